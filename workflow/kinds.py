@@ -19,7 +19,7 @@ from reflowshock.workflow.board_drop.forecast import forecast, package_size
 from reflowshock.workflow.board_drop.plan import package_tables
 from reflowshock.workflow.board_drop.shock_effects import SHOCK_EFFECTS
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.forecast import Size
+from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STAGE, Size
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
@@ -234,5 +234,11 @@ def kind_named_in(table: Mapping) -> Kind:
 
 
 def stage_seconds(case: Case) -> dict[str, float]:
-    """Predict the wall time [s] of each stage of which there is a prediction."""
-    return dict(kind_of(case).forecast(case).seconds)
+    """Predict the wall time [s] of each stage."""
+    return every_stage(case, kind_of(case).forecast(case).seconds)
+
+
+def every_stage(case: Case, predicted: Mapping[str, float]) -> dict[str, float]:
+    """Return predicted wall times [s] with those of the stages that take about as long in every case."""
+    usual = dict.fromkeys(case.pipeline.names, SECONDS_OF_STAGE) | {case.pipeline.names[-1]: SECONDS_OF_REPORT}
+    return usual | dict(predicted)

@@ -9,7 +9,8 @@ from reflowshock.workflow.case.case import FULL, Case
 from reflowshock.workflow.case.fields import display, leaves
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
-from reflowshock.workflow.kinds import kind_of, stage_seconds
+from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
+from reflowshock.workflow.pipeline.gate import LONG
 from reflowshock.workflow.process.terminal import new_table, styled
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
@@ -25,7 +26,7 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
     kind, scale = kind_of(case), "" if case.scale == FULL else f", scale {case.scale}"
     outlook = kind.forecast(case)
     console.print(styled("[bold]{}{}[/]  {}\n", case.case.name, scale, case.case.title))
-    console.print(_stages(store, point, predicted_costs(case, outlook.seconds)))
+    console.print(_stages(store, point, every_stage(case, outlook.seconds)))
     console.print(effects_table(case, outlook.effects, kind.acts))
     for shown in kind.plan(case, outlook):
         console.print(shown)
@@ -64,32 +65,41 @@ def reason(state: StageState, case: Case) -> str:
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """Predict the wall time [s] of all that has to be made up to a stage, corrected by what accuracy measured here."""
+    states, seconds = examine(store, point), corrected(point.case, stage_seconds(point.case))
+    return sum(seconds[stage.name] for stage in point.case.pipeline.upstream(until) if states[stage.name].stale)
+
+
+def corrected(case: Case, seconds: Mapping[str, float]) -> dict[str, float]:
+    """Correct predicted wall times [s] of stages by what the command accuracy measured here."""
     from reflowshock.workflow.convergence.calibration import calibration_of
 
-    known, seconds = calibration_of(point.case), stage_seconds(point.case)
-    states = examine(store, point)
-    stages = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
-    own = [(name, seconds[name]) for name in stages if name in seconds]
-    return sum(known.seconds(name, predicted) if known is not None else predicted for name, predicted in own)
+    known = calibration_of(case)
+    return dict(seconds) if known is None else {stage: known.seconds(stage, own) for stage, own in seconds.items()}
 
 
 def predicted_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
-    """Write the predicted wall time of stages; corrected by what the command accuracy measured here."""
+    """Write the predicted wall time of stages, and which of them the command accuracy has measured here."""
     from reflowshock.workflow.convergence.calibration import calibration_of
 
     known, texts = calibration_of(case), {}
-    for stage, predicted in seconds.items():
+    for stage, cost in corrected(case, seconds).items():
         measured = known is not None and known.knows(stage)
-        cost = known.seconds(stage, predicted) if known is not None else predicted
         source = f" (measured: accuracy, {known.points} points)" if known is not None and measured else ""
         texts[stage] = f"about {duration(cost)}{source}"
     return texts
 
 
-def _stages(store: Store, point: Point, costs: Mapping[str, str]) -> Table:
+def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
+    costs, total, left = predicted_costs(point.case, seconds), corrected(point.case, seconds), 0.0
     for name, state in examine(store, point).items():
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
-        cost = costs.get(name, "") if state.stale else ""
-        table.add_row(name, mark, cost, reason(state, point.case))
+        left += total[name] if state.stale else 0.0
+        table.add_row(name, mark, costs[name] if state.stale else "", reason(state, point.case))
+    table.add_row("all", "", f"about {duration(left)}" if left else "nothing to do", _about_time(left), style="bold")
     return table
+
+
+def _about_time(seconds: float) -> str:
+    """Say of a run's predicted wall time [s] what a user has to know."""
+    return "more than an hour: run asks first; scripts need --yes" if seconds > LONG else "with nothing else to do"

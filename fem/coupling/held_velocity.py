@@ -5,7 +5,7 @@ macro: a_n = (F_ext + F_c - F_int) / (M + M_interface) -> v^{n+1/2}, U^{n+1}; th
 model, which takes m substeps with it WHILE the macro model computes F_int(U^{n+1}); F_c = -(K u)_c comes back last.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.participant import Continued
 from reflowshock.fem.estimates.estimate import WindowPlan
+from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -127,6 +128,11 @@ class WindowMotion(ExplicitMotion):
         before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
         return now + 0.5 * (self._substeps - 1) * (now - before)
 
+    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+        """Return the same at the ends of all substeps of a window: but for the last one it does not change."""
+        first, last = self.body_acceleration(times[0]), self.body_acceleration(times[-1])
+        return [*[first] * (len(times) - 1), last]
+
     def window_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""
         return super().body_acceleration(time - round(time / self.step) % self._substeps * self.step)
@@ -145,6 +151,9 @@ class Driven(Continued):
         self.interface_work = 0.0
         self._interface, self._counted = local_interface(body), counted_interface(body)
         self._zero = np.zeros((len(body.mass), 3))
+        self._lags = plan.step * (np.arange(plan.substeps) - 0.5 * (plan.substeps - 1))
+        ends = 0.5 * plan.step * np.ones(2)  # a substep's work is that of the mean force
+        self._weights = np.column_stack([np.convolve(np.ones(plan.substeps), ends), np.convolve(self._lags, ends)])
 
     def follow(self) -> float:
         """Take m substeps at the received velocity of the interface; return the work that came in across it [J].
@@ -154,20 +163,14 @@ class Driven(Continued):
         motion, counted = self.motion, self._counted
         self._channels.velocities.receive(motion.velocity)
         given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
-        lags = motion.step * (np.arange(self.plan.substeps) - 0.5 * (self.plan.substeps - 1))
-        ends = 0.5 * motion.step * np.ones(2)  # a substep's work is that of the mean force
-        weights = np.column_stack([np.convolve(np.ones(len(lags)), ends), np.convolve(lags, ends)])
-        impulse, lagging = np.zeros((2, len(counted), 3))
-        add_impulse(counted, motion.force, weights[0, 0], impulse)
-        add_impulse(counted, motion.force, weights[0, 1], lagging)
-        for lag, (weight, lagging_weight) in zip(lags, weights[1:], strict=True):
-            if acceleration.any():  # else the interface keeps its velocity
-                motion.velocity[self._interface] = given + lag * acceleration
-            motion.advance()
-            motion.update_force()
-            add_impulse(counted, motion.force, weight, impulse)
-            add_impulse(counted, motion.force, lagging_weight, lagging)
+        change, impulses = np.outer(self._lags, acceleration), np.zeros((2, len(counted), 3))
+        for weight, sum_so_far in zip(self._weights[0], impulses, strict=True):
+            add_impulse(counted, motion.force, weight, sum_so_far)
+        motion.take_steps(
+            self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
+        )
         motion.velocity[self._interface] = given
+        impulse, lagging = impulses
         return -float(np.sum(impulse * motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
 
     def finish_window(self) -> None:

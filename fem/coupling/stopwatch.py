@@ -16,6 +16,7 @@ class Stopwatch:
 
     Attributes:
         turns: Seconds that each model of this rank has had.
+        core_seconds: Of the processor in all turns, waiting included where it keeps the core busy.
     """
 
     def __init__(self, sums: Mapping[Role, MessageClock], coupling: Sequence[MessageClock] = ()) -> None:
@@ -27,20 +28,21 @@ class Stopwatch:
         """
         self.turns: dict[Role, float] = dict.fromkeys(sums, 0.0)
         self._sums, self._coupling = sums, coupling
-        self._begin = 0.0
+        self.core_seconds = self._begin = self._core_begin = 0.0
         self._counted = [(clock, MessageClock()) for clock in [*sums.values(), *coupling]]
 
     def start(self) -> None:
         """Begin a window; messages since the one before are of samples, and do not count."""
         for clock, counted in self._counted:
             clock.packing, clock.waiting = counted.packing, counted.waiting
-        self._begin = time.perf_counter()
+        self._begin, self._core_begin = time.perf_counter(), time.process_time()
 
     def lap(self, role: Role) -> None:
         """Count the time since the start or the last lap for a model."""
-        end = time.perf_counter()
+        end, core_end = time.perf_counter(), time.process_time()
         self.turns[role] += end - self._begin
-        self._begin = end
+        self.core_seconds += core_end - self._core_begin
+        self._begin, self._core_begin = end, core_end
         for clock, counted in self._counted:
             counted.packing, counted.waiting = clock.packing, clock.waiting
 
@@ -58,6 +60,7 @@ class Stopwatch:
         total = np.maximum(total, np.finfo(float).tiny)  # a run that had no window to do
         return {
             "window_seconds": float(total.max()) / max(windows, 1),
+            "window_core_seconds": sum(item["core_seconds"] for item in ranks) / max(windows, 1),
             "busy_share": float(1.0 - waiting.sum() / total.sum()),
             "busy_shares": (1.0 - waiting / total).tolist(),
             "coupling_overhead": float((coupling / total).min()),
@@ -69,6 +72,7 @@ class Stopwatch:
         self.start()
         return {
             "turns": self.turns,
+            "core_seconds": self.core_seconds,
             "sum_packing": {role: clock.packing for role, clock in self._sums.items()},
             "sum_waiting": {role: clock.waiting for role, clock in self._sums.items()},
             "coupling_packing": sum(clock.packing for clock in self._coupling),

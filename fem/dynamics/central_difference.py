@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.dynamics.motion import Motion
+from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce, no_interface
 from reflowshock.fem.forces.force import TermWithPath
-from reflowshock.fem.kernels.motion import advance
+from reflowshock.fem.kernels.levels import Interface, StepArrays
+from reflowshock.fem.kernels.motion import add_impulse, advance
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
@@ -61,6 +63,7 @@ class ExplicitMotion(Motion):
         for load in self._loads:
             load.drive(self.velocity, -step)
         self.velocity -= 0.5 * step * self.acceleration()
+        self._at_once = StepsAtOnce.of(body.terms, self._loads)
 
     @property
     def external_work(self) -> float:
@@ -118,6 +121,37 @@ class ExplicitMotion(Motion):
             load.add(self)
         for load in self._loads:
             load.collect(self)
+
+    def take_steps(self, count: int, interface: Interface | None = None) -> None:
+        """Take steps, each with its force; what moves an interface and what it bears is counted there."""
+        if self.body.shared.exchanged or self._at_once is None:
+            self._take_each(count, interface)
+            return
+        ends = [self.time]
+        for _ in range(count):
+            ends.append(ends[-1] + self.step)
+        accelerations = np.array([self.gravity, *self.accelerations(ends[1:])])
+        tie = self.body.tie
+        arrays = StepArrays(
+            self._state, self.mobility, self.counted_mass, tie.slave, tie.master, tie.weight, self.slave_force
+        )
+        self._body_work += self._at_once.take(self, arrays, interface or no_interface(count), accelerations)
+        self.gravity = accelerations[-1]
+
+    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+        """Return ``body_acceleration`` at the ends [s] of the steps of a window."""
+        return [self.body_acceleration(time) for time in times]
+
+    def _take_each(self, count: int, interface: Interface | None) -> None:
+        """Take steps one by one."""
+        for k in range(count):
+            if interface is not None:
+                self.velocity[interface.rows] = interface.given + interface.change[k]
+            self.advance()
+            self.update_force()
+            if interface is not None:
+                for weight, impulse in zip(interface.weights[k + 1], interface.impulses, strict=True):
+                    add_impulse(interface.counted, self.force, weight, impulse)
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""

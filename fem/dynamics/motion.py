@@ -42,6 +42,12 @@ class Motion(Loaded):
     def update_force(self) -> None:
         """Evaluate the force at the present displacement, once a step."""
 
+    def take_steps(self, count: int) -> None:
+        """Take steps, each with its force."""
+        for _ in range(count):
+            self.advance()
+            self.update_force()
+
     @abstractmethod
     def present_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time``."""

@@ -87,9 +87,7 @@ class Alone(Continued):
 
     def begin_window(self) -> None:
         """Take m substeps."""
-        for _ in range(self.plan.substeps):
-            self.motion.advance()
-            self.motion.update_force()
+        self.motion.take_steps(self.plan.substeps)
 
     def finish_window(self) -> None:
         """Do nothing: the window is done."""

@@ -20,6 +20,7 @@ UPDATES_PER_SECOND = 1.2e7
 BOARD_ADVANTAGE = 4.3
 WINDOW_OVERHEAD = 3.0e-5  # [s] interpreter per window, same source
 STEP_OVERHEAD = 2.5e-5  # [s] interpreter per step of a motion or of a level inside it, same source
+CALL_OVERHEAD = 7.0e-5  # [s] interpreter per window whose steps are one call, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
 ROUNDING = 1e-9  # of a duration
@@ -126,7 +127,7 @@ def largest_implicit_step(duration: float, pulses: Iterable[float]) -> float:
 
 
 def predict_seconds(
-    macro_elements: float, meso: Sequence[tuple[float, int]], plan: WindowPlan, ranks: Ranks
+    macro_elements: float, meso: Sequence[tuple[float, int]], plan: WindowPlan, ranks: Ranks, *, at_once: bool
 ) -> tuple[float, float]:
     """Predict the wall time of a two-scale and of a DNS run on equal cores.
 
@@ -135,15 +136,17 @@ def predict_seconds(
         meso: Elements of each step level of the meso model, in the cost of assembled ones, and its steps a window.
         plan: Time steps; its substeps are those of a DNS.
         ranks: Their number, and which placements are allowed.
+        at_once: Whether a rank that has the meso model for itself takes its steps in one call; that of a DNS does.
 
     Returns:
-        Seconds of ``two_scale`` and of ``dns``.
+        Seconds of the windows of ``two_scale`` and of ``dns``.
     """
     board = macro_elements / BOARD_ADVANTAGE / UPDATES_PER_SECOND
     work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND
     sums = sum(steps for _, steps in meso)
-    cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, sums * STEP_OVERHEAD, sums), LATENCY)
+    calls, message = (CALL_OVERHEAD, LATENCY + STEP_OVERHEAD) if at_once else (sums * STEP_OVERHEAD, LATENCY)
+    cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, calls, sums), message)
     two_scale = least_seconds(ranks, cost)
     everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
-    dns = plan.substeps * (everything / ranks.total + STEP_OVERHEAD + (ranks.total > 1) * LATENCY)
+    dns = plan.substeps * (everything / ranks.total + (ranks.total > 1) * (STEP_OVERHEAD + LATENCY)) + CALL_OVERHEAD
     return plan.windows * two_scale, plan.windows * dns

@@ -36,6 +36,11 @@ class AssembledElements:
         """Subtract K u from the force."""
         add_block_force(self.pointer, self.columns, self.blocks, displacement, force)
 
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {"assembled": (self.pointer, self.columns, self.blocks)}
+
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         return linear_energy(self, displacement, self.mean)

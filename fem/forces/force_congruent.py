@@ -61,6 +61,11 @@ class CongruentElements:
         add_row_forces(self.rows, self.blocks, self.lines[0], self.lines[1])
         subtract_lines(self.nodes, self.axes, self.lines[1], force)
 
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {"congruent": (self.nodes, self.axes, self.rows, self.blocks, self.lines)}
+
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         return linear_energy(self, displacement, self.mean)

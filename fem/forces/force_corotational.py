@@ -15,12 +15,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, element_geometry, element_stiffness
-from reflowshock.fem.elements.one_point import hourglass_control
+from reflowshock.fem.elements.element import Elements, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.forces.force_congruent import SIGNS, aligned, arranged, is_box, parity_blocks
-from reflowshock.fem.forces.nonlinear_blocks import SYMMETRIC, arrange, elastic_constants
+from reflowshock.fem.forces.force_congruent import aligned, arranged, is_box, parity_blocks
+from reflowshock.fem.forces.nonlinear_blocks import arrange, hexahedron_constants
 from reflowshock.fem.kernels.box_rotation import (
     UPRIGHT,
     add_turned_block_forces,
@@ -35,10 +34,6 @@ SHORT_ROWS = 8  # boxes of a row, in the mean, below which blocks of any shapes 
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Parity and entries (00 01 02 11 12 22) of the blocks that resist the modes xy, xz, yz, xyz.
 HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)), (6, (0,)), (5, (3,)), (3, (5,)))
-
-# Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
-HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
-MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +87,17 @@ class CorotationalBoxes:
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
         row = add_turned_row_forces(self.rows, self.scales, self.constants, *self.lines)
         if row != UPRIGHT:
-            raise inverted("the row", self.points[self.nodes[self.rows[row, 0]]])
+            raise self.inverted(row, displacement)
         subtract_lines(self.nodes, self.axes, self.lines[1], force)
+
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {"turning_rows": (self.nodes, self.axes, self.rows, self.scales, self.constants, self.lines)}
+
+    def inverted(self, row: int, displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error of a row with a box that is turned inside out."""
+        return inverted("the row", self.points[self.nodes[self.rows[row, 0]]])
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
@@ -115,6 +119,7 @@ class TurningBlocks:
         history: Empty.
         forces: Kernel that subtracts the force.
         energies: Kernel of the energies of mean strains and higher modes.
+        entry: Of ``kernels.levels.ForceArrays``.
     """
 
     points: NDArray[np.float64]
@@ -126,6 +131,7 @@ class TurningBlocks:
     history: dict[str, NDArray] = field(default_factory=dict)
     forces: ClassVar[Any]
     energies: ClassVar[Any]
+    entry: ClassVar[str]
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
@@ -150,7 +156,16 @@ class TurningBlocks:
         """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
         block = self.forces(self.cells, self.filled, self.constants, displacement, force)
         if block != UPRIGHT:
-            raise inverted("a block", self.points[self.cells[block, 0, 0]])
+            raise self.inverted(block, displacement)
+
+    @property
+    def arrays(self) -> dict[str, tuple[NDArray, ...]]:
+        """Return its entry of ``kernels.levels.ForceArrays``."""
+        return {self.entry: (self.cells, self.filled, self.constants)}
+
+    def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
+        """Return the error of a block with an element that is turned inside out."""
+        return inverted("a block", self.points[self.cells[block, 0, 0]])
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
@@ -162,6 +177,7 @@ class CorotationalBlocks(TurningBlocks):
 
     __slots__ = ()
     forces, energies = staticmethod(add_turned_block_forces), staticmethod(block_energies)
+    entry = "turning_boxes"
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
@@ -180,6 +196,7 @@ class CorotationalHexahedra(TurningBlocks):
 
     __slots__ = ()
     forces, energies = staticmethod(add_turned_forces), staticmethod(turned_energies)
+    entry = "turning"
 
     @staticmethod
     def constants_of(shapes: Elements) -> NDArray[np.float64]:
@@ -229,26 +246,3 @@ def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.flo
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))
     blocks = parity_blocks(element_stiffness(shapes))
     return np.column_stack([elasticity[:, rows, columns], *(blocks[:, parity, entries] for parity, entries in HIGHER)])
-
-
-def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
-    """Return what ``kernels.turned_hexahedron`` needs of each shape: ``(ns, 120)``.
-
-    V C [J], b_p [1/m] of p = 1 to 7, c_k [m], and H [N/m] on the amplitudes, which ``hourglass_control`` has as
-    multiples of the transformed ones.
-
-    Args:
-        shapes: An element of each shape.
-    """
-    corners = shapes.points[shapes.cells]
-    geometry = element_geometry(shapes.points, shapes.cells)
-    rigidity = geometry.volume[:, None] * elastic_constants(shapes.elasticity)[shapes.material]
-    gradient = np.einsum("pa,saj->spj", SIGNS[1:], geometry.gradient) / 8.0
-    transformed = np.einsum("ka,saj->skj", SIGNS[HOURGLASS_PARITY], corners - corners[:, :1])
-    _, stiffness = hourglass_control(corners, shapes.elasticity, shapes.material)
-    tensor = stiffness.reshape(-1, 4, 3, 4, 3)[:, AMPLITUDES][:, :, :, AMPLITUDES]
-    tensor = np.einsum("k,skilj,l->skilj", HANDEDNESS, tensor, HANDEDNESS, optimize=True) / 8.0
-    blocks = tensor.transpose(0, 1, 3, 2, 4)
-    own, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
-    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, own, pairs))
-    return np.column_stack([rigidity, *flat])

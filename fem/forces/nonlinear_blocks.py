@@ -5,14 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, classes
+from reflowshock.fem.elements.element import Elements, classes, element_geometry
 from reflowshock.fem.elements.one_point import hourglass_control
 from reflowshock.fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
+from reflowshock.fem.forces.force_congruent import SIGNS
 from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
 from reflowshock.fem.kernels.lanes import LANES
 from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, STRETCH
 from reflowshock.fem.kernels.nonlinear_gradient import Blocks
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
+from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
 FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)
@@ -21,6 +23,9 @@ TEN_NODES = Tetrahedron(
 )
 SYMMETRIC = (np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2]))  # rows and columns of xx yy zz xy yz xz
 ORTHOTROPIC = (np.append(SYMMETRIC[0], [3, 4, 5]), np.append(SYMMETRIC[1], [3, 4, 5]))
+# Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
+HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
+MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,30 +73,63 @@ def arrange(elements: Elements) -> Lanes:
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
-    """Return one-point hexahedra or tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
+    """Return tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
-    hourglass = np.empty((len(corners), 1, 0))
-    if kind.hourglass:
-        geometry = kind.geometry(corners)
-        gradient, weight = geometry.gradient[:, None], geometry.volume[:, None]
-        gamma, resistance = hourglass_control(corners, elements.elasticity, elements.material[lanes.shape])
-        parts = gamma.transpose(0, 2, 1).reshape(len(corners), 1, -1), resistance.reshape(len(corners), 1, -1)
-        hourglass = np.concatenate(parts, axis=2)
-    else:
-        gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
-        weight = determinant / (6.0 * determinant.shape[1])
+    gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
+    weight = determinant / (6.0 * determinant.shape[1])
     points = gradient.shape[1]
     return Blocks(
         **common_arrays(elements, lanes, plastic),
         gradient=lanes.spread(gradient.reshape(len(corners), points, -1)),
         weight=lanes.spread(weight[:, :, None]),
-        hourglass=lanes.spread(hourglass)[:, 0],
         state=initial_state(len(lanes.filled), points, finite),
         plastic_work=np.zeros(lanes.element.shape),
+    )
+
+
+def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
+    """Return one-point hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
+    shapes = elements.subset(lanes.shape)
+    volume = element_geometry(shapes.points, shapes.cells).volume
+    return OnePointBlocks(
+        **common_arrays(elements, lanes, plastic),
+        constants=lanes.spread(hexahedron_constants(shapes)[:, None])[:, 0],
+        weight=lanes.spread(volume[:, None, None]),
+        state=initial_state(len(lanes.filled), 1, finite),
+        plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
-        slip=written_zeros(len(lanes.filled), 12 * LANES if kind.hourglass else 0),
+        slip=written_zeros(len(lanes.filled), 12 * LANES),
         modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
+
+
+def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
+    """Return what ``kernels.turned_hexahedron`` needs of each shape: ``(ns, 120)``.
+
+    V C [J], b_p [1/m] of p = 1 to 7, c_k [m], and H [N/m] on the amplitudes, which ``hourglass_control`` has as
+    multiples of the transformed ones.
+
+    Args:
+        shapes: An element of each shape.
+    """
+    corners = shapes.points[shapes.cells]
+    geometry = element_geometry(shapes.points, shapes.cells)
+    rigidity = geometry.volume[:, None] * elastic_constants(shapes.elasticity)[shapes.material]
+    gradient = np.einsum("pa,saj->spj", SIGNS[1:], geometry.gradient) / 8.0
+    transformed = np.einsum("ka,saj->skj", SIGNS[HOURGLASS_PARITY], corners - corners[:, :1])
+    _, stiffness = hourglass_control(corners, shapes.elasticity, shapes.material)
+    tensor = stiffness.reshape(-1, 4, 3, 4, 3)[:, AMPLITUDES][:, :, :, AMPLITUDES]
+    tensor = np.einsum("k,skilj,l->skilj", HANDEDNESS, tensor, HANDEDNESS, optimize=True) / 8.0
+    blocks = tensor.transpose(0, 1, 3, 2, 4)
+    own, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
+    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, own, pairs))
+    return np.column_stack([rigidity, *flat])
+
+
+def in_modes(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the amplitudes ``(ne, 12)`` [m] of ``one_point`` as those of the modes xy, xz, yz, xyz."""
+    ordered = amplitudes.reshape(-1, 4, 3)[:, AMPLITUDES] * HANDEDNESS[:, None]
+    return np.sqrt(8.0) * ordered.reshape(amplitudes.shape)
 
 
 def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> HexahedronBlocks:

@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.hexahedron import add_product, condense, new_strain_bench, write_strains
-from reflowshock.fem.kernels.nonlinear_gradient import carried
+from reflowshock.fem.kernels.nonlinear_one_point import carried
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
 
 NODAL, ALL = 24, 33  # components of a hexahedron at its nodes, and with its incompatible modes
@@ -199,7 +199,7 @@ def one_point(shape, displacement, materials, states):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_share(points, stress, laws, share):
-    """Write which share ``(ne,)`` of elastic hourglass forces sections can carry, see ``nonlinear_gradient``.
+    """Write which share ``(ne,)`` of elastic hourglass forces sections can carry, see ``nonlinear_one_point``.
 
     Args:
         points: ``(ne, 1, 7)`` stress [Pa] and plastic strain of the centres.

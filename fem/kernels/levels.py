@@ -1,11 +1,171 @@
-"""Numba kernels of substeps inside a step; see ``fem.model.step_levels``.
+"""Numba kernels of many steps in one call: all those of a window, and substeps inside a step.
 
-A level has its state in ``(3, n, 3)``: displacement [m], force [N], weighted sum of forces [N].
+Levels inside a step are those of ``fem.model.step_levels``; a level has its state in ``(3, n, 3)``: displacement [m],
+force [N], weighted sum of forces [N].
 """
 
-from numba import njit
+from typing import NamedTuple
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from reflowshock.fem.kernels.box_rotation import add_turned_block_forces, add_turned_row_forces
+from reflowshock.fem.kernels.box_rows import add_row_forces, read_lines, subtract_lines
 from reflowshock.fem.kernels.force import add_block_force
+from reflowshock.fem.kernels.motion import add_impulse, advance, gather_from_slaves, spread_to_slaves
+from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
+from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces
+
+ALL_FINE = -1  # no element is turned inside out
+NAMES = ("congruent", "assembled", "turning_rows", "turning_boxes", "turning", "one_point")
+
+
+class ForceArrays(NamedTuple):
+    """The arrays of force terms, at most one of each kind, as their kernels take them; empty where there is none.
+
+    Attributes:
+        congruent: Nodes, axes, rows, blocks and lines of ``kernels.box_rows``.
+        assembled: Pointer, columns and blocks of ``kernels.force.add_block_force``.
+        turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
+        turning_boxes: Cells, filled and constants of ``box_rotation.add_turned_block_forces``.
+        turning: The same of ``turned_hexahedron.add_turned_forces``.
+        one_point: See ``nonlinear_one_point``.
+        path: Of these.
+    """
+
+    congruent: tuple[NDArray, ...]
+    assembled: tuple[NDArray, ...]
+    turning_rows: tuple[NDArray, ...]
+    turning_boxes: tuple[NDArray, ...]
+    turning: tuple[NDArray, ...]
+    one_point: OnePointBlocks
+    path: Path
+
+
+class StepArrays(NamedTuple):
+    """What a motion on one rank steps with, see ``ExplicitMotion``; slaves, masters and weights are those of the tie.
+
+    Attributes:
+        state: ``(3, n, 3)`` displacement [m], velocity half a step back [m/s], force [N].
+        mobility: ``(n, 3)`` [1/kg].
+        counted_mass: ``(n,)`` [kg].
+        slave, master, weight: See ``fem.mesh.tie``.
+        slave_force: ``(ns, 3)`` [N].
+    """
+
+    state: NDArray[np.float64]
+    mobility: NDArray[np.float64]
+    counted_mass: NDArray[np.float64]
+    slave: NDArray[np.int32]
+    master: NDArray[np.int32]
+    weight: NDArray[np.float64]
+    slave_force: NDArray[np.float64]
+
+
+class Interface(NamedTuple):
+    """An interface that another model moves through some steps, and the impulses that its forces give.
+
+    Attributes:
+        rows: ``(k,)`` int32 its nodes on this rank.
+        counted: ``(c,)`` int32 those that count on this rank.
+        given: ``(k, 3)`` [m/s] their mean velocity.
+        change: ``(m, 3)`` [m/s] of it in each step.
+        weights: ``(m + 1, 2)`` [s], [s^2] of the force before the first step and after each in both impulses.
+        impulses: ``(2, c, 3)`` [N s], [N s^2], added to.
+    """
+
+    rows: NDArray[np.int32]
+    counted: NDArray[np.int32]
+    given: NDArray[np.float64]
+    change: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    impulses: NDArray[np.float64]
+
+
+@njit(cache=True)
+def add_forces(arrays, displacement, force):
+    """Subtract the internal force of all terms, as their ``add`` does.
+
+    Returns:
+        ``ALL_FINE``, or the place in ``NAMES`` of a term with an element that is turned inside out; and its block.
+    """
+    nodes, axes, rows, blocks, lines = arrays.congruent
+    if len(rows):
+        read_lines(nodes, axes, displacement, lines[0])
+        add_row_forces(rows, blocks, lines[0], lines[1])
+        subtract_lines(nodes, axes, lines[1], force)
+    pointer, columns, assembled = arrays.assembled
+    add_block_force(pointer, columns, assembled, displacement, force)
+    nodes, axes, rows, scales, constants, lines = arrays.turning_rows
+    if len(rows):
+        read_lines(nodes, axes, displacement, lines[0])
+        block = add_turned_row_forces(rows, scales, constants, lines[0], lines[1])
+        if block >= 0:
+            return 2, block
+        subtract_lines(nodes, axes, lines[1], force)
+    cells, filled, constants = arrays.turning_boxes
+    block = add_turned_block_forces(cells, filled, constants, displacement, force)
+    if block >= 0:
+        return 3, block
+    cells, filled, constants = arrays.turning
+    block = add_turned_forces(cells, filled, constants, displacement, force)
+    if block >= 0:
+        return 4, block
+    block = add_one_point_force(arrays.one_point, arrays.path, displacement, force)
+    if block >= 0:
+        return 5, block
+    return ALL_FINE, 0
+
+
+@njit(cache=True)
+def take_steps(motion, arrays, interface, accelerations, step):
+    """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do, in the same order.
+
+    Args:
+        motion: ``StepArrays``.
+        arrays: ``ForceArrays``.
+        interface: ``Interface``.
+        accelerations: ``(m + 1, 3)`` [m/s^2] of all masses as each step begins, and after the last.
+        step: dt [s].
+
+    Returns:
+        Work of the accelerations [J]; steps taken; what ``add_forces`` returned last.
+    """
+    displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
+    work = 0.0
+    for k in range(len(accelerations) - 1):
+        for i in range(len(interface.rows)):
+            for c in range(3):
+                velocity[interface.rows[i], c] = interface.given[i, c] + interface.change[k, c]
+        advance(motion.state, motion.mobility, accelerations[k], step)
+        spread_to_slaves(motion.slave, motion.master, motion.weight, displacement)
+        mean = 0.5 * (accelerations[k] + accelerations[k + 1])
+        if mean.any():
+            work += step * power_of(mean, motion.counted_mass, velocity)
+        force[:] = 0.0
+        which, block = add_forces(arrays, displacement, force)
+        if which != ALL_FINE:
+            return work, k + 1, which, block
+        for i in range(len(motion.slave)):
+            for c in range(3):
+                motion.slave_force[i, c] = force[motion.slave[i], c]
+        gather_from_slaves(motion.slave, motion.master, motion.weight, force)
+        for j in range(2):
+            add_impulse(interface.counted, force, interface.weights[k + 1, j], interface.impulses[j])
+    return work, len(accelerations) - 1, ALL_FINE, 0
+
+
+@njit(cache=True)
+def power_of(acceleration, mass, velocity):
+    """Return the power [W] of an acceleration ``(3,)`` on masses ``(n,)`` at velocities ``(n, 3)``."""
+    x = y = z = 0.0
+    for i in range(len(mass)):
+        x += mass[i] * velocity[i, 0]
+        y += mass[i] * velocity[i, 1]
+        z += mass[i] * velocity[i, 2]
+    return acceleration[0] * x + acceleration[1] * y + acceleration[2] * z
 
 
 @njit(cache=True)

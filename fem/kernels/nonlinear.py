@@ -29,7 +29,7 @@ from reflowshock.fem.kernels.lanes import (
     six,
     times,
 )
-from reflowshock.fem.kernels.plasticity import plastic_increment
+from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment
 
 DEFORMATION, ROTATION, INCREMENT, MISES, NOMINAL, WORK_SLOTS = (LANES * k for k in (0, 9, 18, 24, 25, 34))
 STRESS, STRETCH, PLASTIC, STATE_SLOTS = (LANES * k for k in (0, 6, 12, 13))
@@ -189,6 +189,15 @@ def elastic_stress(w, state, elastic):
         w[MISES + lane] = np.sqrt(square)
 
 
+@njit(**LANE_OPTIONS)
+def count_above(values, at, limit):
+    """Return in how many lanes an entry is above a limit."""
+    count = 0.0
+    for lane in range(LANES):
+        count += 1.0 if values[at + lane] > limit else 0.0
+    return count
+
+
 @njit(cache=True, error_model="numpy")
 def plastic_flow(w, state, law, weight, work):
     """Return the stress to the yield surface where the elastic trial state lies outside (radial return).
@@ -206,9 +215,11 @@ def plastic_flow(w, state, law, weight, work):
         work: ``(16,)`` [J] plastic work, added to.
     """
     plastic, step = law
+    if count_above(w, MISES, plastic[FIRST_YIELD]) == 0.0:
+        return
     for lane in range(LANES):
         trial = w[MISES + lane]
-        if trial <= plastic[1]:
+        if not trial > plastic[FIRST_YIELD]:
             continue
         flow = plastic_increment(trial, state[PLASTIC + lane], plastic, step)
         if flow == 0.0:

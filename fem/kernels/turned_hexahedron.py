@@ -10,8 +10,9 @@ is that of the element at rest in the frame that turns with F = R U,
 and the force its exact derivative: with P as in ``box_rotation`` and G_k = R (H g^)_k, that on F at fixed q_k is
 D = P - sum over k of G_k (x) c_k; that on q_p is D b_p, of the four modes with G_k.
 
-Slots of the workspace ``w``, in units of lanes: the modes, F and R as in ``box_rotation``, then g^ of the modes xy, xz,
-yz, xyz as A, B, C, D, and H g^ of them. Offsets are constants: only then does the compiler know that nothing overlaps.
+Slots of the workspace ``w``, in units of lanes: the modes, F and R as in ``box_rotation``, room for the rest of
+``kernels.nonlinear``, then g^ of the modes xy, xz, yz, xyz as A, B, C, D, and H g^ of them. Offsets are constants: only
+then does the compiler know that nothing overlaps.
 """
 
 import numpy as np
@@ -50,7 +51,7 @@ from reflowshock.fem.kernels.lanes import (
 )
 from reflowshock.fem.kernels.nonlinear import rotate, stretch
 
-A, B, C, D, SHIFT, SLOTS = (LANES * n for n in (42, 45, 48, 51, 12, 66))
+A, B, C, D, SHIFT, SLOTS = (LANES * n for n in (58, 61, 64, 67, 12, 82))
 # Entries of an element: V C as in ``box_rotation.stress``, b_p of p = 1 to 7, c_k, then H in blocks of the modes: aa,
 # bb, cc, dd with six entries each, ab, ac, ad, bc, bd, cd with nine.
 GRADIENT, CORNERS, STIFFNESS = 9 * LANES, 30 * LANES, 42 * LANES
@@ -67,11 +68,11 @@ def add_product(f, a, b):
 
 
 @njit(**LANE_OPTIONS)
-def write_mean_deformation(k, w):
-    """Write F of sixteen elements."""
+def write_mean_deformation(k, w, unit):
+    """Write F of sixteen elements; with ``unit`` zero in the place of one, F - 1."""
     b = k[GRADIENT - 3 * LANES :]
     for lane in range(LANES):
-        f = add_product((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), three(w, X + lane), three(b, X + lane))
+        f = add_product((unit, 0.0, 0.0, 0.0, unit, 0.0, 0.0, 0.0, unit), three(w, X + lane), three(b, X + lane))
         f = add_product(f, three(w, Y + lane), three(b, Y + lane))
         f = add_product(f, three(w, Z + lane), three(b, Z + lane))
         f = add_product(f, three(w, XY + lane), three(b, XY + lane))
@@ -81,22 +82,22 @@ def write_mean_deformation(k, w):
 
 
 @njit(**LANE_OPTIONS)
-def amplitude(k, at, q, r, f):
-    """Return g^ = R^T (q - (F - 1) c) of a mode, whose c stands in ``k`` at ``at``."""
-    c = three(k, at)
+def amplitude(c, q, r, f, unit):
+    """Return g^ = R^T (q - (F - 1) c) of a mode; ``unit`` as above."""
     moved = applied(f, c)
-    return applied(transposed(r), (q[0] - moved[0] + c[0], q[1] - moved[1] + c[1], q[2] - moved[2] + c[2]))
+    x, y, z = q[0] - moved[0] + unit * c[0], q[1] - moved[1] + unit * c[1], q[2] - moved[2] + unit * c[2]
+    return applied(transposed(r), (x, y, z))
 
 
 @njit(**LANE_OPTIONS)
-def write_amplitudes(k, w):
-    """Write g^ of sixteen elements, given F and R."""
+def write_amplitudes(k, w, unit):
+    """Write g^ of sixteen elements, given F and R; ``unit`` as above."""
     for lane in range(LANES):
         r, f = nine(w, ROTATION + lane), nine(w, DEFORMATION + lane)
-        put_three(w, A + lane, amplitude(k, CORNERS + lane, three(w, XY + lane), r, f))
-        put_three(w, B + lane, amplitude(k, CORNERS + 3 * LANES + lane, three(w, XZ + lane), r, f))
-        put_three(w, C + lane, amplitude(k, CORNERS + 6 * LANES + lane, three(w, YZ + lane), r, f))
-        put_three(w, D + lane, amplitude(k, CORNERS + 9 * LANES + lane, three(w, XYZ + lane), r, f))
+        put_three(w, A + lane, amplitude(three(k, CORNERS + lane), three(w, XY + lane), r, f, unit))
+        put_three(w, B + lane, amplitude(three(k, CORNERS + 3 * LANES + lane), three(w, XZ + lane), r, f, unit))
+        put_three(w, C + lane, amplitude(three(k, CORNERS + 6 * LANES + lane), three(w, YZ + lane), r, f, unit))
+        put_three(w, D + lane, amplitude(three(k, CORNERS + 9 * LANES + lane), three(w, XYZ + lane), r, f, unit))
 
 
 @njit(**LANE_OPTIONS)
@@ -174,9 +175,9 @@ def read_block(cells, displacement, k, w):
     """Write modes, F, R and g^ of a block; return whether no element is turned inside out."""
     gather_lanes(cells, displacement, w)
     transform_corners(w)
-    write_mean_deformation(k, w)
+    write_mean_deformation(k, w, 1.0)
     upright = rotate(w[DEFORMATION:])
-    write_amplitudes(k, w)
+    write_amplitudes(k, w, 1.0)
     write_resistance(k, w)
     return upright
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.forces.energy import InternalForce
 from reflowshock.fem.forces.force import linear_terms
-from reflowshock.fem.kernels.damping import add_damping, power
+from reflowshock.fem.kernels.motion import add_damping, power
 from reflowshock.fem.loads.load import Kept, Load, Loaded
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.body import Body

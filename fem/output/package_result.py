@@ -108,6 +108,7 @@ def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dic
     return {
         "steps_per_second": quantity(windows * substeps / timings.windows, "1/s"),
         "window_seconds": quantity(timings.windows / windows, "s"),
+        "window_core_seconds": quantity(timings.balance["window_core_seconds"], "s"),
         "element_updates_per_second": quantity(windows * updates / timings.windows, "1/s"),
         "step_ratio": quantity(substeps),
         "added_mass": quantity(summary["added_mass"], "kg"),

@@ -125,7 +125,7 @@ def in_hole(key: str, place: tuple[float, float, float], structure: Structure) -
     holes = structure.holes
     if holes is None:
         return
-    radius = math.hypot(*(abs(x) - 0.5 * spacing for x, spacing in zip(place, holes.spacing, strict=False)))
+    radius = min(math.dist(place[:2], axis) for axis in holes.places)
     if radius < 0.5 * holes.diameter - structure.margin:
         allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
         yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(place), allowed)

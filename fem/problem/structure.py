@@ -53,6 +53,12 @@ class Holes(Parameters):
     spacing: Annotated[tuple[float, float], Quantity("mm")]
     diameter: Annotated[float, Quantity("mm")] = Field(gt=0)
 
+    @property
+    def places(self) -> tuple[tuple[float, float], ...]:
+        """Their axes [m]."""
+        x, y = (0.5 * spacing for spacing in self.spacing)
+        return (-x, -y), (-x, y), (x, -y), (x, y)
+
 
 class Structure(Parameters):
     """A box of layers, z = 0 at its bottom, centred on x = y = 0.

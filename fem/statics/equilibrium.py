@@ -3,7 +3,7 @@
 The stress has a convex potential (``kernels.hencky``): each linear system is symmetric and positive, and conjugate
 gradients with the elastic factor as preconditioner solve it in few products, since the tangent is at most as stiff as
 the elastic body. A step that ends beyond the least energy on its way is cut where the slope changes sign. Only the
-limits of hourglass forces (``kernels.nonlinear_gradient``) have no potential: there convergence is linear.
+limits of hourglass forces (``kernels.nonlinear_one_point``) have no potential: there convergence is linear.
 """
 
 from collections.abc import Sequence

@@ -20,6 +20,7 @@ from reflowshock.fem.errors import MeshError
 from reflowshock.fem.estimates.placement import Role
 from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, by_lane
+from reflowshock.fem.forces.nonlinear_blocks import in_modes
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.model.body import Body
@@ -156,9 +157,10 @@ def begin_path(
     order, state = term.lanes.element, by_lane(term.history["state"])
     state[..., :6] = points.stress[order]
     state[..., 12] = points.plastic_strain[order]
-    term.history["hourglass"][...] = points.hourglass_energy[order]
-    if points.stretched.shape[1]:
-        by_lane(term.history["slip"])[...] = -points.stretched[order]
+    if "hourglass" in term.history:
+        term.history["hourglass"][...] = points.hourglass_energy[order]
+    if "slip" in term.history:
+        by_lane(term.history["slip"])[...] = -in_modes(points.stretched)[order]
 
 
 def pretension_of(

@@ -101,7 +101,6 @@ def _package_parts(package: Package, board: Board) -> dict[str, list[int]]:
 def _planes_and_holes(board: Board) -> dict[str, list[int]]:
     """Find symmetry planes and hole walls by where the surfaces lie."""
     names: dict[str, list[int]] = {"mounting_holes": []}
-    hole = (0.5 * board.length - board.holes.inset_x, 0.5 * board.width - board.holes.inset_y)
     if board.symmetry == "quarter":
         names |= {"symmetry_x": [], "symmetry_y": []}
     for _, tag in gmsh.model.getEntities(2):
@@ -110,7 +109,7 @@ def _planes_and_holes(board: Board) -> dict[str, list[int]]:
             names["symmetry_x"].append(tag)
         elif board.symmetry == "quarter" and max(abs(y0), abs(y1)) < TOLERANCE:
             names["symmetry_y"].append(tag)
-        elif lies_within_hole(tag, hole, board.holes.diameter):
+        elif lies_within_hole(tag, board.hole_places, board.holes.diameter):
             names["mounting_holes"].append(tag)
     return names
 

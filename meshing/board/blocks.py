@@ -45,7 +45,7 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
     for i in range(len(plan.x)):
         for j in range(len(plan.y)):
             sides = [along_x[i, j], along_y[i + 1, j], -along_x[i, j + 1], -along_y[i, j]]
-            if hole and i in plan.hole_x and j in plan.hole_y:
+            if hole and (i, j) in plan.holes:
                 corners = [points[i, j], points[i + 1, j], points[i + 1, j + 1], points[i, j + 1]]
                 counts = [plan.x[i].cells, plan.y[j].cells] * 2
                 centre = (0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1]), height / MILLI)
@@ -84,11 +84,11 @@ def _line(start: int, end: int, part: Interval) -> int:
     return line
 
 
-def lies_within_hole(surface: int, centre: tuple[float, float], diameter: float) -> bool:
-    """Whether a surface lies within the square around the hole at the centre [m], or at one of its mirror images."""
+def lies_within_hole(surface: int, centres: Iterable[tuple[float, float]], diameter: float) -> bool:
+    """Whether a surface lies within the square around a hole at one of the centres [m]."""
     x0, y0, _, x1, y1, _ = (value * MILLI for value in gmsh.model.getBoundingBox(2, surface))
-    off_centre = [abs(value) - centre[0] for value in (x0, x1)] + [abs(value) - centre[1] for value in (y0, y1)]
-    return max(map(abs, off_centre)) <= 0.5 * diameter + TOLERANCE
+    reach = 0.5 * diameter + TOLERANCE
+    return any(x - reach <= x0 and x1 <= x + reach and y - reach <= y0 and y1 <= y + reach for x, y in centres)
 
 
 def check_elements(name: str) -> None:

@@ -112,10 +112,8 @@ def _sides(box: Box) -> dict[str, list[int]]:
         for name, (axis, place) in zip(SIDES, planes, strict=True):
             if max(abs(limits[axis] - place), abs(limits[axis + 3] - place)) < TOLERANCE:
                 names[name].append(tag)
-        if box.holes and _is_wall(limits):
-            centre = (0.5 * box.holes.spacing[0], 0.5 * box.holes.spacing[1])
-            if lies_within_hole(tag, centre, box.holes.diameter):
-                names["mounting_holes"].append(tag)
+        if box.holes and _is_wall(limits) and lies_within_hole(tag, box.holes.places, box.holes.diameter):
+            names["mounting_holes"].append(tag)
     return names
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 from reflowshock.meshing.board.checks import SMALLEST_INSET
 from reflowshock.meshing.board.estimate import PartEstimate
-from reflowshock.meshing.board.plan import Interval, Plan, uniform
+from reflowshock.meshing.board.plan import Interval, Plan, blocks_at, uniform
 from reflowshock.problem import Problem
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -35,6 +35,12 @@ class BoxHoles:
 
     spacing: tuple[float, float]
     diameter: float
+
+    @property
+    def places(self) -> tuple[tuple[float, float], ...]:
+        """Their axes [m]."""
+        x, y = (0.5 * spacing for spacing in self.spacing)
+        return (-x, -y), (-x, y), (x, -y), (x, y)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +102,8 @@ class Box:
 
 def box_plan(box: Box) -> Plan:
     """Cut the box along x and y: into equal cells, but for the squares around holes."""
-    axes = [_axis(box, axis) for axis in (0, 1)]
-    hole_x, hole_y = (frozenset(k for k, part in enumerate(axis) if _is_at_hole(box, i, part))
-                      for i, axis in enumerate(axes))  # fmt: skip
-    return Plan(axes[0], axes[1], hole_x, hole_y)
+    x, y = _axis(box, 0), _axis(box, 1)
+    return Plan(x, y, blocks_at(box.holes.places, x, y) if box.holes else frozenset())
 
 
 def count_box(box: Box) -> dict[str, PartEstimate]:
@@ -110,10 +114,8 @@ def count_box(box: Box) -> dict[str, PartEstimate]:
 def _count_stack(box: Box) -> dict[str, PartEstimate]:
     plan = box_plan(box)
     cells = sum(part.cells for part in plan.x) * sum(part.cells for part in plan.y)
-    for i in plan.hole_x:
-        for j in plan.hole_y:
-            around = 2 * (plan.x[i].cells + plan.y[j].cells) * box.rings
-            cells += around - plan.x[i].cells * plan.y[j].cells
+    for i, j in plan.holes:
+        cells += 2 * (plan.x[i].cells + plan.y[j].cells) * box.rings - plan.x[i].cells * plan.y[j].cells
     smallest = [min(part.smallest() for part in axis) for axis in (plan.x, plan.y)]
     if box.holes is not None:
         smallest = [min(length, _smallest_in_ring(box, plan)) for length in smallest]
@@ -135,16 +137,12 @@ def _axis(box: Box, axis: int) -> tuple[Interval, ...]:
     return positive if box.is_halved(axis) else (*(part.mirrored() for part in reversed(positive)), *positive)
 
 
-def _is_at_hole(box: Box, axis: int, part: Interval) -> bool:
-    centre = 0.5 * abs(part.start + part.end)
-    return box.holes is not None and math.isclose(centre, 0.5 * box.holes.spacing[axis], rel_tol=1.0e-9)
-
-
 def _smallest_in_ring(box: Box, plan: Plan) -> float:
     """Shortest edge [m] around a hole: radial, or along the circle."""
     assert box.holes is not None
     radial = 0.5 * (box.square - box.holes.diameter) / box.rings
-    around = 2 * (plan.x[max(plan.hole_x)].cells + plan.y[max(plan.hole_y)].cells)
+    i, j = max(plan.holes)
+    around = 2 * (plan.x[i].cells + plan.y[j].cells)
     return min(radial, math.pi * box.holes.diameter / around)
 
 

@@ -3,10 +3,11 @@
 import difflib
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 from reflowshock.meshing.board.pads import joint_name, lift, pad_table
-from reflowshock.meshing.board.parameters import Board, Package, Pad, Warpage
-from reflowshock.meshing.board.plan import WIDEST_SQUARE, square_around, uniform
+from reflowshock.meshing.board.parameters import IN_LINE, Board, Package, Pad, Warpage
+from reflowshock.meshing.board.plan import WIDEST_SQUARE, hole_square, square_around, uniform
 from reflowshock.problem import Problem
 
 LEAST_ROOM = 1.1  # side of a column over the diameter of its pad
@@ -30,7 +31,8 @@ def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
         *_pad("package.board_pad", package.board_pad, package),
         *_pad("package.package_pad", package.package_pad, package),
         *_layers(package, board),
-        *_holes(package, board),
+        *_which_holes(board),
+        *(_hole_places(package, board) if board.holes.at or any(board.centre) else _holes(package, board)),
         *_gaps(package, board, warpage),
         *_numerics(board),
         *_imprint(package),
@@ -93,14 +95,21 @@ def _layers(package: Package, board: Board) -> Iterator[Problem]:
         if die > substrate:
             message = "the die is larger than its substrate"
             yield Problem(f"package.die.{side}", message, _mm(die), f"<= {_mm(substrate)}")
+        low, high = board.ends[side == "width"]
         if substrate >= whole:
             message = "the package is larger than the board"
             yield Problem(f"package.substrate.{side}", message, _mm(substrate), f"< {_mm(whole)}, the board's")
+        elif 0.5 * substrate >= min(-low, high):
+            away = 0.5 * (whole - substrate)
+            message = f"the package at the origin reaches beyond the board along its {side}"
+            yield Problem("board.centre", message, _places(board.centre), f"within {_mm(away)} of the origin")
 
 
 def _holes(package: Package, board: Board) -> Iterator[Problem]:
     """Holes lie inside the board, and the blocks around them beyond the package along both axes."""
     diameter, x, y = board.holes.diameter, board.holes.inset_x, board.holes.inset_y
+    if x is None or y is None:
+        return
     for axis, side, inset, other in (("x", "length", x, y), ("y", "width", y, x)):
         whole = getattr(board, side)
         room = 0.5 * whole - _taken_by_package(getattr(package.substrate, side), board)
@@ -115,6 +124,56 @@ def _holes(package: Package, board: Board) -> Iterator[Problem]:
         elif inset > largest:
             message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
             yield Problem(key, message, _mm(inset), allowed)
+
+
+def _which_holes(board: Board) -> Iterator[Problem]:
+    """Holes are given by their insets or by their places; a quarter has those of a board in the middle."""
+    holes = board.holes
+    insets = [name for name in ("inset_x", "inset_y") if getattr(holes, name) is not None]
+    if holes.at and insets:
+        yield Problem(
+            f"board.holes.{insets[0]}", "goes with no holes at places of their own", None, "no board.holes.at"
+        )
+    elif not holes.at and len(insets) < 2:
+        missing = next(name for name in ("inset_x", "inset_y") if name not in insets)
+        yield Problem(f"board.holes.{missing}", "is missing", None, "a length, or board.holes.at = [[x, y], …]")
+    if board.symmetry == "full":
+        return
+    whole = 'in the middle, or board.symmetry = "full"'
+    if any(board.centre):
+        yield Problem("board.centre", "a quarter stands for a board with its package in the middle", None, whole)
+    for x, y in holes.at:
+        if not all(any(math.dist(mirror, place) <= IN_LINE for place in holes.at) for mirror in ((-x, y), (x, -y))):
+            message = "a quarter stands for a board whose holes have their mirror images"
+            yield Problem("board.holes.at", message, _places((x, y)), f"{_places((-x, y))} and {_places((x, -y))} too")
+
+
+def _hole_places(package: Package, board: Board) -> Iterator[Problem]:
+    """Holes at any places lie inside the board, beyond the package along both axes, in line or apart."""
+    key, least = "board.holes.at", SMALLEST_INSET * board.holes.diameter
+    if not board.hole_places:
+        return
+    if not any(places[-1] > places[0] for places in board.hole_lines):
+        yield Problem(key, "a board on one hole would turn about it", str(len(board.holes.at)), ">= 2 places")
+    sides = (package.substrate.length, package.substrate.width)
+    square = hole_square(board)
+    for axis, (side, (low, high), lines) in enumerate(zip(sides, board.ends, board.hole_lines, strict=True)):
+        beyond = _taken_by_package(side, board) + 0.5 * max(square, 2.0 * least)
+        for place in lines:
+            inside = f"{_mm(low + least)} to {_mm(-beyond)} and {_mm(beyond)} to {_mm(high - least)}"
+            if not low + least <= place <= high - least:
+                yield Problem(key, f"a mounting hole reaches beyond the board along {'xy'[axis]}", _mm(place), inside)
+            elif abs(place) < beyond:
+                message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
+                yield Problem(key, f"{message} along {'xy'[axis]}", _mm(place), inside)
+        for first, second in pairwise(lines):
+            if second - first < 2.0 * least:
+                message = f"mounting holes are neither in line nor apart along {'xy'[axis]}"
+                yield Problem(key, message, _mm(second - first), f"0 mm, or >= {_mm(2.0 * least)}")
+
+
+def _places(place: tuple[float, float]) -> str:
+    return f"({_mm(place[0])}, {_mm(place[1])})"
 
 
 def _no_room(side: str, needed: float, room: float, board: Board) -> Problem:

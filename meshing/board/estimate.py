@@ -52,9 +52,8 @@ def count_elements(
 def _board_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
     plan, numerics = board_plan(package, board), board.numerics
     patch_cells, all_cells = _cells(plan, patch(plan, package)), _cells(plan, _all_blocks(plan))
-    holes = {(i, j) for i in plan.hole_x for j in plan.hole_y}
-    around_holes = sum(2 * (plan.x[i].cells + plan.y[j].cells) * hole_rings(board) for i, j in holes)
-    all_cells += around_holes - _cells(plan, holes)
+    around_holes = sum(2 * (plan.x[i].cells + plan.y[j].cells) * hole_rings(board) for i, j in plan.holes)
+    all_cells += around_holes - _cells(plan, plan.holes)
     layer = board.thickness / numerics.layers
     size = (_smallest(plan.x), _smallest(plan.y), layer)
     in_patch = patch_cells * numerics.patch_layers

@@ -11,6 +11,7 @@ from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
 Length = Annotated[float, Quantity("mm")]
+IN_LINE = 1.0e-9  # m: holes whose places along an axis differ by less are in line
 
 
 class Pad(Parameters):
@@ -114,12 +115,20 @@ class Package(Parameters):
         return (self.imprint.size or self.pitch) if self.imprint else None
 
 
+Place = Annotated[tuple[float, float], Quantity("mm")]
+
+
 class Holes(Parameters):
-    """Four mounting holes, one near each corner of the board."""
+    """Mounting holes of one diameter: four, one near each corner of the board, or ``at`` any places beside the package.
+
+    Those at places have the package's centre as their origin; each needs strips of the board of its own along both
+    axes, which holes in line share.
+    """
 
     diameter: Length = Field(gt=0)
-    inset_x: Length = Field(gt=0)
-    inset_y: Length = Field(gt=0)
+    inset_x: Length | None = Field(None, gt=0)
+    inset_y: Length | None = Field(None, gt=0)
+    at: tuple[Place, ...] = ()
 
 
 class BoardNumerics(Parameters):
@@ -138,14 +147,48 @@ class BoardNumerics(Parameters):
 
 
 class Board(Parameters):
-    """The printed circuit board, centred on the origin; its top face is z = 0."""
+    """The printed circuit board; its top face is z = 0, the origin below the package's centre.
+
+    ``centre`` is where the middle of the board lies: off the origin, if the package is not in the middle.
+    """
 
     length: Length = Field(gt=0)
     width: Length = Field(gt=0)
     thickness: Length = Field(gt=0)
+    centre: Place = (0.0, 0.0)
     holes: Holes
     symmetry: Literal["full", "quarter"] = "quarter"
     numerics: BoardNumerics = BoardNumerics()
+
+    @property
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where the whole board begins and ends along x and y [m]."""
+        (x, y), (a, b) = self.centre, (0.5 * self.length, 0.5 * self.width)
+        return (x - a, x + a), (y - b, y + b)
+
+    @property
+    def hole_places(self) -> tuple[tuple[float, float], ...]:
+        """Axes of the mounting holes of the whole board [m]."""
+        if self.holes.at or self.holes.inset_x is None or self.holes.inset_y is None:
+            return self.holes.at
+        insets = (self.holes.inset_x, self.holes.inset_y)
+        xs, ys = ((low + inset, high - inset) for (low, high), inset in zip(self.ends, insets, strict=True))
+        return tuple((x, y) for x in xs for y in ys)
+
+    @property
+    def hole_lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Places along x and y [m] at which there are mounting holes, in ascending order."""
+        xs, ys = ([place[axis] for place in self.hole_places] for axis in (0, 1))
+        return _apart(xs), _apart(ys)
+
+
+def _apart(places: list[float]) -> tuple[float, ...]:
+    """Sort places [m] and leave out those that only rounding tells apart."""
+    kept: list[float] = []
+    for place in sorted(places):
+        if not kept or place - kept[-1] > IN_LINE:
+            kept.append(place)
+    return tuple(kept)
 
 
 class Warpage(Parameters):

@@ -1,6 +1,7 @@
 """Plan view of board and package: intervals along x and y, shared by the mesh and by its estimate."""
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -9,6 +10,8 @@ import numpy as np
 from reflowshock.meshing.board.parameters import Board, BoardNumerics, Imprint, Package
 
 MOST_LINES = 100_000
+MIDDLE = 1.0e-8  # m: how far the middle of a block may lie from its hole
+BESIDE = 0.5  # of the distance of holes that are not in line: what the side of their squares is reckoned from
 SAME = 1.0e-6  # of a column: distance of lines that are one
 WIDEST_SQUARE = 1.6  # of a hole's distance from the edge: the side of the square around it
 
@@ -42,12 +45,11 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Intervals along both axes; ``hole_x`` and ``hole_y`` name those that the mounting holes occupy."""
+    """Intervals along both axes; ``holes`` are the blocks (i, j) that mounting holes occupy."""
 
     x: tuple[Interval, ...]
     y: tuple[Interval, ...]
-    hole_x: frozenset[int] = frozenset()
-    hole_y: frozenset[int] = frozenset()
+    holes: frozenset[tuple[int, int]] = frozenset()
 
 
 def board_plan(package: Package, board: Board) -> Plan:
@@ -55,23 +57,36 @@ def board_plan(package: Package, board: Board) -> Plan:
 
     The footprint of the package lies on grid lines, and the margin of the meso model's patch on the next ones.
     """
-    holes, numerics = board.holes, board.numerics
+    numerics, square = board.numerics, hole_square(board)
     half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
-    ends = (0.5 * board.length, 0.5 * board.width)
-    insets = (holes.inset_x, holes.inset_y)
     axes = []
-    for footprint, count, end, inset in zip(half, _joints(package), ends, insets, strict=True):
+    for footprint, count, (low, high), holes in zip(half, _joints(package), board.ends, board.hole_lines, strict=True):
         inner = _under_joints(package, count, (footprint,), numerics.element_size)
-        axes.append(_board_axis(inner, end, end - inset, hole_square(board), numerics))
-    x, y = (tuple(axis) for axis in axes)
-    plan = Plan(x, y, frozenset({len(x) - 2}), frozenset({len(y) - 2}))
-    return plan if board.symmetry == "quarter" else _mirrored(plan)
+        axis = _board_axis(inner, high, [place for place in holes if place > 0.0], square, numerics)
+        if board.symmetry == "full":
+            below = _board_axis(inner, -low, [-place for place in reversed(holes) if place < 0.0], square, numerics)
+            axis = [*_both_sides(below, axis)]
+        axes.append(tuple(axis))
+    return Plan(axes[0], axes[1], blocks_at(board.hole_places, *axes))
+
+
+def blocks_at(
+    places: Iterable[tuple[float, float]], x: tuple[Interval, ...], y: tuple[Interval, ...]
+) -> frozenset[tuple[int, int]]:
+    """Return the blocks in whose middle places [m] lie; places that are not meshed are in none."""
+    columns, rows = ([0.5 * (part.start + part.end) for part in axis] for axis in (x, y))
+    return frozenset(
+        (i, j)
+        for i, a in enumerate(columns)
+        for j, b in enumerate(rows)
+        if any(math.dist((a, b), place) <= MIDDLE for place in places)
+    )
 
 
 def package_plan(package: Package, board: Board) -> Plan:
     """Cut the package so that the edges of the die lie on grid lines."""
-    plan = Plan(*package_axes(package))
-    return plan if board.symmetry == "quarter" else _mirrored(plan)
+    x, y = package_axes(package)
+    return Plan(x, y) if board.symmetry == "quarter" else Plan(_both_sides(x, x), _both_sides(y, y))
 
 
 def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
@@ -86,8 +101,12 @@ def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval
 
 
 def hole_square(board: Board) -> float:
-    """Side of the square around a mounting hole that is meshed as an O-grid [m]."""
-    return square_around(board.holes.diameter, min(board.holes.inset_x, board.holes.inset_y))
+    """Side of the square around a mounting hole that is meshed as an O-grid [m]; alike for all of them."""
+    gaps = [math.inf]
+    for (low, high), places in zip(board.ends, board.hole_lines, strict=True):
+        gaps += [places[0] - low, high - places[-1]] if places else []
+        gaps += [BESIDE * (second - first) for first, second in pairwise(places)]
+    return square_around(board.holes.diameter, min(gaps))
 
 
 def square_around(diameter: float, inset: float) -> float:
@@ -170,16 +189,25 @@ def _under_joints(package: Package, count: int, edges: tuple[float, ...], size: 
 
 
 def _board_axis(
-    inner: list[Interval], end: float, hole: float, square: float, numerics: BoardNumerics
+    inner: list[Interval], end: float, holes: list[float], square: float, numerics: BoardNumerics
 ) -> list[Interval]:
+    """Cut an axis from the origin to an end of the board [m], with squares around holes at places [m]."""
     last, footprint = inner[-1], inner[-1].end
     size = (last.end - last.start) / last.cells
     margin = Interval(footprint, footprint + numerics.patch_margin * size, numerics.patch_margin)
-    axis = [*inner, margin, *_outward(margin.end, hole - 0.5 * square, size, numerics)]
-    axis.append(uniform(hole - 0.5 * square, hole + 0.5 * square, numerics.coarse_size))
-    axis[-1] = replace(axis[-1], cells=max(2, axis[-1].cells))
-    axis.append(uniform(hole + 0.5 * square, end, numerics.coarse_size))
-    return axis
+    axis = [*inner, margin]
+    for hole in holes:
+        low, high = hole - 0.5 * square, hole + 0.5 * square
+        axis += (
+            _outward(axis[-1].end, low, size, numerics) if axis[-1] is margin else _coarse(axis[-1].end, low, numerics)
+        )
+        axis += _coarse(low, high, numerics)
+        axis[-1] = replace(axis[-1], cells=max(2, axis[-1].cells))
+    return axis + (_coarse(axis[-1].end, end, numerics) if holes else _outward(margin.end, end, size, numerics))
+
+
+def _coarse(start: float, end: float, numerics: BoardNumerics) -> list[Interval]:
+    return [uniform(start, end, numerics.coarse_size)]
 
 
 def _outward(start: float, end: float, size: float, numerics: BoardNumerics) -> list[Interval]:
@@ -193,12 +221,6 @@ def _outward(start: float, end: float, size: float, numerics: BoardNumerics) -> 
     return [Interval(start, start + grown, cells, ratio), uniform(start + grown, end, coarse)]
 
 
-def _mirrored(plan: Plan) -> Plan:
-    def both(axis: tuple[Interval, ...]) -> tuple[Interval, ...]:
-        return tuple(part.mirrored() for part in reversed(axis)) + axis
-
-    def holes(axis: tuple[Interval, ...], indices: frozenset[int]) -> frozenset[int]:
-        count = len(axis)
-        return frozenset({count + index for index in indices} | {count - 1 - index for index in indices})
-
-    return Plan(both(plan.x), both(plan.y), holes(plan.x, plan.hole_x), holes(plan.y, plan.hole_y))
+def _both_sides(below: Sequence[Interval], above: Sequence[Interval]) -> tuple[Interval, ...]:
+    """Join two axes that begin at the origin, the first one reflected at it."""
+    return (*(part.mirrored() for part in reversed(below)), *above)

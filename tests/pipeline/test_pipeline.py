@@ -55,7 +55,7 @@ def test_the_summary_has_what_scripts_read(first_run):
     assert metrics["interface_force_residual"] <= 1e-10
     assert metrics["critical_joint"] in {"A3", "A4", "B3", "B4"}
     assert set(metrics) >= {
-        "critical_joint_stress_error", "two_scale_dns_time_ratio", "peak_board_strain", "peak_von_mises",
+        "critical_joint_stress_error", "two_scale_dns_core_ratio", "peak_board_strain", "peak_von_mises",
         "peak_acceleration@edge", "second_peak_acceleration@edge", "peak_displacement@edge", "peak_strain@corner",
         "peak_strain_rate@corner", "response_at_first_frequency",
     }  # fmt: skip

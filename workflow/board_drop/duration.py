@@ -3,6 +3,8 @@
 import math
 from typing import TYPE_CHECKING
 
+from reflowshock.workflow.board_drop.fittings import spans
+
 if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
@@ -28,9 +30,7 @@ def first_mode(case: "BoardDropCase") -> tuple[float, float]:
     What is fitted to it counts as if all of it were at its middle, where it makes it slowest.
     """
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
-    holes = board.holes
-    spans = ((board.length - 2.0 * holes.inset_x, young_x), (board.width - 2.0 * holes.inset_y, young_y))
-    length, young = max(spans)
+    length, young = max(zip(spans(board), (young_x, young_y), strict=True))
     density = case.materials.board.density + 2.0 * fitted_mass(case) / (board.length * board.width * board.thickness)
     stiffness = young * board.thickness * board.thickness / 12.0 / density
     return length, (math.pi / length) ** 2 * math.sqrt(stiffness)

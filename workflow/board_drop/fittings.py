@@ -10,20 +10,36 @@ from reflowshock.fem.problem.structure import Holes, Layer, Structure
 from reflowshock.problem import Problem
 
 if TYPE_CHECKING:
+    from reflowshock.meshing.board.parameters import Board
     from reflowshock.workflow.package.case import BoardDropCase
 
 ROUNDING = 1e-9
 PACKAGE = "package"  # name of the acceleration of the package's centre
 
 
+class DrawnHoles(Holes):
+    """The mounting holes of the board of a drop, wherever they are."""
+
+    at: tuple[tuple[float, float], ...]
+
+    @property
+    def places(self) -> tuple[tuple[float, float], ...]:
+        """Their axes [m]."""
+        return self.at
+
+
 class DrawnBoard(Structure):
     """The board of a drop as a structure, z = 0 at its upper face."""
+
+    centre: tuple[float, float]
+    holes: DrawnHoles | None
 
     @property
     def corners(self) -> tuple[Place, Place]:
         """Return the lowest and the highest corner of the meshed part [m]."""
         (x, y, _), (length, width, thickness) = super().corners
-        return (x, y, -thickness), (length, width, 0.0)
+        a, b = self.centre
+        return (x + a, y + b, -thickness), (length + a, width + b, 0.0)
 
     @property
     def facet_sets(self) -> tuple[str, ...]:
@@ -34,14 +50,14 @@ class DrawnBoard(Structure):
 def drawn_board(case: "BoardDropCase") -> DrawnBoard:
     """Return the board of a case; its elements and material are of no account."""
     board, holes = case.board, case.board.holes
-    spacing = (board.length - 2.0 * holes.inset_x, board.width - 2.0 * holes.inset_y)
     return DrawnBoard(
+        centre=board.centre,
         length=board.length,
         width=board.width,
         cells=(1, 1),
         layers={"board": Layer(material="FR4", thickness=board.thickness)},
         symmetry=("x", "y") if board.symmetry == "quarter" else (),
-        holes=Holes(spacing=spacing, diameter=holes.diameter),
+        holes=DrawnHoles(spacing=spans(board), diameter=holes.diameter, at=board.hole_places),
     )
 
 
@@ -100,12 +116,20 @@ def _layers(key: str, item: Neighbour) -> Iterator[Problem]:
 def _beside_holes(key: str, item: Neighbour, board: DrawnBoard) -> Iterator[Problem]:
     """Find a package over a mounting hole."""
     assert board.holes is not None
-    centre = [
-        0.5 * spacing if x >= 0.0 else -0.5 * spacing for x, spacing in zip(item.at, board.holes.spacing, strict=True)
-    ]
-    gaps = [max(abs(a - b) - 0.5 * side, 0.0) for a, b, side in zip(item.at, centre, item.substrate, strict=False)]
-    if math.hypot(*gaps) < 0.5 * board.holes.diameter:
+    nearest = min(
+        math.hypot(
+            *(max(abs(a - b) - 0.5 * side, 0.0) for a, b, side in zip(item.at, hole, item.substrate, strict=False))
+        )
+        for hole in board.holes.places
+    )
+    if nearest < 0.5 * board.holes.diameter:
         yield Problem(key, "lies over a mounting hole", None, f">= {in_mm(0.5 * board.holes.diameter)} from its axis")
+
+
+def spans(board: "Board") -> tuple[float, float]:
+    """Return how far the outermost mounting holes of a board are apart along x and y [m]."""
+    x, y = (places[-1] - places[0] for places in board.hole_lines)
+    return x, y
 
 
 def in_mm(length: float) -> str:

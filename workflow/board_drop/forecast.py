@@ -13,12 +13,20 @@ from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
     PartForecast,
     ShockForecast,
+    coarse_parts,
     forecast_parts,
     forecast_shock,
+    seconds_around,
     shorter_than_window,
     two_scale_parts,
 )
-from reflowshock.workflow.case.forecast import BYTES_OF_ELEMENT, BYTES_OF_PARTICLE, Size, too_many_steps
+from reflowshock.workflow.case.forecast import (
+    BYTES_OF_ELEMENT,
+    BYTES_OF_PARTICLE,
+    SECONDS_OF_STAGE,
+    Size,
+    too_many_steps,
+)
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated
@@ -69,7 +77,7 @@ def forecast(case: PackageCase) -> PackageForecast:
         particles=(min(counts, default=0), max(counts, default=0)),
         parts={},
         shock=None,
-        seconds={"reflow": sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers},
+        seconds={"reflow": SECONDS_OF_STAGE + sum(reflow_seconds(case.solder, one) for one in distinct) / workers},
     )
     of_reflow = of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
     return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
@@ -78,13 +86,13 @@ def forecast(case: PackageCase) -> PackageForecast:
 def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
     """Predict a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
     heated = forecast_heated(case, thermal)
-    share = of_reflow.joints / of_reflow.distinct
+    share, liquid = of_reflow.joints / of_reflow.distinct, of_reflow.seconds["reflow"] - SECONDS_OF_STAGE
     return replace(
         of_reflow,
         effects=of_reflow.effects | heated.effects,
         distinct=of_reflow.joints,
         load_steps=len(heated.steps),
-        seconds={"reflow": of_reflow.seconds["reflow"] * share * heated.exchanges},
+        seconds={"reflow": SECONDS_OF_STAGE + share * heated.exchanges * liquid},
     )
 
 
@@ -95,8 +103,13 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     cooling, seconds = shock_cooling.forecast(case, parts)
-    modes = {"two_scale": shock.search + shock.two_scale, "dns": dns}
-    again = shock.two_scale if "two_scale" in numerics.modes else dns
+    modes = {
+        "two_scale": shock.two_scale + seconds_around(case, two_scale_parts(case)),
+        "dns": dns + seconds_around(case, parts, shock.dns_share),
+    }
+    again = modes["two_scale" if "two_scale" in numerics.modes else "dns"]
+    if shock.search:
+        modes["two_scale"] += shock.search + seconds_around(case, coarse_parts(case))
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,

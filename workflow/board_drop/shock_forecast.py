@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
-BOXES = ("board", "substrate", "die")  # roles whose elements are boxes
+BOXES = ("board", "substrate", "die")  # roles whose elements are boxes, but for columns
 IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
+# Measured on jedec_bga: until ranks have loaded libraries and kernels; set-up and a sample of histories, an element.
+SECONDS_TO_START, SETUP_SECONDS, SAMPLE_SECONDS = 4.0, 1.5e-4, 2.5e-6
 COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
 
 
@@ -61,9 +63,10 @@ class ShockForecast:
         window: step of the macro model [s].
         substeps: m, steps of a DNS per window.
         windows: number of windows.
-        search: predicted wall time of the run that finds the critical joints [s], zero where there is none.
+        search: predicted wall time of the windows of the run that finds the critical joints [s], zero where there is
+            none.
         two_scale: the same of the two-scale run.
-        dns: predicted wall time of the DNS [s] in explicit steps.
+        dns: the same of the DNS in explicit steps.
         dns_share: of the windows, those that the DNS has.
         implicit: the same in implicit steps on one rank, where everything is elastic.
         updates_per_second: element updates per second and rank that the prediction assumes.
@@ -185,6 +188,13 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
     )
 
 
+def seconds_around(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
+    """Predict the wall time [s] of a run outside its windows: start, set-up, samples; ``share`` of all samples."""
+    elements = sum(part.elements for part in parts.values()) / case.shock.ranks.total
+    samples = share * case.shock.numerics.history_samples
+    return SECONDS_TO_START + elements * (SETUP_SECONDS + samples * SAMPLE_SECONDS)
+
+
 def implicit_seconds(case: "BoardDropCase") -> float | None:
     """Predict the wall time of the whole shock in implicit steps on one rank; None where something is not linear."""
     parts = forecast_parts(case)
@@ -233,12 +243,12 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def _direct(case: "BoardDropCase", parts: Parts):
-    """Return windows and seconds of a DNS."""
+    """Return windows and seconds of the windows of a DNS."""
     from reflowshock.fem.estimates.estimate import predict_seconds
 
     plan, board = _plan(case, parts), _in_boxes(MACRO, parts[MACRO])
     work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
-    return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks)[1]
+    return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks, at_once=True)[1]
 
 
 def _in_boxes(name: str, part: PartForecast) -> float:
@@ -249,7 +259,7 @@ def _in_boxes(name: str, part: PartForecast) -> float:
 
 
 def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
-    """Return scheme, levels and seconds of a two-scale run."""
+    """Return scheme, levels and seconds of the windows of a two-scale run."""
     from reflowshock.fem.estimates.estimate import predict_seconds
 
     plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
@@ -266,7 +276,8 @@ def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tupl
         levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
     work = [(level.cost, level.count) for level in levels[1:]]
     boxes = sum(_in_boxes(name, parts[name]) for name in levels[0].parts)
-    return scheme, tuple(levels), predict_seconds(boxes, work, plan, case.shock.ranks)[0]
+    seconds = predict_seconds(boxes, work, plan, case.shock.ranks, at_once=scheme[0] != "local_steps")[0]
+    return scheme, tuple(levels), seconds
 
 
 def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
@@ -321,7 +332,8 @@ def relative_cost(case: "BoardDropCase", part: str) -> float:
     if is_linear_part(case, part):
         return 1.0
     if material_of(case, part).plasticity is None and numerics.kinematics == "corotational":
-        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if role_of(part) in BOXES else TURNING_RATE)
+        box = role_of(part) in BOXES and not part.endswith(COLUMN)
+        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if box else TURNING_RATE)
     return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
 
 

@@ -120,7 +120,7 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
 def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
     quantity = quantity_of(field)
     if quantity is not None and isinstance(value, list):
-        return tuple(_converted(quantity, field, key, item, problems) for item in value)
+        return tuple(_to_si_value(field, item, key, problems) for item in value)
     if quantity is not None and not any(value in literal_names(kind) for kind in alternatives(field)):
         return _converted(quantity, field, key, value, problems)
     if isinstance(value, dict) and holds_named_tables(field):

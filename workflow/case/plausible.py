@@ -63,9 +63,8 @@ NAMED_NUMBERS = {
 def implausible(case: Case) -> Iterator[Problem]:
     """Find values that nothing in a case of electronics can have."""
     for key, value, field in fields.leaves(case):
-        for number in value if isinstance(value, tuple) else (value,):
-            if isinstance(number, int | float) and not isinstance(number, bool) and number != 0:
-                yield from _implausible(key, number, field)
+        for number in _numbers(value):
+            yield from _implausible(key, number, field)
 
 
 def implausible_tables(case: Case) -> Iterator[Problem]:
@@ -75,6 +74,15 @@ def implausible_tables(case: Case) -> Iterator[Problem]:
         if number > to_si(found.high, unit):
             message = f"has {from_si(number, unit, 6)}, which is not plausible"
             yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
+
+
+def _numbers(value: object) -> Iterator[float]:
+    """Yield the numbers of a value, or of a list of lists, that are not zero."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, int | float) and not isinstance(value, bool) and value != 0:
+        yield value
 
 
 def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]:

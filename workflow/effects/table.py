@@ -16,7 +16,7 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import percent
 from reflowshock.workflow.effects.registry import effect_of
-from reflowshock.workflow.kinds import kind_of, stage_seconds
+from reflowshock.workflow.kinds import kind_of
 
 MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effects.py
 
@@ -33,7 +33,7 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
     Negative where the effect saves time. Effects whose cost is neither predicted nor measured are left out.
     """
     try:
-        seconds = stage_seconds(case)
+        seconds = kind_of(case).forecast(case).seconds
     except PulseError:
         return {}  # a report of a run whose table of the pulse is no longer there
     total = sum(seconds.values())
@@ -52,7 +52,7 @@ def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) 
     switched = own[name].other_way(case, acts) if name in own else None
     if switched is not None:
         try:
-            return sum(stage_seconds(switched).values())
+            return sum(kind_of(switched).forecast(switched).seconds.values())
         except CaseError:
             return None  # the case could not be run that way
     effect = effect_of(name, reflowed="reflow" in case.pipeline.names)

@@ -159,18 +159,23 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
 
     files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
     errors = compare_histories(files[0], files[1], fine_joints_of(results["two_scale"]))
-    seconds = {mode: _wall_time(result) for mode, result in results.items()}
-    ratios = {"two_scale_dns_time_ratio": seconds["two_scale"] / seconds["dns"]}
+    seconds = {mode: _time(result, "window_seconds") for mode, result in results.items()}
+    cores = {mode: _time(result, "window_core_seconds") for mode, result in results.items()}
+    ratios = {
+        "two_scale_dns_core_ratio": cores["two_scale"] / cores["dns"],
+        "two_scale_dns_time_ratio": seconds["two_scale"] / seconds["dns"],
+    }
     ideal = ideal_ratio(results["two_scale"].get("coupling", {}), results["dns"]["model"])
     ratios |= {} if ideal is None else {"two_scale_ideal_ratio": ideal}
     search = folder / "coarse/result.json"
     if search.exists():
         ratios["coarse_run_dns_time_ratio"] = (
-            _wall_time(json.loads(search.read_text(encoding="utf-8"))) / seconds["dns"]
+            _time(json.loads(search.read_text(encoding="utf-8")), "window_seconds") / seconds["dns"]
         )
     return {name: metric(value, "s" if name == COMPARED else "") for name, value in (errors | ratios).items()}
 
 
-def _wall_time(result: Mapping[str, Any]) -> float:
-    """Wall time of a run's windows over the time that they simulate: windows of two runs may differ."""
-    return result["metrics"]["window_seconds"]["value"] / result["model"]["window"]
+def _time(result: Mapping[str, Any], metric_name: str) -> float:
+    """Return a time of a run's windows over the time that they simulate: windows of two runs may differ."""
+    seconds: float = result["metrics"][metric_name]["value"]
+    return seconds / result["model"]["window"]

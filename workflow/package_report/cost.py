@@ -11,14 +11,14 @@ Record = Mapping[str, Any]
 PAPER = "Hu et al., Table 6 and section 4.4: 10 x 10 package, Intel Xeon Silver 4116"
 PUBLISHED = {
     "dns": {
-        "time over the DNS": "1.0",
+        "core time over the DNS": "1.0",
         "simulated time": "1.5 ms",
         "time of the windows": "137 min",
         "ranks": "24 cores",
         "hexahedra": "155 878",
     },
     "two_scale": {
-        "time over the DNS": "0.285",
+        "core time over the DNS": "0.285",
         "simulated time": "1.5 ms",
         "time of the windows": "39 min",
         "ranks": "8 cores macro + 16 cores meso",
@@ -78,10 +78,10 @@ def memory(result: Record) -> str:
 
 def table(results: Mapping[str, dict], metrics: Record) -> dict | None:
     """Return the table of both modes beside the published one; None where one of both was not run."""
-    if "two_scale_dns_time_ratio" not in metrics:
+    if "two_scale_dns_core_ratio" not in metrics:
         return None
-    ratios = {"dns": "1", "two_scale": f"{metrics['two_scale_dns_time_ratio']['value']:.3f}"}
-    ours = {mode: {"time over the DNS": ratios[mode]} | _cells(results[mode]) for mode in ("dns", "two_scale")}
+    ratios = {"dns": "1", "two_scale": f"{metrics['two_scale_dns_core_ratio']['value']:.3f}"}
+    ours = {mode: {"core time over the DNS": ratios[mode]} | _cells(results[mode]) for mode in ("dns", "two_scale")}
     labels = dict.fromkeys(label for cells in ours.values() for label, text in cells.items() if text)
     columns = [*ours.values(), *PUBLISHED.values()]
     rows = [[label, *(cells.get(label, "") or "–" for cells in columns)] for label in labels]

@@ -10,6 +10,7 @@ import stat
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
@@ -28,6 +29,7 @@ PLACES = {
     "XDG_STATE_HOME": ".local/state",
 }  # fmt: skip
 TEMPORARY = ("/tmp", "/var/tmp", "/dev/shm")  # where no variable names a folder
+LAST_WORD = 3.0  # s: what a rank that says nothing leaves to the first one
 DEFAULTS = {
     # PETSc would end a command whose reader has gone, or a stage whose structure was killed, before it can say so.
     "PETSC_OPTIONS": "-no_signal_handler",
@@ -114,13 +116,17 @@ def check_ranks(environment: Mapping[str, str]) -> None:
     """Refuse to be started on several ranks: each would do all the work, in the same folder.
 
     Raises:
-        EnvironmentProblem: it was; the first rank says so.
+        EnvironmentProblem: it was; the first rank says so, while the others wait: Open MPI 5 ends all ranks, heard or
+            not, as soon as one has failed.
     """
     for size, rank in RANKS:
         count = environment.get(size, "")
         if count.isdigit() and int(count) > 1:
+            is_first = environment.get(rank, "0") == "0"
+            if not is_first:
+                time.sleep(LAST_WORD)
             message = f"started on {count} MPI ranks; start it without mpirun, it starts its own ranks"
-            raise EnvironmentProblem(message, 2, environment.get(rank, "0") != "0")
+            raise EnvironmentProblem(message, 2, silent=not is_first)
 
 
 def check_limits() -> None:

@@ -79,12 +79,16 @@ def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return the wall time of a coupled run's windows over that of the DNS, on as many ranks."""
+    """Return core and wall time of a coupled run's windows over those of the DNS, on as many ranks."""
     results = [
         json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
     ]
     coupled, dns = (result["timings"]["windows"] for result in results)
-    return {"two_scale_dns_time_ratio": metric(coupled / dns)}
+    cores = [result["balance"]["window_core_seconds"] / result["model"]["window"] for result in results]
+    return {
+        "two_scale_dns_core_ratio": metric(cores[0] / cores[1]),
+        "two_scale_dns_time_ratio": metric(coupled / dns),
+    }
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:

@@ -33,6 +33,14 @@ def board(**changes) -> Board:
     return Board.model_validate(values | changes)
 
 
+def aside(**changes) -> Board:
+    """The whole board with its package aside, and five holes, of which four are no rectangle; fields as keywords."""
+    places = ((-8.0, -7.0), (14.0, -7.0), (-8.0, 10.0), (14.0, 10.0), (9.0, -7.0))
+    holes = {"diameter": 2.0 * MM, "at": [(x * MM, y * MM) for x, y in places]}
+    values = {"length": 30.0 * MM, "width": 24.0 * MM, "centre": (3.0 * MM, 1.5 * MM), "holes": holes}
+    return board(**({"symmetry": "full"} | values | changes))
+
+
 def side_of(warpage: Warpage, the_package: Package) -> PackageSide:
     """The whole underside of a package with a prescribed warpage."""
     return PackageSide.prescribed(the_package, board(symmetry="full"), warpage)

@@ -8,8 +8,7 @@ import pytest
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.kernels.damping import add_damping, power
-from reflowshock.fem.kernels.motion import STRIP
+from reflowshock.fem.kernels.motion import STRIP, add_damping, power
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration
 from reflowshock.fem.loads.pulse import Constant

@@ -111,7 +111,7 @@ def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
     board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in that many seconds
     ranks = Ranks(total=2, placement="disjoint", macro=1)
-    two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks)
+    two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks, at_once=True)
     assert two_scale == pytest.approx(100 * 0.1, rel=0.01)
     assert dns == pytest.approx(100 * 0.55, rel=0.01)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
+from reflowshock.cases.hard.trials.packages import MM, PLATE, aside, board, package
 from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.estimate import count_elements
 from reflowshock.meshing.board.parameters import Warpage
@@ -88,6 +88,29 @@ def test_full_model_is_four_quarters(tmp_path, quarter):
     assert full.points.mean(axis=0)[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
     for part in full.counts:
         assert full.volume(part) == pytest.approx(4.0 * quarter.volume(part))
+
+
+def test_a_board_aside_has_its_holes_where_they_are(tmp_path):
+    the_board = aside()
+    mesh = Assembly(tmp_path, package(), the_board)
+    assert mesh.counts == {name: count_elements(package(), the_board)[name].elements for name in mesh.counts}
+    corners = mesh.points[:, :2] / MM
+    assert corners.min(axis=0) == pytest.approx([-12.0, -10.5])
+    assert corners.max(axis=0) == pytest.approx([18.0, 13.5])
+    walls = mesh.points[mesh.cells("mounting_holes", "quad")][:, :, :2].mean(axis=1)
+    distances = np.linalg.norm(walls[:, None] - np.array(the_board.hole_places), axis=2)
+    assert distances.min(axis=1) == pytest.approx(1.0 * MM, rel=0.1)
+    assert set(distances.argmin(axis=1)) == set(range(5))
+    volume = sum(mesh.volume(part) for part in ("board", "board_patch")) / MM**3
+    assert volume == pytest.approx(30.0 * 24.0 - 5 * np.pi, rel=3e-3)
+
+
+def test_four_places_are_four_insets(tmp_path):
+    holes = {"diameter": 2.0 * MM, "at": [(x * MM, y * MM) for x in (17.0, -17.0) for y in (12.0, -12.0)]}
+    both = [tmp_path / f"{name}.msh" for name in ("places", "insets")]
+    for path, the_board in zip(both, (board(holes=holes), board()), strict=True):
+        write_assembly(package(), the_board, path)
+    assert both[0].read_bytes() == both[1].read_bytes()
 
 
 def test_copper_plates_lie_under_and_above_the_joints(tmp_path):

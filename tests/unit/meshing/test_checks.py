@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from reflowshock.cases.hard.trials.packages import MM, board, package
+from reflowshock.cases.hard.trials.packages import MM, aside, board, package
 from reflowshock.meshing.board.checks import problems
 from reflowshock.meshing.board.parameters import Warpage
 
@@ -12,6 +12,7 @@ def found(the_package, the_board, corner=0.0):
 
 
 def test_sound_parameters_have_no_problem():
+    assert not found(package(), aside())
     assert not found(package(), board(), 0.05 * MM)
     assert not found(package(rows=1, columns=1), board(symmetry="full"), -1.0 * MM)
     assert not found(package(depopulated=("B2", "B3", "C2", "C3")), board())
@@ -53,6 +54,33 @@ def test_impossible_packages(changes, key, allowed):
 )
 def test_impossible_boards(changes, key):
     assert key in found(package(), board(**changes))
+
+
+def places(*pairs, diameter=2.0):
+    return {"diameter": diameter * MM, "at": [(x * MM, y * MM) for x, y in pairs]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "told"),
+    [
+        ({"holes": places((-8, -7), (17.0, 10))}, "board.holes.at", "beyond the board along x -10.5 mm to -"),
+        ({"holes": places((-8, 0), (14, 10))}, "board.holes.at", "beside the package.* along y"),
+        ({"holes": places((-8, -7), (-8, -7))}, "board.holes.at", "would turn"),
+        ({"holes": places((-8, -7), (14, 10), (13, -7))}, "board.holes.at", "neither in line nor apart along x"),
+        ({"holes": places() | {"inset_x": MM}}, "board.holes.inset_y", "is missing"),
+        ({"holes": places((-8, -7), (14, 10)) | {"inset_x": MM}}, "board.holes.inset_x", "goes with no holes"),
+        ({"symmetry": "quarter"}, "board.centre", "in the middle"),
+        (
+            {"symmetry": "quarter", "centre": (0.0, 0.0), "length": 40 * MM, "width": 30 * MM},
+            "board.holes.at",
+            "mirror",
+        ),
+        ({"centre": (13 * MM, 0.0)}, "board.centre", "reaches beyond the board along its length within 12.5 mm"),
+    ],
+)
+def test_impossible_boards_aside(changes, key, told):
+    problem = found(package(), aside(**changes))[key]
+    assert re.search(told, f"{problem.message} {problem.allowed}")
 
 
 def with_holes(diameter, **changes):

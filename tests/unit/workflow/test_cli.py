@@ -95,7 +95,9 @@ def test_bad_input_has_exit_code_2(call, arguments, words, tmp_path):
 
 
 def test_plan_writes_nothing(call, tmp_path):
-    assert call("plan", str(CASE))[0] == 0
+    code, output, _ = call("plan", str(CASE))
+    assert code == 0
+    assert any(line.startswith("all ") and "about" in line for line in output.splitlines())
     assert list(tmp_path.iterdir()) == []
 
 

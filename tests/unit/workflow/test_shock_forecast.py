@@ -1,18 +1,24 @@
 """What plan says of two scales: scheme, levels of time steps, fine and coarse joints, cost."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from reflowshock.meshing.board.estimate import count_elements
+from reflowshock.workflow.board_drop.forecast import forecast
 from reflowshock.workflow.board_drop.shock_forecast import (
+    SECONDS_TO_START,
     forecast_parts,
     forecast_shock,
     implicit_seconds,
+    seconds_around,
     two_scale_parts,
 )
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
+
+CASES = Path(__file__).resolve().parents[3] / "cases"
 
 
 def predicted(*settings: str):
@@ -87,3 +93,18 @@ def test_one_way_the_coarse_model_takes_the_window_of_all_its_parts():
     assert "die" in macro.parts
     assert meso.parts == ("solder", "copper")
     assert macro.step < predicted().window
+
+
+def test_what_lies_around_windows_counts():
+    """Start-up, set-up and samples: a run of few windows takes seconds all the same."""
+    case = read_case(SMALL_CASE)
+    parts = forecast_parts(case)
+    assert seconds_around(case, parts) > seconds_around(case, parts, share=0.1) > SECONDS_TO_START
+    assert forecast(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
+
+
+def test_columns_are_no_boxes():
+    """Elements of a column around a fine joint turn at the price of any hexahedra."""
+    case = read_case(CASES / "jedec_bga/case.toml", ["scale=quick", "shock.numerics.kinematics=corotational"])
+    parts = two_scale_parts(case)
+    assert parts["board_column"].cost == parts["copper"].cost > parts["board_patch"].cost

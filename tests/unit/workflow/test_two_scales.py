@@ -95,7 +95,7 @@ def test_the_ideal_ratio_counts_element_updates():
 
 
 def test_coupling_and_comparison_become_metrics(tmp_path):
-    window = {"window_seconds": {"value": 1.0, "unit": "s"}}
+    window = {name: {"value": 1.0, "unit": "s"} for name in ("window_seconds", "window_core_seconds")}
     bent = {"peak_board_displacement": {"value": 3e-3, "unit": "m"}}
     result = {"metrics": window | bent, "health": {}, "effects": {}, "model": MODEL}
     for mode, factor in (("two_scale", 0.9), ("dns", 1.0)):
@@ -113,7 +113,7 @@ def test_coupling_and_comparison_become_metrics(tmp_path):
     assert metrics["meso_share"] == 0.4
     assert metrics["busy_share"] == 0.93
     assert metrics["coupling_overhead"] == 0.02
-    assert metrics["two_scale_dns_time_ratio"] == 1.0
+    assert metrics["two_scale_dns_time_ratio"] == metrics["two_scale_dns_core_ratio"] == 1.0
     assert metrics["critical_joint"] == "B3"
     assert metrics["worst_joint_stress_error"] == pytest.approx(0.1)
     assert not found.health["critical_joint_coarse"]["ok"]

@@ -1,0 +1,248 @@
+"""What rotation and yielding cost, against their bars: forces, steps, windows, two scales over one model.
+
+    PYTHONPATH=. python benchmarks/nonlinear.py [PART ...]  (ten quiet minutes, one core; writes results/nonlinear.json)
+
+Parts, each by itself where it is named; figures of earlier calls stay:
+- ``forces``: the cube of 40^3 boxes in finite rotation, alone and in whole steps; solder that yields, one-point and
+  with incompatible modes, on 12^3 distorted elements that stay in the cache; Akantu's linear loop, if pip installs it.
+- ``bending``: the moment of a plastic hinge of four elements over its height, and the elastic stiffness of a distorted
+  one-point element over that of the element with incompatible modes: what the faster element gives up.
+- ``effects``: windows of bga_drop (held velocity, one fine joint, copper at its true mass) in finite rotation and with
+  solder that yields, over the linear ones of the same scheme, and of the scheme that a linear model would take.
+- ``interpreter``: what Python costs between substeps, one by one and in one call.
+- ``two_scales``: core seconds of a simulated second over those of one model, with three joints fine and with one, in
+  finite rotation, solder that yields; ``errors``: their histories on a smaller board under a shorter pulse.
+- ``drift``: energy over 1e5 windows of two models in finite rotation, elastic, no damping.
+
+Sides take turns; ratios are of processor seconds. Bars that stand in ``not_measured`` need longer runs.
+"""
+
+import argparse
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import numpy as np
+from mpi4py import MPI
+
+from benchmarks import peers
+from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
+from benchmarks.support import turns
+from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
+from benchmarks.support.drop_scene import DropScene
+from benchmarks.support.program_run import ProgramRun
+from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
+from reflowshock.cases.hard.trials.beams import bent_moment
+from reflowshock.cases.hard.trials.bodies import motion_of, nonlinear_body
+from reflowshock.cases.hard.trials.coupled import Coupled
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
+from reflowshock.cases.hard.trials.windows import PUSH
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.elements.element import element_stiffness
+from reflowshock.fem.model.assembly import ForceOptions, make_body
+from reflowshock.fem.output.compare import compare_histories
+
+RESULT = turns.RESULTS / "nonlinear.json"
+FINITE = {"kinematics": "corotational", "plasticity": "on", "formulation": "one_point"}
+ELASTIC = {"plasticity": "off", "formulation": "one_point"}
+HELD = {"scheme": "held_velocity", "fine_joints": CRITICAL[:1]}
+SIDES: dict[str, tuple[dict, dict]] = {
+    "linear": (HELD, ELASTIC | {"kinematics": "small"}),
+    "linear_as_chosen": ({"fine_joints": CRITICAL[:1]}, ELASTIC | {"kinematics": "small"}),
+    "turning": (HELD, ELASTIC | {"kinematics": "corotational"}),
+    "yielding": (HELD, FINITE | {"kinematics": "small"}),
+    "turning_yielding": (HELD, FINITE),
+}
+FINE = {"three_joints": CRITICAL, "one_joint": CRITICAL[:1]}
+MATERIAL = "materials.solder='SAC405'"
+DURATION = 1.2e-4  # [s], of errors
+WINDOWS, SAMPLES = 100_000, 200
+ROUNDS = 5
+NOT_MEASURED = {
+    "nonlinear windows, growth over the grid of the linear schemes": "not tried",
+    "default case, answer complete": "its run folder tells: reflowshock run cases/jedec_bga/case.toml",
+    "hu_bga_drop, full size, finite + J2, two scales": "its run folder tells: --set scale=physical",
+}
+Bars = dict[str, dict[str, Any]]
+
+
+def forces() -> tuple[Bars, dict]:
+    """Return element updates a second."""
+    boxes, small = cube(), cube(distorted=True, edge=12)
+    body, critical = nonlinear_body(boxes, STEEL, ForceOptions("corotational", 1e-8), "incompatible_modes")
+    motion = motion_of(body, 0.5 * critical)
+    motion.displacement[:] = random_displacement(body.local.points, 1e-3)
+    works = {
+        "linear_boxes": linear(elements_of(boxes)),
+        "turning_boxes": turning(elements_of(boxes)),
+        "turning_boxes_step": lambda: motion.take_steps(1),
+        "turning_any": turning(elements_of(small)),
+    }
+    for kind in ("one_point", "incompatible_modes"):
+        for name, strain in STRAINS.items():
+            works[f"{name}_{kind}"] = plastic(elements_of(small, kind, SOLDER), "finite", strain)
+    counts = dict.fromkeys(works, len(small.cells)) | dict.fromkeys(list(works)[:3], len(boxes.cells))
+    batches = {name: turns.batch(work) for name, work in works.items()}
+    akantu = akantu_loop(boxes, random_displacement(boxes.points))
+    if akantu:
+        batches["akantu"] = lambda: akantu.ask("force")
+        counts["akantu"] = len(boxes.cells)
+    seconds = turns.in_turns(batches)
+    if akantu:
+        akantu.end()
+    rates = turns.rates(seconds, counts)
+    bars = {
+        "finite rotation, elastic boxes, force [updates/s]": turns.bar(rates["turning_boxes"], 18e6),
+        "finite rotation, whole step / force": turns.bar(
+            turns.ratio(seconds, "turning_boxes_step", "turning_boxes"), 0.8
+        ),
+        "solder below yield, one point [updates/s]": turns.bar(rates["below_yield_one_point"], 4e6),
+        f"solder that flows at {RATE:g} 1/s, one point [updates/s]": turns.bar(rates["yielding_one_point"], 2e6),
+        "solder below yield, incompatible modes [updates/s]": turns.bar(rates["below_yield_incompatible_modes"], 4e6),
+        "solder that flows, incompatible modes [updates/s]": turns.bar(rates["yielding_incompatible_modes"], 2e6),
+    }
+    if akantu:
+        faster = turns.ratio(seconds, "turning_boxes", "akantu")
+        bars["finite rotation over Akantu's linear loop"] = turns.bar(faster, 60.0)
+    return bars, {"updates_per_second": rates}
+
+
+def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
+    """Return Akantu with the linear cube; None where pip cannot install it."""
+    peers.FOLDER.mkdir(parents=True, exist_ok=True)
+    return peers.Peer("akantu", peers.write_problem(mesh, displacement, 1e-8)) if "akantu" in peers.install() else None
+
+
+def bending() -> tuple[Bars, dict]:
+    """Return what the one-point element gives up."""
+    moments = {name: bent_moment(name, 4) for name in ("one_point", "incompatible_modes")}
+    stiffness = [element_stiffness(elements_of(cube(True, 4), name)) for name in moments]
+    difference = np.abs(stiffness[0] - stiffness[1]).max() / np.abs(stiffness[1]).max()
+    bars = {
+        "plastic hinge of four elements, error of the moment": turns.bar(abs(moments["one_point"] - 1.0), 0.05, False),
+        "elastic stiffness against incompatible modes": turns.bar(float(difference), 1e-9, False),
+    }
+    return bars, {"hinge_moments": moments}
+
+
+def effects() -> tuple[Bars, dict]:
+    """Return what windows cost."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
+        runs = {name: ProgramRun(scene.request("two_scale", *side)) for name, side in SIDES.items()}
+    seconds = seconds_of(runs)
+    cost = {name: turns.ratio(seconds, "linear", name) for name in runs}
+    bars = {
+        "finite rotation in bga_drop, over linear": turns.bar(cost["turning"] - 1.0, 1.2, False),
+        "yielding in bga_drop, over linear": turns.bar(cost["yielding"] - 1.0, 1.0, False),
+    }
+    return bars, {"window_cost_over_linear": cost, "elements": {name: run.elements for name, run in runs.items()}}
+
+
+def seconds_of(runs: dict[str, ProgramRun]) -> dict[str, np.ndarray]:
+    """Return the processor seconds of a simulated second of runs, in turns."""
+    for run in runs.values():
+        run.step(STRETCH)
+    return turns.in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
+
+
+def interpreter() -> tuple[Bars, dict]:
+    """Return what Python costs in a substep of a meso model [s]."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL, "scale=quick"))
+        run = ProgramRun(scene.request("two_scale", {"scheme": "held_velocity", "fine_joints": ["A4"]}, FINITE))
+    motion = run.participants["meso"].motion
+    steps = 20
+    works: dict[str, Callable[[], object]] = {
+        "at_once": lambda: motion.take_steps(steps),
+        "one_by_one": lambda: ExplicitMotion._take_each(motion, steps, None),
+    }
+    seconds = turns.in_turns({name: turns.batch(work) for name, work in works.items()})
+    spared = float(np.median(seconds["one_by_one"] - seconds["at_once"])) / steps
+    each = {name: float(values.min()) / steps for name, values in seconds.items()}
+    return {}, {"substep_seconds": each, "spared_a_substep": spared, "elements": run.elements}
+
+
+def two_scales() -> tuple[Bars, dict]:
+    """Return core seconds of two scales over those of one model."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
+        runs = {
+            name: ProgramRun(scene.request("two_scale", HELD | {"fine_joints": fine}, FINITE))
+            for name, fine in FINE.items()
+        } | {"dns": ProgramRun(scene.request("dns", {}, FINITE))}
+    seconds = seconds_of(runs)
+    ratios = {name: turns.ratio(seconds, "dns", name) for name in FINE}
+    plans = {name: {"window_ns": 1e9 * run.plan.window, "substeps": run.plan.substeps} for name, run in runs.items()}
+    bars = {
+        "two scales over one model, 3 fine joints": turns.bar(ratios["three_joints"], 0.12, False),
+        "two scales over one model, 1 fine joint": turns.bar(ratios["one_joint"], 0.077, False),
+    }
+    return bars, {"ratios": ratios, "plans": plans, "elements": {name: run.elements for name, run in runs.items()}}
+
+
+def errors() -> tuple[Bars, dict]:
+    """Return errors of the critical joint against one model."""
+    shock = FINITE | {"pulse_duration": PULSE, "duration": DURATION}
+    found: dict[str, dict] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        scene = DropScene.write(Path(folder), (*SHORT, MATERIAL))
+        requests = {name: ("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
+        requests |= {"dns": ("dns", HELD | {"fine_joints": "all"})}
+        for name, (mode, coupling) in requests.items():
+            arrays, seconds = ProgramRun(scene.request(mode, coupling, shock)).to_end()
+            np.savez(Path(folder) / f"{name}.npz", **arrays)
+            found[name] = {"seconds": seconds}
+        for name, fine in FINE.items():
+            found[name] |= compare_histories(Path(folder) / f"{name}.npz", Path(folder) / "dns.npz", list(fine))
+    limits = {"three_joints": ("3 fine joints", 0.03), "one_joint": ("1 fine joint", 0.05)}
+    bars = {
+        f"{words}: {metric}": turns.bar(found[name][metric], limit, False)
+        for name, (words, limit) in limits.items()
+        for metric in ("critical_joint_peel_error", "critical_joint_work_error")
+        if metric in found[name]
+    }
+    return bars, found
+
+
+def drift() -> tuple[Bars, dict]:
+    """Return the drift of energy over many windows in finite rotation."""
+    models = Pair(substeps=3, impedance=3.0).divided(SCHEMES["held_velocity"])
+    response = ForceOptions("corotational", models.division.meso_step)
+    bodies = {
+        role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), response)
+        for role, part in models.parts.items()
+    }
+    coupled = Coupled(bodies, models.division.plan, scheme_of("held_velocity"))
+    coupled.swing(PUSH)
+    change, interface = coupled.drift(WINDOWS, SAMPLES)
+    bars = {"1e5 windows, elastic finite, no damping: energy drift": turns.bar(change, 1e-3, False)}
+    return bars, {
+        "interface_energy": interface,
+        "elements": {role: len(b.elements.cells) for role, b in bodies.items()},
+    }
+
+
+PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter, two_scales, errors, drift)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; without, all")
+    chosen = parser.parse_args().parts or list(PARTS)
+    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
+    for name in chosen:
+        bars, rest = PARTS[name]()
+        found["bars"] |= bars
+        found[name] = rest
+        turns.write("nonlinear", found)
+
+
+if __name__ == "__main__":
+    main()

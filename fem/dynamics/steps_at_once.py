@@ -1,0 +1,90 @@
+"""All steps of a window in one compiled call, where nothing else acts between them: no message, no load at nodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from reflowshock.fem.dynamics.motion import Motion
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.forces.force import ForceTerm
+from reflowshock.fem.kernels.lanes import LANES
+from reflowshock.fem.kernels.levels import ALL_FINE, NAMES, ForceArrays, Interface, StepArrays, take_steps
+from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
+from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
+from reflowshock.fem.loads.load import Load
+
+
+def none_of(*shape: int, kind: type = np.float64) -> Any:
+    """Return an array with no entries for a kernel that has nothing to do."""
+    return np.zeros(shape, kind)
+
+
+NODES, AXES, ROWS = none_of(0, kind=np.int32), none_of(3, kind=np.int64), none_of(0, 6, kind=np.int32)
+CELLS, LINES, BY_LANE = none_of(0, 8, LANES, kind=np.int32), none_of(2, 3, 0), none_of(0, LANES)
+NOTHING = ForceArrays(
+    congruent=(NODES, AXES, ROWS, none_of(0, 8, 6), LINES),
+    assembled=(none_of(1, kind=np.int32), NODES, none_of(0, 3, 3)),
+    turning_rows=(NODES, AXES, ROWS, none_of(0, 3), none_of(0, 27), LINES),
+    turning_boxes=(CELLS, NODES, none_of(0, 30 * LANES)),
+    turning=(CELLS, NODES, none_of(0, 120 * LANES)),
+    one_point=OnePointBlocks(
+        *(CELLS, NODES, NODES, NODES, none_of(0, 9), none_of(0, 6), none_of(0, 120 * LANES), none_of(0, 1, LANES)),
+        *(none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, none_of(0, 12 * LANES), none_of(0)),
+    ),
+    path=Path(False, np.inf),
+)
+
+
+def no_interface(steps: int) -> Interface:
+    """Return the interface of a model that nobody moves through some steps."""
+    nowhere = none_of(0, 3)
+    return Interface(NODES, NODES, nowhere, none_of(steps, 3), none_of(steps + 1, 2), none_of(2, 0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class StepsAtOnce:
+    """The compiled steps of a motion.
+
+    Attributes:
+        arrays: Of its force terms.
+        terms: Entry of ``ForceArrays`` -> the term.
+    """
+
+    arrays: ForceArrays
+    terms: dict[str, Any]
+
+    @classmethod
+    def of(cls, terms: Sequence[ForceTerm], loads: Sequence[Load]) -> "StepsAtOnce | None":
+        """Return the steps of force terms under loads; None where some of either act between steps in their own way."""
+        found: dict[str, Any] = {}
+        for term in terms:
+            arrays = getattr(term, "arrays", {})
+            if not arrays or found.keys() & arrays.keys():
+                return None
+            found |= dict.fromkeys(arrays, term)
+        if any(acts_at_nodes(load) for load in loads):
+            return None
+        entries = {name: term.arrays[name] for name, term in found.items()}
+        return cls(NOTHING._replace(**entries), found)
+
+    def take(self, motion: Motion, steps: StepArrays, interface: Interface, accelerations: np.ndarray) -> float:
+        """Take steps; return the work of the accelerations ``(m + 1, 3)`` [m/s^2] at the ends of steps [J].
+
+        Raises:
+            InvertedElementError: An element is turned inside out; the motion's time is that of the step.
+        """
+        work, taken, which, block = take_steps(steps, self.arrays, interface, accelerations, motion.step)
+        for _ in range(taken):
+            motion.time += motion.step
+        if which != ALL_FINE:
+            error: InvertedElementError = self.terms[NAMES[which]].inverted(block, motion.displacement)
+            raise error
+        return float(work)
+
+
+def acts_at_nodes(load: Load) -> bool:
+    """Return whether a load does more in a step than to accelerate all masses."""
+    kind = type(load)
+    return any(getattr(kind, name) is not getattr(Load, name) for name in ("drive", "add", "collect"))

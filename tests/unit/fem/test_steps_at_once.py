@@ -1,0 +1,84 @@
+"""All steps of a window in one compiled call: those one by one, but for the order of sums."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from reflowshock.cases.hard.trials.bodies import SOLDER
+from reflowshock.fem.division.tables import prepare
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce
+from reflowshock.fem.errors import InvertedElementError
+from reflowshock.fem.kernels.levels import Interface
+from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.load import half_sine_drop
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.parallel.local_mesh import distribute
+from tests.support.fem_levels import joint_on_board
+
+STEP, STEPS = 1e-9, 6
+SETTINGS = {
+    "small": ("one_point", ForceOptions("small", STEP), {"congruent", "assembled", "one_point", "path"}),
+    "turning": ("one_point", ForceOptions("corotational", STEP), {"turning_boxes", "turning", "one_point", "path"}),
+}
+
+
+def body_of(formulation: str, response: ForceOptions):
+    """Return a joint that yields, tied to a board; some of its elements are no boxes."""
+    mesh = joint_on_board(edges=6)
+    copper = np.unique(mesh.cells[mesh.in_parts(lambda name: name.startswith("copper"))])
+    low = copper[mesh.points[copper, 2] < np.median(mesh.points[copper, 2])]
+    mesh.points[low, :2] *= 1.0 + 0.02 * np.cos(1e4 * mesh.points[low, 1:2])
+    item = prepare(mesh, "dns")["dns"]
+    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, Materials(solder=SOLDER), formulation)
+    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
+
+
+def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interface]:
+    """Return a motion that begins with any velocities, and some nodes that another model moves through its steps."""
+    rows = np.arange(12, dtype=np.int32)
+    motion = ExplicitMotion(body, loads, STEP, rows, np.zeros(len(body.mass)))
+    random = np.random.default_rng(3)
+    motion.velocity[:] = random.uniform(-speed, speed, motion.velocity.shape)
+    given, change = motion.velocity[rows], random.uniform(-1.0, 1.0, (STEPS, 3))
+    return motion, Interface(rows, rows[::2].copy(), given, change, random.random((STEPS + 1, 2)), np.zeros((2, 6, 3)))
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_steps_at_once_are_those_one_by_one(name):
+    formulation, response, entries = SETTINGS[name]
+    drop = half_sine_drop(1e7, 20 * STEP)
+    ended = []
+    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_each):
+        body = body_of(formulation, response)
+        assert entries <= StepsAtOnce.of(body.terms, [drop]).terms.keys()
+        motion, interface = moving(body, [drop])
+        take(motion, STEPS, interface)
+        history = [array for term in body.terms for array in term.history.values()]
+        ended.append((motion, [motion._state, motion.slave_force, motion.gravity, interface.impulses, *history]))
+    (motion, first), (other, second) = ended
+    for one, two in zip(first, second, strict=True):
+        assert np.abs(one - two).max() <= 1e-13 * np.abs(two).max()
+    assert motion.time == other.time
+    assert motion.external_work == pytest.approx(other.external_work, rel=1e-12)
+    assert motion.internal_energy().plastic > 0.0
+
+
+def test_inverted_elements_are_told_alike():
+    told = []
+    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_each):
+        motion, interface = moving(body_of(*SETTINGS["turning"][:2]), speed=2e4)
+        with pytest.raises(InvertedElementError) as error:
+            take(motion, STEPS, interface)
+        told.append((str(error.value), motion.time))
+    assert told[0] == told[1]
+
+
+def test_what_acts_between_steps_is_no_matter_of_one_call():
+    body = body_of(*SETTINGS["small"][:2])
+    assert StepsAtOnce.of(body.terms, [RayleighDamping.build(body, (1.0, 0.0))]) is None
+    assert StepsAtOnce.of([*body.terms, SimpleNamespace(history={})], []) is None
+    assert StepsAtOnce.of(body_of("incompatible_modes", SETTINGS["small"][1]).terms, []) is None
