@@ -22,6 +22,8 @@ from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
 
 # Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
 REACHES = (2.6, 3.4, 4.4)
+# Of a particle's volume: the least that its coefficient carries.
+SMALLEST_CARRIED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +71,15 @@ class Galerkin:
         origin = np.concatenate((np.arange(count), ghosts.source))
         volumes = nodal_volumes(body, density)
         carried = np.bincount(origin, shape.T @ volumes).astype(float)
-        _check(body, carried > 0.0, "carries no mass")
-        return cls(volumes, carried, starts, columns, weights, ghosts)
+        # Where a surface is stretched, weights of MLS are negative; a row sum that is no mass gives way to a small one.
+        carried = np.maximum(carried, SMALLEST_CARRIED * volumes)
+        return cls(volumes, carried * (volumes.sum() / carried.sum()), starts, columns, weights, ghosts)
+
+    def averages(self, coefficients: Floats) -> Floats:
+        """Values at the particles `(n,)` of a scalar that is even at the walls."""
+        count, origin = len(self.volumes), np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))
+        shape = sparse.csr_matrix((self.weights[:, 0], self.columns, self.starts), shape=(count, len(origin)))
+        return shape @ coefficients[origin]
 
     def values(self, field: Floats) -> tuple[Floats, Floats]:
         """Velocity `(n, 3)` [m/s] and its gradient `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, of coefficients."""

@@ -70,6 +70,7 @@ class Past:
         coefficients: `(n, 3)` of the velocity [m/s].
         gradient: `(n, 3, 3)` of the velocity at the particles [1/s].
         masses: `(n,)` of the coefficients [kg].
+        pressure: `(n,)` coefficients [Pa].
         momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s]; None before the first step.
         history: its displacement and change of the coefficients.
         losses: of all steps.
@@ -79,6 +80,7 @@ class Past:
     coefficients: Floats
     gradient: Floats
     masses: Floats
+    pressure: Floats
     momenta: Floats | None
     history: BackwardDifference
     losses: Losses
@@ -88,9 +90,8 @@ class Past:
         """A body that starts with its velocity."""
         count = len(body.points)
         start = BackwardDifference.start(count)
-        return cls(
-            body.points, body.velocity, np.zeros((count, 3, 3)), np.zeros(count), None, start, losses or Losses()
-        )
+        slope, masses = np.zeros((count, 3, 3)), np.zeros(count)
+        return cls(body.points, body.velocity, slope, masses, body.pressure, None, start, losses or Losses())
 
     def kinetic_energy(self) -> float:
         """Of the coefficients [J]."""
@@ -203,7 +204,7 @@ class PreparedIspgStep:
         lost = self._lost_momentum(equations.masses)
         past, base = replace(past, coefficients=past.coefficients + lost), replace(base, velocity=base.velocity + lost)
         force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
-        pressure = body.pressure
+        pressure = past.pressure
         start = equations.predict(base.velocity, force, pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         coefficients, change = equations.project(start, rate, self.solver.factors)
@@ -213,11 +214,11 @@ class PreparedIspgStep:
         momenta = rigid_momenta(rigid_motions(points), equations.masses, coefficients)
         history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
         losses = self._losses(equations, base, coefficients, time_step)
-        self.solver.past = Past(points, coefficients, gradient, equations.masses, momenta, history, losses)
+        self.solver.past = Past(points, coefficients, gradient, equations.masses, pressure, momenta, history, losses)
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
-            pressure=pressure,
+            pressure=equations.space.averages(pressure),
             surface_pressure=float(pressure @ equations.space.volumes / equations.space.volumes.sum()),
             twists={},
             iterations=self.solver.factors.iterations,

@@ -18,6 +18,7 @@ FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
+ISPG_ANGLES = (pi / 3.0, 2.0 * pi / 3.0)
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -58,11 +59,18 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     places = {
         "free drops": drop.is_free,
         "pads": drop.pad_radius is not None,
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(drop.contact_angle),
         "hysteresis": drop.hysteresis is not None,
         "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _is_between(angle: float | None) -> bool:
+    """Whether a contact angle [rad] is one that the scheme ispg is verified for."""
+    low, high = ISPG_ANGLES
+    return angle is None or low - ROUNDING <= angle <= high + ROUNDING
 
 
 def _pair_resolution(pair: Drops) -> list[Problem]:

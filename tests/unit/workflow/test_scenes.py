@@ -202,6 +202,7 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
     [
         ("drop.pad_radius=0.5 mm", "pads"),
         ("drop.symmetry=half", "planes of symmetry"),
+        ("drop.contact_angle=148 deg", "contact angles outside 60 deg to 120 deg"),
         ("solder.wall=no-slip", "free slip only"),
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
