@@ -25,6 +25,9 @@ class Viewer {
 
   async build() {
     this.root = new ogl.Transform();
+    // One for all bodies: a browser without a graphics card takes long to compile each.
+    this.program = new ogl.Program(this.gl, { vertex: VERTEX, fragment: FRAGMENT, transparent: true });
+    this.program.setBlendFunc(this.gl.ONE, this.gl.ONE_MINUS_SRC_ALPHA);
     this.groups = [];
     for (const group of this.scene.groups) this.groups.push(await this.addGroup(group));
     this.hasContext = this.groups.some((group) => group.state === 1);
@@ -78,9 +81,13 @@ class Viewer {
   }
 
   addMesh(group, attributes, mode, uniforms) {
-    const program = new ogl.Program(this.gl, { vertex: VERTEX, fragment: FRAGMENT, uniforms, cullFace: false, transparent: true });
-    program.setBlendFunc(this.gl.ONE, this.gl.ONE_MINUS_SRC_ALPHA);
+    const { program } = this;
     const mesh = new ogl.Mesh(this.gl, { geometry: new ogl.Geometry(this.gl, attributes), program, mode, frustumCulled: false });
+    mesh.onBeforeRender(() => {
+      Object.assign(program.uniforms, uniforms);
+      program.depthWrite = group.state !== 1;
+      program.cullFace = group.state === 1 ? this.gl.BACK : false;
+    });
     mesh.setParent(this.root);
     group.meshes.push(mesh);
     return mesh;
@@ -325,8 +332,6 @@ class Viewer {
       group.uniforms.uSize.value = group.size * this.gl.canvas.height * 0.5;
       for (const mesh of group.meshes) {
         mesh.visible = shown && (mesh !== group.edges || (this.meshed && !picking && !ghost));
-        mesh.program.depthWrite = !ghost;
-        mesh.program.cullFace = ghost ? this.gl.BACK : false;
       }
     }
   }
