@@ -13,7 +13,8 @@ class Viewer {
     this.field = scene.fields.length ? 0 : -1;
     this.canvasBox = element("div", { className: "view" });
     this.tip = element("div", { className: "tip", hidden: true });
-    this.renderer = new ogl.Renderer({ dpr: Math.min(devicePixelRatio, 2), antialias: true, preserveDrawingBuffer: true });
+    this.width = widthOf(place) - 2; // within its border
+    this.renderer = new ogl.Renderer({ width: this.width, height: VIEW_HEIGHT, dpr: Math.min(devicePixelRatio, 2), antialias: true, preserveDrawingBuffer: true });
     this.gl = this.renderer.gl;
     this.gl.clearColor(1, 1, 1, 1);
     this.gl.canvas.tabIndex = 0;
@@ -346,9 +347,14 @@ class Viewer {
   }
 
   resize() {
-    const width = Math.max(this.canvasBox.clientWidth || shownWidth(this.canvasBox), 100);
-    this.renderer.setSize(width, VIEW_HEIGHT);
+    const width = widthOf(this.canvasBox);
+    if (width !== this.width) this.renderer.setSize(width, VIEW_HEIGHT);
+    this.width = width;
     this.aspect = width / VIEW_HEIGHT;
     this.wake();
   }
+}
+
+function widthOf(place) {
+  return Math.max(place.clientWidth || shownWidth(place), 100);
 }
