@@ -17,6 +17,7 @@ demo: setup  ## run the default case from case file to report
 
 test: setup  ## run every check and test, on all cores
 	@.ci/setup-slurm
+	@.ci/setup-browser
 	$(PYTHON) -m pytest $(PARALLEL)
 
 test-long: setup  ## the sweeps that `make test` leaves out: 50 interrupts, ..., random hard cases on three new seeds

@@ -58,7 +58,8 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert all(check["ok"] for check in summary["health"].values())
     assert summary["metrics"]["verdict"]["value"] == "ok"
     assert set(summary["timings"]) == {"reflow"}
-    assert "<svg" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert 'data-scene="0"' in page and 'data-figure="0"' in page
     assert not list(tmp_path.rglob("*.partial"))
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
@@ -76,7 +77,8 @@ def test_two_drops_from_case_file_to_report(tmp_path, place):
     limits = {"height_error", "max_width_error"} | (set() if place else {"radius_error"})
     assert set(summary["health"]) >= limits | {"drops_not_as_meant", "volume_drift", "capillary_number_at_rest"}
     assert result.returncode == 0, result.stderr
-    assert "<svg" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert 'data-scene="0"' in page and 'data-figure="0"' in page
 
 
 def test_an_oscillation_from_case_file_to_report(tmp_path):
@@ -87,7 +89,8 @@ def test_an_oscillation_from_case_file_to_report(tmp_path):
     assert set(summary["metrics"]) >= own | {"particles", "particle_steps_per_second"}
     assert set(summary["health"]) == {"period_error", "decay_rate_error", "volume_drift"}
     assert result.returncode == (0 if all(check["ok"] for check in summary["health"].values()) else 1)
-    assert "<svg" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert 'data-scene="0"' in page and 'data-figure="0"' in page
 
 
 MOVED = ("joint.spacing=0.07 mm", "solder.numerics.time_step_limit=100")

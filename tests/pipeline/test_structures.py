@@ -43,7 +43,7 @@ def test_both_solvers_of_a_board_from_case_file_to_report(tmp_path):
     assert summary["metrics"]["peak_strain@centre"]["value"] > 0.0
     assert all(effect["why"] for effect in summary["effects"].values())
     page = (tmp_path / "report.html").read_text()
-    assert page.count("<svg") >= 4 and page.count("data:image/png") == 3
+    assert page.count("data-figure=") >= 4 and page.count("data-scene=") == 2 and page.count("data:image/png") == 1
     assert "Fuchs" in page and "Natural modes" in page
     assert "nothing to do" in command("run", "jedec_board", tmp_path, *COARSE_BOARD).stdout
     plan = command("plan", "jedec_board", tmp_path, *COARSE_BOARD, "references.first_mode.at_most=300 Hz").stdout

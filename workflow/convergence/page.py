@@ -9,7 +9,8 @@ from reflowshock.workflow.convergence import tables
 from reflowshock.workflow.convergence.known import is_of, own_accuracy
 from reflowshock.workflow.convergence.measured import FILE, Accuracy, Measurement, read_accuracy
 from reflowshock.workflow.convergence.tables import compared, every_run, front
-from reflowshock.workflow.report.curves import STYLE, plain_ticks, pyplot, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLACK, GREY, RED
 from reflowshock.workflow.report.template import write_page
 
 COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
@@ -61,7 +62,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: boo
         "machine": str(accuracy.machine),
         "judged": accuracy.errors[accuracy.judged],
         "stages": " and ".join(f"stage {stage}" for stage in stages),
-        "plot": svg(figure(accuracy)),
+        "plot": charts(accuracy),
         "legend": tables.legend(accuracy),
         "runs": tables.runs(accuracy),
         "orders": tables.orders(accuracy),
@@ -103,8 +104,40 @@ def _markdown(table: dict) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows)
 
 
+def charts(accuracy: Accuracy) -> list[Chart]:
+    """Return the judged error over wall time and core-seconds, the name of each run under the pointer."""
+    level = Axis("error [%]", log=True)
+    return [
+        Chart(Axis(label, log=True), level, _series(accuracy, cost))
+        for cost, label in (("seconds", "wall time [s]"), ("core_seconds", "core-seconds"))
+    ]
+
+
+def _series(accuracy: Accuracy, cost: str) -> list[Series]:
+    """Return marks of one colour for each parameter, the front, the tolerance, the recommended run."""
+    known = sorted(compared(accuracy), key=lambda one: getattr(one, cost))
+    costs, errors = [getattr(one, cost) for one in known], [_error(one, accuracy) for one in known]
+    lines = []
+    for number, parameter in enumerate(dict.fromkeys(one.parameter for one in known)):
+        here = [place for place, one in enumerate(known) if one.parameter == parameter]
+        values = [costs[k] for k in here], [errors[k] for k in here]
+        names, colour = [known[k].run for k in here], COLOURS[number % len(COLOURS)]
+        lines.append(Series(parameter, *values, colour, line="none", marks=True, labels=names))
+    best = sorted(front(costs, errors), key=lambda k: costs[k])
+    lines.append(Series("Pareto front", [costs[k] for k in best], [errors[k] for k in best], BLACK, line="step"))
+    if accuracy.tolerance is not None and costs:
+        lines.append(Series("tolerance", [costs[0], costs[-1]], 2 * [100.0 * accuracy.tolerance], RED, line="dashed"))
+    chosen = accuracy.recommended
+    if chosen is not None and chosen.found is not None and accuracy.judged in chosen.found.errors:
+        mark = [getattr(chosen.found, cost)], [_error(chosen.found, accuracy)]
+        lines.append(Series("recommended", *mark, GREY, line="none", marks=True, labels=[chosen.run.name]))
+    return lines
+
+
 def save_picture(accuracy: Accuracy, path: Path) -> None:
     """Write the plot as PNG."""
+    from reflowshock.workflow.report.drawing import pyplot
+
     drawing = figure(accuracy)
     drawing.savefig(path, dpi=150)
     pyplot.close(drawing)
@@ -117,6 +150,8 @@ def figure(accuracy: Accuracy):
         A figure of matplotlib: marks of one colour for each parameter, the front as a line, tolerance,
         recommendation, and the cost of the finest run where others are compared with it.
     """
+    from reflowshock.workflow.report.drawing import STYLE, plain_ticks, pyplot
+
     with pyplot.rc_context(STYLE):
         drawing, axes = pyplot.subplots(1, 2, figsize=(9.6, 4.6), sharey=True, constrained_layout=True)
         for axis, cost, label in zip(axes, ("seconds", "core_seconds"), ("wall time [s]", "core-seconds"), strict=True):

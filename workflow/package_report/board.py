@@ -5,14 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib import pyplot
-
 from reflowshock.workflow.case.text import number
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.products import read_json
-from reflowshock.workflow.report.curves import MILLI, MODE_STYLE, STYLE, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.curves import GRAVITY, MILLI, MODE_STYLE, TIME
 from reflowshock.workflow.report.fitted import Histories, gauge_curves, gauge_table, in_mm
-from reflowshock.workflow.report.spectra import GRAVITY, mode_table, spectrum_curves
+from reflowshock.workflow.report.spectra import mode_table, spectrum_curves
 
 
 def add_board(
@@ -55,30 +54,26 @@ def watch_table(case: BoardDropCase, metrics: Mapping[str, Any]) -> dict:
     return {"head": head, "rows": rows} if rows else {}
 
 
-def watch_curves(case: BoardDropCase, histories: Histories) -> str:
-    """Draw deflection and acceleration of every watch point; empty without any."""
+def watch_curves(case: BoardDropCase, histories: Histories) -> list[Chart]:
+    """Return deflection and acceleration of every watch point."""
     from reflowshock.fem.loads.shock_pulse import shock_pulse
     from reflowshock.fem.output.acceleration import drop_accelerations
 
     if not case.watch:
-        return ""
+        return []
     pulse, low_pass = shock_pulse(case.shock).pulse, case.shock.filter
-    size = (9.2, 2.2 * len(case.watch))
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(
-            len(case.watch), 2, figsize=size, squeeze=False, sharex=True, constrained_layout=True
-        )
-        for mode, history in histories.items():
-            courses = drop_accelerations(history, pulse, low_pass, case.watch)
-            for (left, right), name in zip(axes, case.watch, strict=True):
-                left.plot(history["time"] / MILLI, history[f"displacement@{name}"][:, 2] / MILLI, **MODE_STYLE[mode])
-                left.set_ylabel("deflection [mm]")
-                left.set_title(name, loc="left")
-                if name in courses:
-                    course = courses[name]
-                    right.plot(course.time / MILLI, course.filtered / GRAVITY, **MODE_STYLE[mode])
-                right.set_ylabel("acceleration [G]")
-        axes[0, 0].legend(frameon=False)
-        for axis in axes[-1]:
-            axis.set_xlabel("time [ms]")
-        return svg(figure)
+    courses = {mode: drop_accelerations(history, pulse, low_pass, case.watch) for mode, history in histories.items()}
+    charts = []
+    for name in case.watch:
+        moved = [
+            Series(x=history["time"] / MILLI, y=history[f"displacement@{name}"][:, 2] / MILLI, **MODE_STYLE[mode])
+            for mode, history in histories.items()
+        ]
+        felt = [
+            Series(x=found[name].time / MILLI, y=found[name].filtered / GRAVITY, **MODE_STYLE[mode])
+            for mode, found in courses.items()
+            if name in found
+        ]
+        charts.append(Chart(TIME, Axis("deflection [mm]"), moved, title=name))
+        charts += [Chart(TIME, Axis("acceleration [G]"), felt, title=name)] if felt else []
+    return charts

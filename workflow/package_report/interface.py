@@ -4,20 +4,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib import pyplot
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from reflowshock.workflow.case.text import mega, percent
-from reflowshock.workflow.report.curves import MILLI, STYLE, svg
+from reflowshock.workflow.report.curves import MILLI
+from reflowshock.workflow.report.scene import Field, Group, Scene
 from reflowshock.workflow.report.tables import mode_name
 
 Arrays = Mapping[str, NDArray]
 
 MEGA = 1e6
-ROWS_DRAWN = 3  # times that are drawn; the table has all of them
-PANEL = 4.4  # inches
+STRESS = "von Mises stress"
+APART = 1.15  # of the array's width, between the modes
+FROM_ABOVE = (0.0, -0.01, 1.0)
 SAME_TIME = 1e-6  # s: modes write a time at the end of their own window that is next to it
 
 
@@ -95,27 +94,38 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
     return {"head": ["time [ms]", *heads, *last], "rows": rows}
 
 
-def interface_maps(interfaces: Mapping[str, Arrays]) -> str:
-    """Draw the faces of all joints seen from above, a row a time, a column a mode, one colour scale per time."""
-    times = times_of(interfaces)[:ROWS_DRAWN]
-    with pyplot.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 200}):
-        size = (PANEL * len(interfaces) + 0.8, (PANEL - 0.2) * len(times))
-        figure, axes = pyplot.subplots(len(times), len(interfaces), figsize=size, layout="constrained", squeeze=False)
-        for row, time in enumerate(times):
-            found = {mode: row_at(interface, time) for mode, interface in interfaces.items()}
-            here = {mode: own for mode, own in found.items() if own is not None}
-            top = max(_largest(interfaces[mode], own) for mode, own in here.items()) / MEGA
-            for axis in axes[row][len(here) :]:
-                axis.set_visible(False)
-            for axis, (mode, own) in zip(axes[row], here.items(), strict=False):
-                drawn = _draw_joints(axis, interfaces[mode], own, top)
-                axis.set_title(f"{mode_name(mode)}, {time / MILLI:.4g} ms", fontsize=9)
-            figure.colorbar(drawn, ax=axes[row][: len(here)].tolist(), label="von Mises [MPa]", shrink=0.85)
-        return svg(figure)
+def interface_scene(interfaces: Mapping[str, Arrays]) -> Scene:
+    """Return the faces of all joints seen from above at all times, the modes beside each other."""
+    times, first = times_of(interfaces), next(iter(interfaces.values()))
+    corners = np.concatenate([first[f"points@{joint}"] for joint in joints_of(first)])
+    width, top_edge = float(np.ptp(corners[:, 0])), float(corners[:, 1].max())
+    groups: list[Group] = []
+    parts: list[str] = []
+    labels = []
+    for column, (mode, interface) in enumerate(interfaces.items()):
+        shift = np.array([APART * width * column, 0.0, 0.0])
+        groups.append(_group(interface, times, shift, len(parts)))
+        parts += [f"{joint}, {mode_name(mode)}" for joint in joints_of(interface)]
+        place = (float(corners[:, 0].mean() + shift[0]), top_edge + 0.06 * width, float(corners[:, 2].mean()))
+        labels.append((mode_name(mode), place))
+    top = max(float(np.nanmax(group.values[STRESS])) for group in groups)
+    frames = [f"{time / MILLI:.4g} ms" for time in times]
+    return Scene(groups, parts, [Field(STRESS, "MPa", 0.0, top)], frames, view=FROM_ABOVE, labels=labels)
 
 
-def _largest(interface: Arrays, row: int) -> float:
-    return max(float(interface[f"von_mises@{joint}"][row].max()) for joint in joints_of(interface))
+def _group(interface: Arrays, times: NDArray[np.float64], shift: NDArray[np.float64], first_part: int) -> Group:
+    """Return the faces of a mode's joints with the stress [MPa] of each at all times; nan after the mode's end."""
+    rows, joints = [row_at(interface, time) for time in times], joints_of(interface)
+    corners = [interface[f"points@{joint}"][interface[f"quads@{joint}"]].reshape(-1, 3) + shift for joint in joints]
+    values = []
+    for joint, places in zip(joints, corners, strict=True):
+        stress, count = interface[f"von_mises@{joint}"] / MEGA, len(places) // 4
+        of_faces = [np.full(count, np.nan) if row is None else stress[row] for row in rows]
+        values.append(np.repeat(of_faces, 4, axis=1))
+    points = np.concatenate(corners)
+    part = np.repeat(first_part + np.arange(len(joints)), [len(places) for places in corners])
+    shown = {STRESS: np.concatenate(values, axis=1)}
+    return Group("solder", points, np.arange(len(points)).reshape(-1, 4), part, values=shown)
 
 
 def _extremes(interface: Arrays, row: int) -> tuple[str, str, str]:
@@ -128,20 +138,3 @@ def _extremes(interface: Arrays, row: int) -> tuple[str, str, str]:
         float(weight @ interface[f"von_mises@{joint}"][row]) for joint, weight in zip(joints, weights, strict=True)
     )
     return mega(peaks[worst]), joints[worst], mega(force / sum(float(weight.sum()) for weight in weights))
-
-
-def _draw_joints(axis: Axes, interface: Arrays, row: int, top: float) -> PolyCollection:
-    """Draw the faces of all joints at a time, on a scale that ends at ``top`` [MPa]."""
-    joints = joints_of(interface)
-    places = [interface[f"points@{joint}"][interface[f"quads@{joint}"]][:, :, :2] / MILLI for joint in joints]
-    values = np.concatenate([interface[f"von_mises@{joint}"][row] for joint in joints]) / MEGA
-    faces = PolyCollection(np.concatenate(places), array=values, cmap="turbo", linewidths=0.0, rasterized=True)
-    faces.set_clim(0.0, top)
-    axis.add_collection(faces)
-    for joint, corners in zip(joints, places, strict=True):
-        x, low, high = corners[..., 0].mean(), corners[..., 1].min(), corners[..., 1].max()
-        axis.annotate(joint, (x, low - 0.08 * (high - low)), ha="center", va="top", fontsize=6, color="#5f6c7b")
-    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axis.margins(x=0.06, y=0.1)
-    axis.autoscale_view()
-    return faces

@@ -83,6 +83,7 @@ def ranked_joints(
         rows.append(
             [
                 name,
+                *verdict_cells(judged[name]),
                 mega(PEEL.peaks(history)[column]),
                 mega(VON_MISES.peaks(history)[column]),
                 *work_cells(history, column),
@@ -93,7 +94,6 @@ def ranked_joints(
                 mega(OUTER_FIBRE.peaks(history)[column]),
                 micro(shape[name]["standoff"]),
                 micro(shape[name]["max_width"]),
-                *verdict_cells(judged[name]),
                 *([] if fine is None else ["fine" if name in fine else "coarse"]),
                 mega(history["von_mises_max"][:, column].max()),
             ]
@@ -101,6 +101,8 @@ def ranked_joints(
     layer = f"{1e6 * float(history['joint_layer']):.4g} µm"
     head = [
         "joint",
+        "verdict",
+        "margin",
         "peel stress [MPa]",
         f"von Mises of the {layer} at the pad [MPa]",
         *([f"plastic work of the {layer} [kJ/m³]"] if "plastic_work_board" in history else []),
@@ -111,8 +113,6 @@ def ranked_joints(
         "outer-fibre stress [MPa]",
         "standoff [µm]",
         "width [µm]",
-        "verdict",
-        "margin",
         *([] if fine is None else ["mesh"]),
         "largest element value [MPa], depends on the mesh",
     ]

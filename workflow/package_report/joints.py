@@ -9,15 +9,14 @@ from reflowshock.workflow.package_report import joint_tables as mesh_tables
 from reflowshock.workflow.package_report.joint_records import bridge_records, joint_records
 from reflowshock.workflow.process.products import read_json
 
-BRIDGE_CAPTION = "as one body: particles and free surface; right: coloured by pressure above ambient."
+BRIDGE_CAPTION = "as one body: particles and free surface; at the end coloured by pressure above ambient."
 
 
 def add_joints(run_folder: Path, context: dict) -> None:
     """Add shapes, maps, verdicts and meshes of the joints of an array, as far as the run has gone."""
     if not (run_folder / "reflow/joints.json").exists():
         return
-    from reflowshock.workflow.package_report.gallery import array_map, render_gallery
-    from reflowshock.workflow.report.pictures import embedded
+    from reflowshock.workflow.package_report.array import array_maps, shapes_scene
 
     joints = joint_records(run_folder)
     meshed = joints + bridge_records(run_folder)
@@ -29,10 +28,10 @@ def add_joints(run_folder: Path, context: dict) -> None:
         "missed_tries": mesh_tables.missed_tries(meshed),
         "fine_instead": mesh_tables.fine_instead(run_folder),
     }
-    context["curves"]["map"] = array_map(joints)
+    context["maps"] = array_maps(joints)
     drawn = [joint for joint in joints if "given" not in joint or (run_folder / "surface").exists()]
     if drawn:
-        context["pictures"]["gallery"], _ = embedded(lambda path: render_gallery(run_folder, drawn, path))
+        context["scenes"]["shapes"] = shapes_scene(run_folder, drawn)
     _add_bridge(run_folder, context)
     _add_warpage(run_folder, joints, context)
 
@@ -52,13 +51,12 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
     if not any(joint["verdict"] == "bridged" for joint in read_json(run_folder / "reflow/joints.json").values()):
         return
     from reflowshock.particles.scenes.products import read_shapes
-    from reflowshock.workflow.report.pictures import embedded, render_stages
+    from reflowshock.workflow.report.particles import particle_scene
 
     for name, shape in read_shapes(run_folder / "reflow/shapes.h5").items():
         if "+" in name:
-            first = shape.snapshots[:1]
             context["bridge_caption"] = f"{name} {BRIDGE_CAPTION}"
-            context["pictures"]["bridge"], _ = embedded(lambda path: render_stages(first, shape, path))  # noqa: B023
+            context["scenes"]["bridge"] = particle_scene(shape)
             return
 
 
@@ -70,8 +68,6 @@ def _add_warpage(run_folder: Path, joints: Sequence[Mapping[str, Any]], context:
     if structure is None:
         return
     context["warpage"] = warpage.in_words(structure)
-    context["curves"] |= {
-        "warpage": warpage.warpage_maps(structure, joints),
-        "profiles": warpage.profiles(structure),
-    }
+    context["scenes"]["warpage"] = warpage.warpage_scene(structure, joints)
+    context["curves"]["profiles"] = warpage.profiles(structure)
     context["tables"]["load_steps"] = warpage.load_steps(structure)

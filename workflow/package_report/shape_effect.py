@@ -2,21 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from matplotlib import pyplot
 from numpy.typing import NDArray
 
 from reflowshock.fem.output.ranking import PEEL
 from reflowshock.workflow.board_drop.identical_joints import shape_effect
 from reflowshock.workflow.case.text import mega, number, percent
-from reflowshock.workflow.report.curves import MILLI, STYLE, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLUE, ORANGE
+from reflowshock.workflow.report.curves import MILLI, TIME
 from reflowshock.workflow.report.histories import joint_stress, peel_peaks
 
 Arrays = Mapping[str, NDArray]
 
 MEGA = 1e6
-REAL, IDENTICAL = "#0b5fa5", "#9aa5b1"
-SHOWN = 30  # joints of the bar chart, the critical one first
+SHOWN = 30  # joints of the chart, the critical one first
 
 
 def in_words(real: Arrays, identical: Arrays) -> str:
@@ -49,22 +48,20 @@ def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
     }
 
 
-def curves(real: Arrays, identical: Arrays) -> str:
-    """Draw the critical joint's peel stress with real and identical joints, and the peaks of all joints."""
+def curves(real: Arrays, identical: Arrays) -> list[Chart]:
+    """Return the critical joint's peel stress with real and identical joints, and the peaks of all joints."""
     found, flat = peel_peaks(real), peel_peaks(identical)
-    critical = next(iter(found))
-    with pyplot.rc_context(STYLE):
-        figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 3.4), constrained_layout=True)
-        for history, label, colour in ((identical, "identical joints", IDENTICAL), (real, "real shapes", REAL)):
-            stress = joint_stress(history, critical, PEEL) / MEGA
-            left.plot(history["time"] / MILLI, stress, color=colour, label=label)
-        left.set(xlabel="time [ms]", ylabel=f"peel stress of {critical} [MPa]")
-        left.legend(frameon=False)
-        names = list(found)[:SHOWN]
-        place = np.arange(len(names))
-        right.bar(place - 0.2, [flat[name] / MEGA for name in names], 0.4, color=IDENTICAL, label="identical joints")
-        right.bar(place + 0.2, [found[name] / MEGA for name in names], 0.4, color=REAL, label="real shapes")
-        right.set_xticks(place, names, rotation=90, fontsize=7)
-        right.set(ylabel="peak peel stress [MPa]")
-        right.grid(axis="x", visible=False)
-        return svg(figure)
+    critical, names = next(iter(found)), list(found)[:SHOWN]
+    kinds = ((real, found, "real shapes", BLUE), (identical, flat, "identical joints", ORANGE))
+    lines = [
+        Series(label, history["time"] / MILLI, joint_stress(history, critical, PEEL) / MEGA, colour)
+        for history, _, label, colour in kinds
+    ]
+    peaks = [
+        Series(label, range(len(names)), [of[name] / MEGA for name in names], colour, line="none", marks=True)
+        for _, of, label, colour in kinds
+    ]
+    return [
+        Chart(TIME, Axis(f"peel stress of {critical} [MPa]"), lines),
+        Chart(Axis("joint, the critical one first", names=names), Axis("peak peel stress [MPa]"), peaks),
+    ]

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.package.verdict import failing, limits_table
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.board import add_board
-from reflowshock.workflow.package_report.headline import headline
+from reflowshock.workflow.package_report.headline import headline, later_swings
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
@@ -29,6 +28,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     if not histories:
         return
     from reflowshock.workflow.package_report import cost
+    from reflowshock.workflow.package_report.scenes import drop_scene
     from reflowshock.workflow.report.curves import difference_curves, energy_curves, history_curves
 
     main = next(iter(histories))
@@ -37,6 +37,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     critical = metrics["critical_joint"]["value"]
     context["headline"] = tables.headline(metrics) + context["headline"]
     context["figures"] = headline(metrics, context["discretisation"], summary, results)
+    context["figures"]["note"] += later_swings(case.shock, float(histories[main]["time"][-1]))
     context |= {"verdict": summary["verdict"], "answer": summary["answer"]}
     context["failing"] = failing(summary["verdict"])
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)
@@ -60,7 +61,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     _add_interface(shock, context)
     add_residual(shock, results[main]["parts"], context)
     _add_two_scales(run_folder, case, context, results)
-    _add_pictures(shock / main, histories[main], results[main], context)
+    context["scenes"]["view"], context["view_caption"] = drop_scene(shock / main, histories[main], results[main])
 
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
@@ -118,7 +119,7 @@ def _add_interface(shock: Path, context: dict) -> None:
 
     interfaces = interface.read_interfaces(shock, MODES)
     if interfaces:
-        context["curves"]["interface"] = interface.interface_maps(interfaces)
+        context["scenes"]["interface"] = interface.interface_scene(interfaces)
         context["tables"]["interface"] = interface.table(interfaces)
 
 
@@ -144,18 +145,6 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
     context["oracle"] = scales.oracle(seconds, runs) if seconds is not None else ""
 
 
-def _add_pictures(folder: Path, history: dict, result: dict, context: dict) -> None:
-    from reflowshock.workflow.report.pictures import embedded, render_board, render_joints
-
-    whole = {name: path for name in ("dns", "macro", "meso") if (path := folder / f"{name}.pvd").exists()}
-    is_one_way = result.get("coupling", {}).get("direction") == "one_way"
-    joints, board = ([whole["meso"]], [whole["macro"]]) if is_one_way else 2 * (list(whole.values()),)
-    parts = result["parts"]
-    for name, render, series in (("joints", render_joints, joints), ("board", render_board, board)):
-        draw = partial(render, series, history, parts)
-        context["pictures"][name], context[f"{name}_caption"] = embedded(draw)
-
-
 def add_residual(shock: Path, parts: list[str], context: dict) -> None:
     """Add what cooling left, where the shock begins with it.
 
@@ -164,7 +153,7 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
         parts: names of the parts of its mesh.
         context: of the page.
     """
-    from reflowshock.workflow.report.pictures import embedded
+    from reflowshock.workflow.package_report.scenes import residual_scene
 
     folder = next((shock / name for name in FOLDERS if (shock / name / "result.json").exists()), None)
     if folder is None:
@@ -173,7 +162,8 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
     context["residual"] = in_words(result["metrics"])
     context["tables"]["residual"] = table(result["joints"])
     if result["joints"]["joints"]:
-        context["pictures"]["residual"], _ = embedded(partial(_draw, folder, result["joints"], parts))
+        top = max(max(result["joints"][side]) for side in SIDES)
+        context["scenes"]["residual"] = residual_scene(folder / "residual.vtu", parts, top)
 
 
 def in_words(metrics: Mapping[str, Any]) -> str:
@@ -202,13 +192,3 @@ def table(joints: Mapping[str, list]) -> dict:
         for k in order
     ]
     return {"head": ["joint", *heads, *([] if strains is None else ["largest plastic strain"])], "rows": rows}
-
-
-def _draw(folder: Path, joints: Mapping[str, list], parts: list[str], picture: Path) -> None:
-    import pyvista
-
-    from reflowshock.workflow.report.pictures import draw_joints
-
-    stress = [max(joints[side][k] for side in SIDES) for k in range(len(joints["joints"]))]
-    worst = stress.index(max(stress))
-    draw_joints(pyvista.read(folder / "residual.vtu"), parts, joints["joints"][worst], stress[worst], picture)

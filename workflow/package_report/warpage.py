@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import pyplot
-from matplotlib.axes import Axes
-from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 
+from reflowshock.arrays import Floats
 from reflowshock.fem.problem.thermal import KELVIN
 from reflowshock.workflow.case.text import number
-from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, svg
-
-Floats = NDArray[np.float64]
+from reflowshock.workflow.report.bodies import exaggeration
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
+from reflowshock.workflow.report.curves import MICRO, MILLI
+from reflowshock.workflow.report.scene import Field, Group, Scene
 
 SAME_HEIGHT = 1e-8  # m; nodes of a flat face lie within it
 SAMPLES = 121  # of the profile
-LEVELS = 12  # of a map
-PACKAGE, BOARD = "#0b5fa5", "#e09f3e"
+VIEW = (-0.8, -1.8, 0.5)
+FACES = ("package, underside", "board, top face")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,22 +28,35 @@ class Face:
     """A face that was flat at the reference temperature.
 
     Attributes:
-        triangles: of its nodes [m].
+        points: ``(n, 3)`` its nodes [m].
         lift: ``(n,)`` their displacement along z [m].
     """
 
-    triangles: Triangulation
+    points: Floats
     lift: Floats
 
     @classmethod
     def of_nodes(cls, points: Floats, displacement: Floats) -> "Face":
         """Return the face through nodes ``(n, 3)`` [m]; those of the same place once."""
         _, first = np.unique(np.round(points[:, :2], 9), axis=0, return_index=True)
-        return cls(Triangulation(points[first, 0], points[first, 1]), displacement[first, 2])
+        return cls(points[first], displacement[first, 2])
 
     def at(self, x: Floats, y: Floats) -> Floats:
         """Return the lift at places of the face [m]; nan beside it."""
-        return np.asarray(LinearTriInterpolator(self.triangles, self.lift)(x, y).filled(np.nan))
+        from scipy.interpolate import LinearNDInterpolator
+
+        return np.asarray(LinearNDInterpolator(self.points[:, :2], self.lift)(x, y))
+
+    def triangles(self) -> NDArray[np.integer]:
+        """Return triangles ``(t, 3)`` of its nodes."""
+        from scipy.spatial import Delaunay
+
+        return Delaunay(self.points[:, :2]).simplices
+
+    @property
+    def over_centre(self) -> Floats:
+        """Lift over that of the node next to the axis ``(n,)`` [m]."""
+        return self.lift - self.lift[np.argmin(np.hypot(*self.points[:, :2].T))]
 
     @property
     def warpage(self) -> float:
@@ -64,30 +77,49 @@ def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
     return Face.of_nodes(points[under], displacement[under]), Face.of_nodes(points[top], displacement[top])
 
 
-def warpage_maps(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str, Any]]) -> str:
-    """Draw the lift of both faces as contours, each over its value at the centre, with the joints marked."""
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 4.0), constrained_layout=True)
-        names = ("package, underside", "board, top face")
-        for axis, face, name in zip(axes, faces(structure), names, strict=True):
-            _draw_face(axis, face, joints)
-            axis.set_title(f"{name}: {face.warpage / MICRO:.1f} µm", fontsize=9)
-        return svg(figure)
+def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str, Any]]) -> Scene:
+    """Return both faces, each with its lift over its own centre, and the places of the joints between them."""
+    found = faces(structure)
+    largest = max(float(np.abs(face.over_centre).max()) for face in found)
+    groups = []
+    for place, (face, name) in enumerate(zip(found, FACES, strict=True)):
+        moved = np.zeros((1, len(face.points), 3))
+        moved[0, :, 2] = face.over_centre
+        part = np.full(len(face.points), place)
+        groups.append(Group(name, face.points, face.triangles(), part, displacement=moved))
+    height = 0.5 * sum(float(face.points[:, 2].mean()) for face in found)
+    places = np.array([[joint["x"], joint["y"], height] for joint in joints])
+    numbers = len(FACES) + np.arange(len(joints))
+    size = 0.03 * float(np.ptp(found[0].points[:, 0]))
+    groups.append(Group("joints", places, np.zeros((0, 3), int), numbers, size=size))
+    return Scene(
+        groups,
+        [*(f"{name}: {face.warpage / MICRO:.1f} µm" for face, name in zip(found, FACES, strict=True)),
+         *(joint.get("name", "joint") for joint in joints)],
+        [Field("lift over the centre", "µm", -largest / MICRO, largest / MICRO, "diverging", "lift", 1 / MICRO)],
+        exaggeration=exaggeration(float(np.ptp(found[0].points[:, 0])), largest),
+        view=VIEW,
+    )  # fmt: skip
 
 
-def profiles(structure: Mapping[str, NDArray]) -> str:
-    """Draw the lift of both faces along the package's diagonal, and the gaps over the temperature of each step."""
-    with pyplot.rc_context(STYLE):
-        figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.2, 3.3), constrained_layout=True)
-        package, board = faces(structure)
-        x, y, along = _diagonal(package)
-        for face, label, colour in ((package, "package, underside", PACKAGE), (board, "board, top face", BOARD)):
-            lift = face.at(x, y)
-            left.plot(along / MILLI, (lift - lift[np.argmin(np.abs(along))]) / MICRO, color=colour, label=label)
-        left.set(xlabel="distance from the centre along the diagonal [mm]", ylabel="lift over the centre [µm]")
-        left.legend(frameon=False)
-        _draw_gaps(right, structure)
-        return svg(figure)
+def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
+    """Return the lift of both faces along the package's diagonal, and the gaps over the temperature of each step."""
+    package, board = faces(structure)
+    x, y, along = _diagonal(package)
+    lines = []
+    for face, name, colour in ((package, FACES[0], BLUE), (board, FACES[1], ORANGE)):
+        lift = face.at(x, y)
+        lines.append(Series(name, along / MILLI, (lift - lift[np.argmin(np.abs(along))]) / MICRO, colour))
+    order = np.argsort(structure["temperature"], kind="stable")
+    celsius = (structure["temperature"] - KELVIN)[order]
+    gaps = [
+        Series(f"joint {name}", celsius, change[order] / MICRO, colour, marks=True)
+        for (name, change), colour in zip(_extremes(structure), (BLUE, RED), strict=False)
+    ]
+    return [
+        Chart(Axis("distance from the centre along the diagonal [mm]"), Axis("lift over the centre [µm]"), lines),
+        Chart(Axis("temperature [°C]"), Axis("change of the gap [µm]"), gaps),
+    ]
 
 
 def load_steps(structure: Mapping[str, NDArray]) -> dict:
@@ -142,28 +174,9 @@ def _extremes(structure: Mapping[str, NDArray]) -> list[tuple[str, Floats]]:
     return [(str(names[column]), change[:, column]) for column in ends]
 
 
-def _draw_gaps(axis: Axes, structure: Mapping[str, NDArray]) -> None:
-    celsius = structure["temperature"] - KELVIN
-    for (name, change), colour in zip(_extremes(structure), (PACKAGE, "#d1495b"), strict=False):
-        axis.plot(celsius, change / MICRO, ".-", color=colour, label=f"joint {name}")
-    axis.set(xlabel="temperature [°C]", ylabel="change of the gap [µm]")
-    axis.legend(frameon=False)
-
-
-def _draw_face(axis: Axes, face: Face, joints: Sequence[Mapping[str, Any]]) -> None:
-    x, y = face.triangles.x / MILLI, face.triangles.y / MILLI
-    lift = (face.lift - face.lift[np.argmin(np.hypot(x, y))]) / MICRO
-    drawn = axis.tricontourf(x, y, face.triangles.triangles, lift, levels=LEVELS, cmap="viridis")
-    axis.plot([joint["x"] / MILLI for joint in joints], [joint["y"] / MILLI for joint in joints], "o", ms=5, mfc="none",
-              mec="white", mew=0.9)  # fmt: skip
-    axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axis.grid(False)
-    axis.figure.colorbar(drawn, ax=axis, label="lift over the centre [µm]")
-
-
 def _diagonal(face: Face) -> tuple[Floats, Floats, Floats]:
     """Return places x, y along the diagonal of a face, and their distance from the centre, signed [m]."""
-    lower = np.minimum([face.triangles.x.min(), face.triangles.y.min()], 0.0)
-    upper = np.array([face.triangles.x.max(), face.triangles.y.max()])
+    lower = np.minimum([*face.points[:, :2].min(axis=0)], 0.0)
+    upper = face.points[:, :2].max(axis=0)
     share = np.linspace(-1.0 if lower.any() else 0.0, 1.0, SAMPLES)
     return share * upper[0], share * upper[1], share * float(np.hypot(*upper))

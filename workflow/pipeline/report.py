@@ -56,13 +56,13 @@ def _context(run_folder: Path, case: Case, summary: dict, known: Discretisation)
         "discretisation": known,
         "warnings": summary.get("warnings", []),
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
+        "missed": [name.replace("_", " ") for name, check in summary["health"].items() if not check["ok"]],
+        "not_run": [name for name in case.pipeline.names[:-1] if name not in summary["timings"]],
+        "timings": summary["timings"],
         "curves": {},
+        "scenes": {},
         "pictures": {},
     }
-    if summary["timings"]:
-        from reflowshock.workflow.report.curves import timing_bars
-
-        context["curves"]["timings"] = timing_bars(summary["timings"])
     preview = run_folder / "geometry/preview.png"
     if preview.exists():
         context["pictures"]["preview"] = base64.b64encode(preview.read_bytes()).decode()

@@ -1,1 +1,1 @@
-"""The report of a run, from its products only; the page is put together in `page.py`."""
+"""What reports share: charts, scenes in 3D, tables, templates, and the scripts that draw them (`assets/`)."""

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from matplotlib import pyplot
-
 from reflowshock.workflow.case.text import number
-from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, stacked, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.curves import MICRO, MILLI, TIME
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,17 +46,17 @@ def in_mm(place: tuple[float, ...]) -> str:
     return ", ".join(number(value / MILLI) for value in place)
 
 
-def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styles: Mapping[str, dict]) -> str:
-    """Draw the strain of every gauge; empty without any."""
-    if not gauges:
-        return ""
-    with pyplot.rc_context(STYLE):
-        figure, axes = stacked(len(gauges), 2.2)
-        for axis, name in zip(axes, gauges, strict=True):
-            for run, history in histories.items():
-                axis.plot(history["time"] / MILLI, history[f"gauge@{name}"] / MICRO, **styles[run])
-            axis.set_ylabel("strain [µm/m]")
-            axis.set_title(name, loc="left")
-        axes[0].legend(frameon=False)
-        axes[-1].set_xlabel("time [ms]")
-        return svg(figure)
+def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styles: Mapping[str, dict]) -> list[Chart]:
+    """Return the strain of every gauge."""
+    return [
+        Chart(
+            TIME,
+            Axis("strain [µm/m]"),
+            [
+                Series(x=history["time"] / MILLI, y=history[f"gauge@{name}"] / MICRO, **styles[run])
+                for run, history in histories.items()
+            ],
+            title=name,
+        )
+        for name in gauges
+    ]

@@ -1,39 +1,38 @@
 """Response spectra of what shakes a body, and its natural modes."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import pyplot
 
-from reflowshock.workflow.report.curves import STYLE, plain_ticks, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import CYCLE
+from reflowshock.workflow.report.curves import GRAVITY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reflowshock.fem.loads.pulse import Pulse
 
-GRAVITY = 9.80665
 SAMPLES = 4000  # of an input, for its spectrum
 LOWEST = 0.1  # periods of the spectrum's lowest frequency in that time, since boards swing more slowly than the pulse
 LEAST = 20.0  # samples in a period of the spectrum's highest frequency
 
 
-def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> str:
-    """Draw the response spectrum of inputs over the duration [s] of a run; empty without any."""
+def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Chart]:
+    """Return the response spectrum of inputs over the duration [s] of a run; nothing without any."""
     from reflowshock.fem.output.response_spectrum import QUALITY, spectrum_frequencies
 
     if not pulses:
-        return ""
+        return []
     frequencies = spectrum_frequencies(LOWEST / duration, SAMPLES / (LEAST * duration))
-    with pyplot.rc_context(STYLE):
-        figure, axis = pyplot.subplots(figsize=(9.2, 2.8), constrained_layout=True)
-        for name, pulse in pulses.items():
-            axis.semilogx(frequencies, spectrum(pulse, duration, frequencies), label=name)
-        plain_ticks(axis.xaxis)
-        axis.set(xlabel="natural frequency [Hz]", ylabel=f"peak acceleration, Q = {QUALITY:g} [G]")
-        axis.legend(frameon=False)
-        return svg(figure)
+    lines = [
+        Series(name, frequencies, spectrum(pulse, duration, frequencies), colour)
+        for (name, pulse), colour in zip(pulses.items(), cycle(CYCLE), strict=False)
+    ]
+    level = Axis(f"peak acceleration, Q = {QUALITY:g} [G]")
+    return [Chart(Axis("natural frequency [Hz]", log=True), level, lines, is_wide=True)]
 
 
 def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]") -> "NDArray[np.float64]":

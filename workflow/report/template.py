@@ -1,18 +1,30 @@
-"""How pages are made from templates: nothing that a case, a file or an error says becomes a part of the page's code."""
+"""How pages are made from templates: nothing that a case, a file or an error says becomes a part of the page's code.
 
+Texts are escaped. A content security policy in each page allows its own script and style, by their digests, and
+pictures that are in the page; nothing else, and nothing from elsewhere.
+"""
+
+import base64
+import hashlib
+from functools import cache
 from pathlib import Path
 
 import jinja2
 from markupsafe import Markup
 
 from reflowshock.workflow.process.terminal import visible
+from reflowshock.workflow.report.page_data import PageData
 
 TEMPLATES = Path(__file__).parent / "templates"
+ASSETS = Path(__file__).parent / "assets"
+SCRIPTS = ("uplot.min.js", "ogl.min.js", "page.js", "charts.js", "shaders.js", "surfaces.js", "viewer.js", "start.js")
+STYLES = ("uplot.min.css", "style.css")
 
 
 def write_page(path: Path, template: str, context: dict) -> None:
     """Write a page from one of the templates, under a temporary name, then rename it."""
     environment = template_environment(TEMPLATES)
+    environment.globals |= {"data": PageData(), "script": script(), "style": style(), "policy": policy()}
     partial = path.with_name(f".{path.name}.partial")
     partial.write_text(environment.get_template(template).render(context), encoding="utf-8", errors="backslashreplace")
     partial.rename(path)
@@ -26,7 +38,29 @@ def template_environment(folder: Path) -> jinja2.Environment:
         finalize=_shown,
         undefined=jinja2.ChainableUndefined,
         trim_blocks=True,
+        extensions=["jinja2.ext.do"],
     )
+
+
+@cache
+def script() -> Markup:
+    """Return the script of a page."""
+    return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS))
+
+
+@cache
+def style() -> Markup:
+    """Return the style of a page."""
+    return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES))
+
+
+def policy() -> str:
+    """Return the content security policy of a page."""
+    return f"default-src 'none'; script-src {_digest(script())}; style-src {_digest(style())}; img-src data:"
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _shown(value: object) -> object:

@@ -3,17 +3,14 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import pyplot
 
 from reflowshock.workflow.case.text import number, percent, quantity
-from reflowshock.workflow.report.curves import MICRO, MILLI, STYLE, plain_ticks, svg
-from reflowshock.workflow.report.pictures import embedded, render_stages
-
-if TYPE_CHECKING:
-    from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
+from reflowshock.workflow.report.curves import MICRO, MILLI, TIME
+from reflowshock.workflow.report.particles import particle_scene
 
 DEGREE = np.pi / 180.0
 HEADLINE = (
@@ -41,9 +38,8 @@ def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> Non
         context["curves"]["body_history"] = history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
     if path.exists():
-        kind, context["curves"]["path"] = "path", path_curve(json.loads(path.read_text(encoding="utf-8")))
-    shown = stages(kind, shape)
-    context["pictures"]["body"], _ = embedded(lambda picture: render_stages(shown, shape, picture))
+        context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
+    context["scenes"]["body"] = particle_scene(shape)
 
 
 def headline(metrics: dict) -> list[dict]:
@@ -70,75 +66,59 @@ def middle(points: np.ndarray) -> np.ndarray:
     return 0.5 * (points.min(axis=0) + points.max(axis=0)) * np.array([1.0, 1.0, 0.0])
 
 
-def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> str:
-    """Draw radius against height of the surface particles `(s, 3)` [m] over the exact meridian `(2, k)` [m]."""
-    with pyplot.rc_context(STYLE):
-        figure, axis = pyplot.subplots(figsize=(6.2, 3.6), constrained_layout=True)
-        radius = np.hypot(points[:, 0], points[:, 1])
-        axis.plot(radius / MILLI, points[:, 2] / MILLI, ".", ms=3, color="#0b5fa5", label="surface particles")
-        if meridian is not None:
-            axis.plot(*(meridian / MILLI), color="#d1495b", lw=1.2, label="Young-Laplace")
-        axis.set(xlabel="radius [mm]", ylabel="height [mm]", aspect="equal")
-        axis.set_xlim(left=min(0.0, axis.get_xlim()[0]))
-        figure.legend(frameon=False, loc="outside upper center", ncols=2)
-        return svg(figure)
+def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> list[Chart]:
+    """Return radius against height of the surface particles `(s, 3)` [m], and the exact meridian `(2, k)` [m]."""
+    order = np.argsort(points[:, 2])
+    radius, height = np.hypot(points[:, 0], points[:, 1])[order] / MILLI, points[order, 2] / MILLI
+    lines = [Series("surface particles", height, radius, line="none", marks=True)]
+    if meridian is not None:
+        upwards = np.argsort(meridian[1], kind="stable")
+        lines.append(Series("Young-Laplace", meridian[1][upwards] / MILLI, meridian[0][upwards] / MILLI, RED))
+    return [Chart(Axis("height [mm]"), Axis("radius [mm]"), lines, is_upright=True)]
 
 
-def history_curve(history: dict) -> str:
-    """Draw height and width, energy, capillary number and time step against the steps."""
-    step = history["step"]
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(2, 2, figsize=(9.2, 5.2), sharex=True, constrained_layout=True)
-        axes[0, 0].plot(step, history["height"] / MILLI, label="height")
-        if "width" in history:
-            axes[0, 0].plot(step, history["width"] / MILLI, label="width")
-        axes[0, 0].set_ylabel("[mm]")
-        axes[0, 0].legend(frameon=False)
-        axes[0, 1].plot(step, history["energy"] / MICRO)
-        axes[0, 1].set_ylabel("energy [µJ]")
-        axes[0, 1].ticklabel_format(useOffset=False)
-        axes[1, 0].semilogy(step, history["capillary_number"])
-        axes[1, 0].set_ylabel("capillary number")
-        axes[1, 1].semilogy(step, history["time_step"] / MICRO)
-        axes[1, 1].set_ylabel("time step [µs]")
-        for axis in axes[1]:
-            plain_ticks(axis.yaxis)
-            axis.set_xlabel("step")
-        return svg(figure)
+def history_curve(history: dict) -> list[Chart]:
+    """Return height and width, energy, capillary number and time step against the steps."""
+    step, steps = history["step"], Axis("step")
+    sizes = [
+        Series(name, step, history[name] / MILLI, colour)
+        for name, colour in (("height", BLUE), ("width", ORANGE))
+        if name in history
+    ]
+    energy = [Series("energy", step, history["energy"] / MICRO)]
+    capillary = [Series("capillary number", step, history["capillary_number"])]
+    return [
+        Chart(steps, Axis("size [mm]"), sizes),
+        Chart(steps, Axis("energy [µJ]"), energy),
+        Chart(steps, Axis("capillary number", log=True), capillary),
+        Chart(steps, Axis("time step [µs]", log=True), [Series("time step", step, history["time_step"] / MICRO)]),
+    ]
 
 
-def path_curve(places: Sequence[Mapping]) -> str:
-    """Draw force and waist of a joint in the places of a path, over what changes first: standoff, offset or tilt."""
+def path_curve(places: Sequence[Mapping]) -> list[Chart]:
+    """Return force and waist of a joint in the places of a path, over what changes first: standoff, offset or tilt."""
     axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [deg]", DEGREE)}
     name = next((name for name in axis_of if places[0][name] != places[-1][name]), "standoff")
     label, scale = axis_of[name]
-    way = [place[name] / scale for place in places]
-    exact = [(x, place["axial_force_exact"] / MILLI) for x, place in zip(way, places, strict=True)
-             if place["axial_force_exact"] is not None]  # fmt: skip
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
-        axes[0].plot(way, [place["axial_force"] / MILLI for place in places], "o", ms=4, label="particles")
-        if exact:
-            axes[0].plot(*zip(*exact, strict=True), color="#d1495b", lw=1.2, marker=".", label="Young-Laplace")
-        axes[0].set_ylabel("force on the package, upwards [mN]")
-        axes[1].plot(way, [place["waist"] / MILLI for place in places], "o-", ms=4, label="waist")
-        axes[1].plot(way, [place["max_width"] / MILLI for place in places], "s-", ms=4, label="width")
-        axes[1].set_ylabel("[mm]")
-        for axis in axes:
-            axis.set_xlabel(label)
-            axis.legend(frameon=False)
-        return svg(figure)
+    ordered = sorted(places, key=lambda place: place[name])
+    way = [place[name] / scale for place in ordered]
+    force = [Series("particles", way, [place["axial_force"] / MILLI for place in ordered], line="none", marks=True)]
+    exact = [place["axial_force_exact"] for place in ordered]
+    if any(value is not None for value in exact):
+        values = [np.nan if value is None else value / MILLI for value in exact]
+        force.append(Series("Young-Laplace", way, values, RED, marks=True))
+    widths = [
+        Series(shown, way, [place[key] / MILLI for place in ordered], colour, marks=True)
+        for key, shown, colour in (("waist", "waist", BLUE), ("max_width", "width", ORANGE))
+    ]
+    return [
+        Chart(Axis(label), Axis("force on the package, upwards [mN]"), force),
+        Chart(Axis(label), Axis("size [mm]"), widths),
+    ]
 
 
-def stages(kind: str, shape: "JointShape") -> "list[Snapshot]":
-    """The states that a picture shows before the end: each quarter of the first oscillation, two of a path."""
-    half = max(1, len(shape.snapshots) // 2)
-    shown = {"oscillation": shape.snapshots[:7:2], "drops": shape.snapshots, "path": shape.snapshots[: half + 1 : half]}
-    return shown.get(kind, shape.snapshots[:1])
-
-
-def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> str:
-    """Draw the amplitude of the second mode beside that of Reid at small amplitude, and the energies."""
+def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> list[Chart]:
+    """Return the amplitude of the second mode beside that of Reid at small amplitude, and the energies."""
     time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
     period = value["period"] / (1.0 + value["period_error"])
     decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])
@@ -146,20 +126,20 @@ def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) 
     first = amplitude[time <= period]
     scale = 0.5 * (first.max() - first.min()) * np.exp(0.5 * decay * period)
     exact = scale * np.exp(-decay * time) * np.sin(2.0 * np.pi * time / period)
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(1, 2, figsize=(9.2, 3.2), constrained_layout=True)
-        axes[0].plot(time / MILLI, amplitude, color="#0b5fa5", label="particles")
-        axes[0].plot(time / MILLI, exact, "--", color="#d1495b", lw=1.0, label="Reid")
-        axes[0].set_ylabel("amplitude of the second mode / R")
-        total, kinetic = history["energy"], history["kinetic_energy"]
-        rest = total[0] - kinetic[0]
-        axes[1].plot(time / MILLI, (total - rest) / kinetic[0], label="kinetic + surface")
-        axes[1].plot(time / MILLI, kinetic / kinetic[0], label="kinetic")
-        axes[1].set_ylabel("energy above that at rest / at the start")
-        for axis in axes:
-            axis.set_xlabel("time [ms]")
-            axis.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-        return svg(figure)
+    swing = [
+        Series("particles", time / MILLI, amplitude),
+        Series("Reid", time / MILLI, exact, RED, line="dashed"),
+    ]
+    total, kinetic = history["energy"], history["kinetic_energy"]
+    rest = total[0] - kinetic[0]
+    energies = [
+        Series("kinetic + surface", time / MILLI, (total - rest) / kinetic[0]),
+        Series("kinetic", time / MILLI, kinetic / kinetic[0], ORANGE),
+    ]
+    return [
+        Chart(TIME, Axis("amplitude of the second mode / R"), swing),
+        Chart(TIME, Axis("energy above that at rest / at the start"), energies),
+    ]
 
 
 def _text(name: str, metric: dict) -> str:

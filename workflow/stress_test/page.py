@@ -18,7 +18,7 @@ from reflowshock.cases.hard.hard_case import hard_case_text
 from reflowshock.cases.hard.trial import FAMILIES
 from reflowshock.cases.hard.verdict import Check, Verdict
 from reflowshock.workflow import __version__
-from reflowshock.workflow.report.curves import STYLE
+from reflowshock.workflow.report.drawing import STYLE
 from reflowshock.workflow.report.template import template_environment
 from reflowshock.workflow.stress_test.sample import Sample
 from reflowshock.workflow.stress_test.words import sample_said

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import pyplot
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.report import two_scales
-from reflowshock.workflow.report.curves import ENERGIES, MILLI, STYLE, svg
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLUE, GREEN, RED
+from reflowshock.workflow.report.curves import ENERGIES, MILLI, TIME
 from reflowshock.workflow.report.fitted import gauge_curves, gauge_table
 from reflowshock.workflow.report.spectra import mode_table
 from reflowshock.workflow.report.tables import costs
@@ -26,9 +26,9 @@ from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
 SOLVER_STYLE: dict[str, dict[str, Any]] = {
-    "explicit": {"color": "#0b5fa5", "linestyle": "-", "linewidth": 1.6, "label": "explicit"},
-    "implicit": {"color": "#d1495b", "linestyle": "--", "linewidth": 1.3, "label": "implicit"},
-    "dns": {"color": "#2a7d4f", "linestyle": ":", "linewidth": 1.6, "label": "DNS"},
+    "explicit": {"name": "explicit", "colour": BLUE},
+    "implicit": {"name": "implicit", "colour": RED, "line": "dashed"},
+    "dns": {"name": "DNS", "colour": GREEN, "line": "dotted"},
 }
 COMPONENTS = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 UNITS = {"displacement": "m", "velocity": "m/s", "strain": "m/m", "stress": "Pa", "reaction": "N"}
@@ -69,7 +69,7 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     context["headline"] = headline(metrics)
     context["meshed"] = meshed_part(case)
     context["points"] = [{"name": name, "curve": point_curves(histories, name)} for name in case.watch]
-    context["curves"]["energies"] = energy_curves(histories)
+    context["curves"]["energy"] = energy_curves(histories)
     context["curves"]["accelerations"] = acceleration_curves(case, histories, SOLVER_STYLE)
     context["curves"]["gauges"] = gauge_curves(histories, case.gauges, SOLVER_STYLE)
     context["curves"]["spectrum"] = input_spectra(case)
@@ -86,7 +86,7 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     first = next(iter(results))
     context["tables"]["gauges"] = gauge_table(case.gauges, metrics, results[first]["model"].get("gauge_lengths", {}))
     add_two_scales(results[first], context)
-    _add_pictures(folder / first, case, histories[first], context)
+    _add_scenes(folder / first, case, histories[first], context)
 
 
 def add_two_scales(result: Mapping, context: dict) -> None:
@@ -172,16 +172,17 @@ def models(results: Mapping[str, dict]) -> dict:
     }
 
 
-def _add_pictures(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:
-    from reflowshock.workflow.report.pictures import embedded
-    from reflowshock.workflow.structure.pictures import render_deformation, render_modes
+def _add_scenes(folder: Path, case: StructureCase, history: Mapping[str, np.ndarray], context: dict) -> None:
+    from reflowshock.workflow.structure.scenes import deformation_scene, modes_scene
 
-    modes, series, time = read_modes(folder), model_series(folder), _peak_time(case, history)
-    pictures = context["pictures"]
-    pictures["bent"], context["bent_caption"] = embedded(lambda path: render_deformation(series, time, path))
+    modes, parts = read_modes(folder), list(case.structure.layers)
+    context["scenes"]["view"] = deformation_scene(model_series(folder), parts, _peak_time(case, history))
+    context["view_caption"] = (
+        "At first the time of the largest strain energy. Displacements are relative to the supports."
+    )
     if modes:
         context["tables"]["modes"] = mode_table(modes)
-        pictures["modes"], _ = embedded(lambda path: render_modes(folder / "modes.pvd", modes[:6], path))
+        context["scenes"]["modes"] = modes_scene(folder / "modes.pvd", parts, modes)
 
 
 def model_series(folder: Path) -> list[Path]:
@@ -194,61 +195,45 @@ def _peak_time(case: StructureCase, history: Mapping[str, np.ndarray]) -> float:
     return float(history["time"][np.argmax(history["internal"])])
 
 
-def point_curves(histories: Histories, point: str) -> str:
-    """Draw displacement, velocity, strain and stress of a watch point, of each its largest component."""
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(2, 2, figsize=(9.2, 5.2), sharex=True, constrained_layout=True)
-        for axis, quantity in zip(axes.ravel(), ("displacement", "velocity", "strain", "stress"), strict=True):
-            _draw(axis, histories, quantity, point)
-        axes[0, 0].legend(frameon=False)
-        for axis in axes[1]:
-            axis.set_xlabel("time [ms]")
-        return svg(figure)
+def point_curves(histories: Histories, point: str) -> list[Chart]:
+    """Return displacement, velocity, strain and stress of a watch point, of each its largest component."""
+    return [component_chart(histories, what, point) for what in ("displacement", "velocity", "strain", "stress")]
 
 
-def reaction_curves(histories: Histories, supports: list[str]) -> str:
-    """Draw the largest component of the reaction of every support."""
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(
-            1, len(supports), figsize=(min(9.2, 4.6 * len(supports)), 2.8), squeeze=False, constrained_layout=True
-        )
-        for axis, support in zip(axes[0], supports, strict=True):
-            _draw(axis, histories, "reaction", support)
-            axis.set(xlabel="time [ms]", title=support)
-        axes[0, 0].legend(frameon=False)
-        return svg(figure)
+def reaction_curves(histories: Histories, supports: list[str]) -> list[Chart]:
+    """Return the largest component of the reaction of every support."""
+    return [component_chart(histories, "reaction", support, support) for support in supports]
 
 
-def energy_curves(histories: Histories) -> str:
-    """Draw the nonzero terms of each solver's energy balance, and the balance relative to the largest energy."""
-    with pyplot.rc_context(STYLE):
-        figure, axes = pyplot.subplots(
-            len(histories), 2, figsize=(9.2, 3.0 * len(histories)), squeeze=False, constrained_layout=True
-        )
-        for (left, right), (solver, history) in zip(axes, histories.items(), strict=True):
-            time, largest = history["time"] / MILLI, _largest(history)
-            factor, prefix = _prefix(largest)
-            for name, colour in ENERGIES.items():
-                if np.abs(history[name]).max() > 1e-6 * largest:
-                    left.plot(time, history[name] / factor, label=name, color=colour)
-            left.set_ylabel(f"{solver}: energy [{prefix}J]")
-            left.legend(frameon=False, fontsize=7, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-            right.plot(time, 100.0 * history["balance"] / (largest or 1.0), color="#d1495b")
-            right.set_ylabel(f"{solver}: balance [%]")
-        for axis in axes[-1]:
-            axis.set_xlabel("time [ms]")
-        return svg(figure)
+def energy_curves(histories: Histories) -> list[Chart]:
+    """Return the nonzero terms of each solver's energy balance, and the balance relative to the largest energy."""
+    charts = []
+    for solver, history in histories.items():
+        time, largest = history["time"] / MILLI, _largest(history)
+        factor, prefix = _prefix(largest)
+        terms = [
+            Series(name, time, history[name] / factor, colour)
+            for name, colour in ENERGIES.items()
+            if np.abs(history[name]).max() > 1e-6 * largest
+        ]
+        balance = Series("balance", time, 100.0 * history["balance"] / (largest or 1.0), RED)
+        charts += [Chart(TIME, Axis(f"energy [{prefix}J]"), terms, title=solver)] if terms else []
+        charts.append(Chart(TIME, Axis("share of the largest energy [%]"), [balance], title=solver))
+    return charts
 
 
-def _draw(axis: Axes, histories: Histories, quantity: str, place: str) -> None:
-    """Draw one component of a vector or tensor: the one that is largest in the first history."""
+def component_chart(histories: Histories, quantity: str, place: str, title: str = "") -> Chart:
+    """Return one component of a vector or tensor: the one that is largest in the first history."""
     name = f"{quantity}@{place}"
     first = next(iter(histories.values()))[name]
     component = int(np.argmax(np.abs(first).max(axis=0)))
     factor, prefix = _prefix(float(np.abs(first[:, component]).max()))
-    for solver, history in histories.items():
-        axis.plot(history["time"] / MILLI, history[name][:, component] / factor, **SOLVER_STYLE[solver])
-    axis.set_ylabel(f"{quantity} {COMPONENTS[first.shape[1]][component]} [{prefix}{UNITS[quantity]}]")
+    lines = [
+        Series(x=history["time"] / MILLI, y=history[name][:, component] / factor, **SOLVER_STYLE[solver])
+        for solver, history in histories.items()
+    ]
+    label = f"{quantity} {COMPONENTS[first.shape[1]][component]} [{prefix}{UNITS[quantity]}]"
+    return Chart(TIME, Axis(label), lines, title=title)
 
 
 def _prefix(largest: float) -> tuple[float, str]:

@@ -1,5 +1,6 @@
 """study.html, main_effects.png, results.csv and results.parquet of a study, with a panel a metric and factor."""
 
+import base64
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from matplotlib.figure import Figure
 
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.text import SHOWN
-from reflowshock.workflow.report.curves import STYLE, pyplot
+from reflowshock.workflow.report.drawing import STYLE, pyplot
 from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.main_effects import MainEffect
@@ -52,14 +53,14 @@ def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
 
 
 def _picture(folder: Path, found: list) -> dict:
-    """Draw main effects into a PNG; return them as SVG. Nothing where no point has a metric."""
+    """Draw main effects into a PNG; return it in base64. Nothing where no point has a metric."""
     if not found:
         return {"picture": ""}
-    from reflowshock.workflow.report.curves import svg
-
+    picture = folder / "main_effects.png"
     figure = main_effects(found)
-    figure.savefig(folder / "main_effects.png", dpi=150)
-    return {"picture": svg(figure)}
+    figure.savefig(picture, dpi=150)
+    pyplot.close(figure)
+    return {"picture": base64.b64encode(picture.read_bytes()).decode()}
 
 
 def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Figure:

@@ -8,14 +8,13 @@ import pytest
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.workflow.package.verdict import verdict_of
 from reflowshock.workflow.package_report import joint_tables
-from reflowshock.workflow.package_report.gallery import array_map
 from reflowshock.workflow.package_report.shock import ranking_mode
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.report import collect_summary, write_summary
 from reflowshock.workflow.report import tables
-from reflowshock.workflow.report.curves import energy_curves, history_curves
+from reflowshock.workflow.report.bodies import exaggeration
+from reflowshock.workflow.report.curves import difference_curves, energy_curves, history_curves
 from reflowshock.workflow.report.histories import late_peak
-from reflowshock.workflow.report.pictures import exaggeration
 from reflowshock.workflow.solder import report as report_body
 from reflowshock.workflow.store.keys import inputs_digest
 from tests.support.products import record_of
@@ -54,9 +53,10 @@ def test_joints_are_ranked_by_their_worse_pad(history):
     judged = verdict_of(Failure(), history, "A10")["joints"]
     table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], judged)
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert table["rows"][0][1:8] == ["9.000", "100.0", "board", "0.500", "2", "1", "30.00"]
-    assert table["rows"][1][5:7] == ["1", "5"]
-    assert table["head"][2] == "von Mises of the 25 µm at the pad [MPa]"
+    assert table["rows"][0][1:3] == ["NO LIMIT", "–"]
+    assert table["rows"][0][3:10] == ["9.000", "100.0", "board", "0.500", "2", "1", "30.00"]
+    assert table["rows"][1][7:9] == ["1", "5"]
+    assert table["head"][4] == "von Mises of the 25 µm at the pad [MPa]"
     assert (table["head"][-1], table["rows"][0][-1]) == ("largest element value [MPa], depends on the mesh", "150.0")
 
 
@@ -74,10 +74,10 @@ def test_joints_tell_their_verdict_and_by_what(history):
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
     found = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
     table = joint_tables.ranked_joints(yielding, joints, found)
-    assert table["head"][3] == "plastic work of the 25 µm [kJ/m³]"
+    assert table["head"][5] == "plastic work of the 25 µm [kJ/m³]"
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
-    assert [row[-3:-1] for row in table["rows"]] == [["FAIL", "0.889 by peel"], ["PASS", "1.6 by peel"]]
-    assert [row[3] for row in table["rows"]] == ["200", "100"]
+    assert [row[1:3] for row in table["rows"]] == [["FAIL", "0.889 by peel"], ["PASS", "1.6 by peel"]]
+    assert [row[5] for row in table["rows"]] == ["200", "100"]
 
 
 def test_a_drop_may_stand_anywhere():
@@ -110,14 +110,20 @@ def test_quantities_read_as_an_engineer_writes_them(name, metric, text):
     assert tables.named_quantity({name: metric}, name) == text
 
 
-def test_curves_are_inline_svg(history):
-    joints = [{"name": "A10", "x": 4.5e-3, "y": 4.5e-3, **JOINT}, {"name": "A9", "x": 3.5e-3, "y": 4.5e-3, **JOINT}]
-    for drawing in (
-        array_map(joints),
-        history_curves({"two_scale": history, "dns": history}, "A10"),
-        energy_curves(history),
-    ):
-        assert drawing.startswith("<svg") and drawing.rstrip().endswith("</svg>")
+def test_histories_of_both_modes_are_charts(history):
+    both = {"two_scale": history, "dns": history}
+    first, *others = history_curves(both, "A10")
+    assert [line.name for line in first.series] == [
+        "two-scale",
+        "DNS",
+        "input",
+    ] and first.right == "input acceleration [G]"
+    assert max(others[-1].series[0].y) == pytest.approx(100.0)  # MPa, of the worse pad
+    assert [max(abs(chart.series[0].y)) for chart in difference_curves(both, "A10")] == [0.0, 0.0]
+    assert difference_curves({"dns": history}, "A10") == []
+    energies, balance = energy_curves(history)
+    assert [line.name for line in energies.series] == ["external", "kinetic", "internal"]
+    assert max(energies.series[0].y) == pytest.approx(3.0) and max(balance.series[0].y) == 0.0
 
 
 def test_summary_merges_the_stages_that_have_run(tmp_path):
@@ -144,7 +150,7 @@ def test_a_board_at_rest_is_drawn_as_it_is():
 
 
 def test_dollars_and_backslashes_are_no_formulas():
-    from reflowshock.workflow.report.curves import STYLE, pyplot, svg
+    from reflowshock.workflow.report.drawing import STYLE, pyplot, svg
 
     with pyplot.rc_context(STYLE):
         figure, axis = pyplot.subplots()

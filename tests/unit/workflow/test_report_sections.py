@@ -4,16 +4,15 @@ import json
 
 import numpy as np
 import pytest
-import pyvista
 
-from reflowshock.workflow.package_report import cost, gallery, shape_effect, shock, warpage
+from reflowshock.workflow.package_report import cost, shape_effect, shock, warpage
 from reflowshock.workflow.package_report import interface as section
 from reflowshock.workflow.package_report import joint_tables as mesh_tables
 from reflowshock.workflow.package_report import shock as residual
-from reflowshock.workflow.package_report.gallery import array_map
+from reflowshock.workflow.package_report.array import array_maps
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
-from reflowshock.workflow.report.pictures import is_neighbour
+from reflowshock.workflow.package_report.scenes import is_neighbour, role_of
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
 
 NAMES = ["A3", "A4", "B3", "B4"]
@@ -46,9 +45,14 @@ def test_warpage_is_told_in_words_and_by_load_step(structure):
 
 
 def test_warpage_is_drawn(structure):
-    joints = [{"x": x, "y": y} for x, y in zip(X, Y, strict=True)]
-    for drawing in (warpage.warpage_maps(structure, joints), warpage.profiles(structure)):
-        assert drawing.startswith("<svg")
+    joints = [{"name": name, "x": x, "y": y} for name, x, y in zip(NAMES, X, Y, strict=True)]
+    scene = warpage.warpage_scene(structure, joints)
+    package, board, places = scene.groups
+    assert package.displacement[0, :, 2].max() == pytest.approx(BOW["package"]) and scene.fields[0].unit == "µm"
+    assert board.triangles > 0 and len(places.points) == len(NAMES) and scene.parts[-4:] == NAMES
+    lifts, gaps = warpage.profiles(structure)
+    assert max(lifts.series[0].y) == pytest.approx(BOW["package"] / MICRO, rel=1e-3)
+    assert len(gaps.series) == 2
 
 
 def test_neighbours_are_told_from_the_package_by_their_parts():
@@ -63,16 +67,8 @@ def test_neighbours_are_told_from_the_package_by_their_parts():
         "solder_u2",
     ]
     assert [name for name in parts if is_neighbour(name)] == ["die_pmic", "solder_u2"]
-
-
-def test_captions_of_the_gallery_are_narrower_than_a_joint():
-    surface = pyvista.Plane()
-    surface.cell_data["boundary"] = np.zeros(surface.n_cells)
-    surface[gallery.DEVIATION] = np.linspace(-12.3, 24.6, surface.n_points)
-    joint = {"standoff": 278.2e-6, "max_width": 615.1e-6, "angles": "142.9 / 142.7", "tilted": 8.6e-3}
-    lines = gallery.caption(["A10"], joint, surface).split("\n")
-    assert lines[-2:] == ["-12.3 to +24.6 µm", "tilt 8.6 mrad"]
-    assert max(map(len, lines)) <= len("142.9 / 142.7 deg") and len(lines) < gallery.LINES
+    roles = ["solder", "substrate", "substrate", "die", "copper", "board", "other packages", "other packages"]
+    assert [role_of(name) for name in parts] == roles
 
 
 def test_no_structure_no_section(tmp_path):
@@ -90,7 +86,10 @@ def test_stresses_of_both_modes_differ_by_their_factor():
     assert [row[0] for row in table["rows"]] == ["0.5", "1"]
     assert table["rows"][1][1:3] == ["6.575", "A4"]
     assert table["rows"][1][-1] == "1 %"
-    assert section.interface_maps(both).startswith("<svg")
+    scene = section.interface_scene(both)
+    assert scene.fields[0].high == pytest.approx(6.575, rel=1e-3) and scene.frames == ["0.5 ms", "1 ms"]
+    assert [text for text, _ in scene.labels] == ["two-scale", "DNS"]
+    assert scene.groups[1].points[:, 0].min() > scene.groups[0].points[:, 0].max()
 
 
 def test_a_dns_that_ends_early_is_compared_as_far_as_it_goes():
@@ -98,7 +97,8 @@ def test_a_dns_that_ends_early_is_compared_as_far_as_it_goes():
     both = {"two_scale": ours, "dns": interface(NAMES, X, Y, np.array([0.5e-3]), 2.0)}
     rows = section.table(both)["rows"]
     assert rows[0][-1] == "75 %" and rows[1][-4:] == ["–", "–", "–", "–"]
-    assert section.interface_maps(both).startswith("<svg")
+    values = section.interface_scene(both).groups[1].values[section.STRESS]
+    assert np.isfinite(values[0]).all() and np.isnan(values[1]).all()
 
 
 def test_times_are_compared_by_time_and_not_by_place_in_the_file():
@@ -134,7 +134,9 @@ def test_the_shape_effect_is_that_of_the_critical_joint():
     assert shape_effect.table(real, flat, joints)["rows"][0] == ["A4", "90.00", "75.00", "+20.00 %", "300.0"]
     pressed = shape_effect.in_words(real, history_of(0.0, 0.0, 0.0, 0.0))
     assert "raise the peak peel stress of A4: 90 MPa instead of 0 MPa" in pressed
-    assert shape_effect.curves(real, flat).startswith("<svg")
+    line, peaks = shape_effect.curves(real, flat)
+    assert max(line.series[0].y) == pytest.approx(90.0)
+    assert peaks.x.names == ["A4", "B4", "B3", "A3"] and peaks.series[1].y == pytest.approx([75.0, 80.0, 50.0, 40.0])
 
 
 def record(name: str, **others) -> dict:
@@ -176,8 +178,13 @@ def test_records_are_complete_for_what_has_run(tmp_path):
 
 def test_maps_show_what_the_joints_have():
     joints = [record(name, x=x, y=y, tilted=1e-3) for name, x, y in zip(NAMES, X, Y, strict=True)]
-    drawing = array_map(joints)
-    assert "tilt of the package" in drawing and "contact angle" not in drawing
+    joints[1]["verdict"] = "open"
+    standoff, _, tilt = array_maps(joints)
+    assert (standoff.label, tilt.label, tilt.size) == ("standoff [µm]", "tilt of the package's pad [mrad]", (2.0, 2.0))
+    assert [(cell["x"], cell["y"], cell["ok"]) for cell in tilt.cells] == [
+        (0.5, 0.5, True), (1.5, 0.5, False), (0.5, 1.5, True), (1.5, 1.5, True),
+    ]  # fmt: skip
+    assert tilt.cells[0]["full"] == "1 mrad" and tilt.cells[0]["text"] == "1.00"
 
 
 def test_small_kinematics_are_told_where_they_matter():

@@ -1,0 +1,1 @@
+"""The command ``compare``: runs side by side, what differs in their parameters and in their answers."""

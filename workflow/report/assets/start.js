@@ -1,0 +1,35 @@
+"use strict";
+// Draw everything, what comes first on the page first; then joints that are picked in a table are shown in 3D.
+
+async function start() {
+  for (const place of document.querySelectorAll("[data-figure], [data-scene]")) {
+    await (place.dataset.figure === undefined ? drawScene(place) : drawFigure(place));
+  }
+  document.querySelectorAll("tr[data-joint]").forEach((row) => {
+    row.tabIndex = 0;
+    row.addEventListener("click", () => pickJoint(row));
+    row.addEventListener("keydown", (event) => event.key === "Enter" && pickJoint(row));
+  });
+  document.documentElement.dataset.ready = "yes";
+}
+
+async function drawScene(place) {
+  if (!document.createElement("canvas").getContext("webgl2")) {
+    place.append(element("p", { className: "note" }, "This browser has no WebGL: the 3D view cannot be shown."));
+    return;
+  }
+  place.viewer = await new Viewer(place, page.scenes[Number(place.dataset.scene)]).build();
+}
+
+function pickJoint(row) {
+  const place = document.querySelector("#view-3d .scene");
+  if (!place || !place.viewer) return;
+  const again = row.classList.contains("picked");
+  document.querySelectorAll("tr.picked").forEach((one) => one.classList.remove("picked"));
+  if (place.viewer.showPart(again ? "" : row.dataset.joint) && !again) {
+    row.classList.add("picked");
+    place.scrollIntoView({ block: "center", behavior: "smooth" });
+  }
+}
+
+start();

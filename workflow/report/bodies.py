@@ -1,0 +1,70 @@
+"""Surfaces of the cells of a run, with their fields, as groups of a scene."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.arrays import Floats
+from reflowshock.workflow.report.field_series import FieldSeries
+from reflowshock.workflow.report.scene import Group, boundary
+
+SHARE = 0.12  # of a body's size, that its displacement is drawn as
+COLOURS = {
+    "solder": "#98a2af", "copper": "#b5622d", "board": "#62a876", "substrate": "#c2971c", "die": "#56626e",
+    "other packages": "#7a5ea8",
+}  # fmt: skip
+LAYER_COLOURS = ("#62a876", "#c2971c", "#56626e", "#b5622d", "#98a2af", "#7a5ea8")
+
+
+def body_group(
+    name: str, series: FieldSeries, chosen: NDArray[np.bool_], values: Mapping[str, Floats], **style: Any
+) -> Group:
+    """Return the surface of some cells of a run.
+
+    Args:
+        name: of the group.
+        series: cells, displacements and parts (``fields["part"]``) of the run.
+        chosen: ``(c,)`` which cells.
+        values: name of a field -> ``(k, c)``; at a vertex the mean over the body's faces there.
+        style: further attributes of the group.
+    """
+    faces, cell = boundary(series.cells[chosen])
+    part = series.fields["part"][0][chosen].astype(np.int64)[cell]
+    span = len(series.points)
+    keys, place = np.unique(part[:, None] * span + faces, return_inverse=True)
+    place = place.reshape(faces.shape)
+    nodes = keys % span
+    return Group(
+        name,
+        series.points[nodes],
+        place,
+        keys // span,
+        displacement=series.displacement[:, nodes],
+        values={key: _at_vertices(of_cells[:, chosen][:, cell], place, len(keys)) for key, of_cells in values.items()},
+        **({"colour": COLOURS.get(name, LAYER_COLOURS[0])} | style),
+    )
+
+
+def _at_vertices(values: Floats, faces: NDArray[np.int64], count: int) -> Floats:
+    """Return the mean ``(k, count)`` of values ``(k, f)`` on faces ``(f, m)`` at each of their vertices."""
+    weight = np.bincount(faces.ravel(), minlength=count)
+    repeated = (np.repeat(row, faces.shape[1]) for row in values)
+    return np.array([np.bincount(faces.ravel(), one, count) for one in repeated]) / weight
+
+
+def exaggeration(length: float, deflection: float) -> float:
+    """Return how many times as large a deflection is drawn; once where a body is still at rest."""
+    return max(round_down(SHARE * length / deflection), 1.0) if deflection > 0.0 else 1.0
+
+
+def round_down(factor: float) -> float:
+    """Round down to 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor))
+
+
+def milliseconds(times: Floats) -> list[str]:
+    """Return times [s] as labels of frames."""
+    return [f"{1e3 * time:.4g} ms" for time in times]
