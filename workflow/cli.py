@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +14,7 @@ import typer
 from reflowshock.workflow import __version__
 from reflowshock.workflow.compare.command import compare
 from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
+from reflowshock.workflow.new_case import import_board, init, new
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores, prepare
@@ -27,7 +29,7 @@ app = typer.Typer(
     help="Solder reflow with particles and two-scale explicit drop shock, from a case file to a report.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 app.command()(compare)
@@ -80,46 +82,9 @@ def interruptible(what: str) -> Iterator[None]:
         raise typer.Exit(1) from error
 
 
-@app.command()
-def new(
-    name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
-    template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
-) -> None:
-    """Write a complete, commented case file."""
-    from reflowshock.workflow.pipeline.template import write_new_case
-
-    path = write_new_case(name, template)
-    console.print(f"wrote {path}; next: reflowshock plan {path}")
-
-
-@app.command("import")
-def import_board(
-    board: Annotated[
-        Path, typer.Argument(metavar="BOARD", help="KiCad (.kicad_pcb), IPC-2581 (.xml), CSV, or a folder of Gerber X2")
-    ],
-    component: Annotated[
-        str | None, typer.Option(metavar="U8", help="component whose joints are computed; without: show what is there")
-    ] = None,
-    name: Annotated[str | None, typer.Option(help="name of the case [default: board and component]")] = None,
-    thickness: Annotated[
-        str | None, typer.Option(help='of the board, where the file does not say it: "1.6 mm"')
-    ] = None,
-    ball: Annotated[str | None, typer.Option(help="diameter of a solder ball [default: 0.6 of the pitch]")] = None,
-    holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes [default: 2 mm]")] = None,
-) -> None:
-    """Write a case file for a component of a board from ECAD."""
-    from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case
-    from reflowshock.workflow.ecad.layout import EcadError
-
-    try:
-        if component is None:
-            show_layout(read_layout(board), console)
-            return
-        path = write_case(board, component, name, {"--thickness": thickness, "--ball": ball, "--holes": holes})
-    except EcadError as error:
-        print_error(str(error))
-        raise typer.Exit(2) from error
-    console.print(f"wrote {path}; put in what is ASSUMED, then: reflowshock plan {path}")
+app.command()(new)
+app.command()(init)
+app.command("import")(import_board)
 
 
 @app.command()
@@ -154,12 +119,13 @@ def run(
     fail_on_verdict: Annotated[
         bool, typer.Option("--fail-on-verdict", help="exit code 3 where the verdict on the design is FAIL")
     ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would run and its cost, as plan")] = False,
 ) -> None:
     """Run all stages that are missing, stale or damaged; ends with the verdict on the design."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.package.verdict import FAIL
     from reflowshock.workflow.pipeline.gate import ask_if_long
-    from reflowshock.workflow.plan import predicted_seconds
+    from reflowshock.workflow.plan import predicted_seconds, show_plan
     from reflowshock.workflow.run import WHAT, run_case
 
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
@@ -169,6 +135,9 @@ def run(
     if fail_on_verdict and until != point.case.pipeline.names[-1]:
         raise typer.BadParameter("needs the report, which has the verdict", param_hint="--fail-on-verdict")
     check_folder(store.folder, WHAT, point.case.case.name, force)
+    if dry_run:
+        show_plan(store, point, console)
+        return
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, [point.case]), one_run=True)
     if executor == ExecutorName.LOCAL:
         seconds = predicted_seconds(store, point, until)
@@ -208,15 +177,31 @@ def accuracy(
 
 
 @app.command()
-def status(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+def status(
+    case: CasePath,
+    settings: Settings = None,
+    out: Out = None,
+    follow: Annotated[
+        bool, typer.Option("--follow", "-f", help="watch a run that another terminal has started, until it ends")
+    ] = False,
+) -> None:
     """Show the state of a run folder: stages done, stale, damaged or missing, with times and key results."""
-    from reflowshock.workflow.status import show_status
+    from reflowshock.workflow.status import follow_run, show_status
 
-    show_status(*_load(case, settings, out, True, True), console)
+    store, point = _load(case, settings, out, True, True)
+    if follow:
+        with interruptible("the run goes on"):
+            follow_run(store, point, console)
+    show_status(store, point, console)
 
 
 @app.command()
-def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
+def report(
+    case: CasePath,
+    settings: Settings = None,
+    out: Out = None,
+    show: Annotated[bool, typer.Option("--open", help="open it in the browser")] = False,
+) -> None:
     """Write the report again from the existing products."""
     from reflowshock.workflow.pipeline.report import write_report
     from reflowshock.workflow.run import report_again
@@ -229,6 +214,9 @@ def report(case: CasePath, settings: Settings = None, out: Out = None) -> None:
     if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
     console.print(f"report: {store.folder / 'report.html'}")
+    if show and not webbrowser.open((store.folder / "report.html").resolve().as_uri()):
+        print_error("no browser can be opened here")
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -352,9 +340,11 @@ def stage(
     """Make one product in the store in the working directory (called by Snakemake)."""
     from reflowshock.workflow.case.run import Run
     from reflowshock.workflow.pipeline.stage_runner import execute
+    from reflowshock.workflow.process.progress_file import tell_in
     from reflowshock.workflow.stages import stage_function
 
     product, folder = Path("products", f"{name}-{key}"), Path("work", f"{name}-{key}")
+    tell_in(folder)
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
     if not execute(name, stage_function(run.case, name), run, product):
         raise typer.Exit(1)

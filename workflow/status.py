@@ -1,15 +1,22 @@
 """What a run folder holds, stage by stage."""
 
+import time
+
 from rich.console import Console
+from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from reflowshock.units import from_si
+from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.process.progress_file import read_progress
 from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.store.folders import is_busy
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine
 from reflowshock.workflow.store.store import Store
 
+LOOK = 0.5  # s between two looks at a run
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
 FIGURES = {
     "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
@@ -32,6 +39,32 @@ FIGURES = {
     ),
     "report": (),
 }  # fmt: skip
+
+
+def follow_run(store: Store, point: Point, console: Console) -> None:
+    """Show what a run does, stage by stage with the time left, until no process works in its folder any more."""
+    if not is_busy(store.folder):
+        console.print(f"no run is at work in {store.folder}")
+        return
+    told = ""
+    with Live(console=console, transient=True, auto_refresh=False) as live:
+        while is_busy(store.folder):
+            lines = [line for stage in point.digests if (line := _progress(store, point, stage))]
+            live.update(Text("\n".join(lines) or "waiting for the next stage …"), refresh=True)
+            begun = ", ".join(line.partition(":")[0] for line in lines)
+            if not console.is_terminal and begun and begun != told:
+                told = begun
+                console.print("\n".join(lines))
+            time.sleep(LOOK)
+
+
+def _progress(store: Store, point: Point, stage: str) -> str:
+    """Say how far a stage is; nothing where it is not at work."""
+    found = read_progress(store.work_folder(point, stage))
+    if found is None:
+        return ""
+    left = f", about {duration(found.left)} left" if found.left is not None else ""
+    return f"{stage}: {found.what}, {100.0 * found.share:.0f} %{left}"
 
 
 def show_status(store: Store, point: Point, console: Console) -> None:

@@ -20,6 +20,7 @@ REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those 
 TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
 ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
 FINE = (1, 3)  # most stressed joints that are fine
+FEW = 8  # joints, below which all of them are fine while meshes are varied
 SAME_MESH = "all x 1"  # the mesh of the case
 GRAIN = 0.05  # of sizes that are chosen between the measured ones
 SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # of particles, over that of the case
@@ -58,10 +59,11 @@ def _dropped(case: BoardDropCase) -> ConvergenceStudy:
     """Meshes; then what other couplings on the case's mesh lose.
 
     Where all is linear, meshes are varied by one model in implicit steps. One that yields or turns takes small explicit
-    steps everywhere: there two models vary them, the critical joint alone fine.
+    steps everywhere: there two models vary them. All joints are fine as long as they are few. Coarse ones are tied to
+    boxes, and the softer the finer these are: with one fine joint among them, no figure converges with the mesh.
     """
     linear = _is_linear(case)
-    whole = _one_model(case) if linear else _fine(1)
+    whole = _one_model(case) if linear else _mostly_fine(case)
     parts = [
         _board(case, whole).apart(FINEST),
         _joints(case, whole).apart(FINEST),
@@ -142,6 +144,12 @@ def _fine(count: int) -> Settings:
     """Two models, as many joints fine as are given, the most stressed ones."""
     key = "shock.coupling"
     return TWO_SCALE | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
+
+
+def _mostly_fine(case: BoardDropCase) -> Settings:
+    """Two models, all joints fine where they are few, else as many as the study tries."""
+    few = len(pad_table(case.package, case.board, case.warpage)) <= FEW
+    return TWO_SCALE | {"shock.coupling.fine_joints": "all"} if few else _fine(max(FINE))
 
 
 def _board(case: BoardDropCase, whole: Settings) -> Parameter:
@@ -232,7 +240,7 @@ def _couplings(case: BoardDropCase, whole: Settings) -> Iterator[StudyRun]:
     for name, settings in (_two_models(case) | _explicit(case)).items():
         if settings == whole:
             continue
-        if settings != _fine(1):  # which is on the way of all meshes
+        if settings != _fine(1) or not _is_linear(case):  # else it is on the way of all meshes
             yield StudyRun(name, "coupling", settings)
         yield StudyRun(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
 

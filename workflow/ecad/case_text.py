@@ -31,6 +31,8 @@ class Wanted:
         thickness: of the board [m], where the file does not say it.
         ball: diameter of a solder ball before reflow [m]; none for what is usual at the pitch.
         least_hole: smallest diameter [m] of holes that are taken for mounting holes.
+        condition: service condition of JESD22-B110B; none for what is usual.
+        title: of the case; none for that of the file.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Wanted:
     thickness: float | None = None
     ball: float | None = None
     least_hole: float = LEAST_HOLE
+    condition: str | None = None
+    title: str | None = None
 
 
 def case_text(layout: Layout, wanted: Wanted) -> str:
@@ -64,10 +68,18 @@ def case_text(layout: Layout, wanted: Wanted) -> str:
         table["symmetry"] = "quarter"
     ball = wanted.ball or BALL * array.pitch
     return _template().render(
-        name=wanted.name, file=layout.path.name, component=wanted.component, below=component.side == "bottom",
-        array=array, package=package, board=table, masses=masses, notes=[*layout.notes, *notes, *left_out],
-        ball=ball, volume=from_si(math.pi / 6.0 * ball**3, "mm^3", 5),
-    )  # fmt: skip
+        wanted=wanted,
+        file=layout.path.name,
+        below=component.side == "bottom",
+        array=array,
+        package=package,
+        board=table,
+        has_body=component.body is not None,
+        masses=masses,
+        notes=[*layout.notes, *notes, *left_out],
+        ball=ball,
+        volume=from_si(math.pi / 6.0 * ball**3, "mm^3", 5),
+    )
 
 
 def _template() -> Template:

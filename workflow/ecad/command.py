@@ -1,4 +1,4 @@
-"""The command ``import``: what is on a board, and a case for one of its components."""
+"""The commands ``import`` and ``init``: what is on a board, a case for one of its components, or from five answers."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +17,11 @@ from reflowshock.workflow.ecad.gerber import read_gerber
 from reflowshock.workflow.ecad.ipc2581 import read_ipc2581
 from reflowshock.workflow.ecad.kicad import read_kicad
 from reflowshock.workflow.ecad.layout import Component, EcadError, Layout, in_mm
+from reflowshock.workflow.ecad.questions import QUESTIONS, AnswerError, case_of
 from reflowshock.workflow.ecad.table import read_table
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.template import write_schema
+from reflowshock.workflow.process.terminal import print_error
 
 READERS: dict[str, Callable[[Path], Layout]] = {
     ".kicad_pcb": read_kicad, ".xml": read_ipc2581, ".cvg": read_ipc2581, ".csv": read_table,
@@ -92,17 +95,45 @@ def write_case(path: Path, component: str, name: str | None, lengths: dict[str, 
     found = {option: _length(option, text) for option, text in lengths.items() if text is not None}
     least_hole = found.get("--holes", LEAST_HOLE)
     wanted = Wanted(name, component, found.get("--thickness"), found.get("--ball"), least_hole)
-    text = case_text(layout, wanted)
+    return _written(name, case_text(layout, wanted), "import")
+
+
+def _written(name: str, text: str, command: str) -> Path:
+    """Write a case file that is not there yet, and read it again."""
     case = Path(f"{name}.toml")
     try:
         with case.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise CaseError(
-            "import", [Problem("--name", "there is such a case file already", name, "another name")]
-        ) from None
+        raise CaseError(command, [Problem("name", "there is such a case file already", name, "another name")]) from None
+    write_schema(case.parent)
     read_case(case)
     return case
+
+
+def ask_for_case(given: dict[str, str | None], ask: Callable[[str, str], str]) -> Path:
+    """Ask for what a case needs, and write it into the current folder.
+
+    Args:
+        given: answers to ``QUESTIONS`` that a user gave as options, by key.
+        ask: asks a question, with the usual answer; it is asked again while the answer is not understood.
+
+    Raises:
+        CaseError: a given answer cannot be, or the file exists.
+        EcadError: the board has no room for package and screws.
+    """
+    answers: dict[str, object] = {}
+    for question in QUESTIONS:
+        text = given.get(question.key)
+        while question.key not in answers:
+            answer = text if text is not None else ask(question.words, question.usual)
+            try:
+                answers[question.key] = question.read(answer)
+            except AnswerError as error:
+                if text is not None:
+                    raise CaseError("init", [Problem(f"--{question.key}", str(error), text, question.usual)]) from error
+                print_error(f"{answer!r}: {error}")
+    return _written(str(answers["name"]), case_of(answers), "init")
 
 
 def _length(option: str, text: str) -> float:

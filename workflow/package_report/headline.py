@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
 
@@ -24,6 +25,16 @@ NOTE = (
     " three meshes, 3 times that from the finest mesh where they show no order. Error of two scales: difference from"
     " one model on the same mesh."
 )
+
+
+def later_swings(shock: Shock, end: float) -> str:
+    """Say that swings after the end of a run [s] may bring more, where it ended by itself and nothing damps it."""
+    if shock.duration != "auto" or any(shock.damping.coefficients):
+        return ""
+    return (
+        f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. Nothing damps the board: later"
+        " swings may bring more (shock.damping damps it, shock.duration follows it further)."
+    )
 
 
 def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mapping, results: Mapping[str, Any]) -> dict:

@@ -11,7 +11,7 @@ from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.package.verdict import failing, limits_table
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.board import add_board
-from reflowshock.workflow.package_report.headline import headline
+from reflowshock.workflow.package_report.headline import headline, later_swings
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
@@ -37,6 +37,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     critical = metrics["critical_joint"]["value"]
     context["headline"] = tables.headline(metrics) + context["headline"]
     context["figures"] = headline(metrics, context["discretisation"], summary, results)
+    context["figures"]["note"] += later_swings(case.shock, float(histories[main]["time"][-1]))
     context |= {"verdict": summary["verdict"], "answer": summary["answer"]}
     context["failing"] = failing(summary["verdict"])
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)

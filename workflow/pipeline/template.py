@@ -1,5 +1,6 @@
 """Writing a case file: every parameter, its value, its default and its range."""
 
+import json
 import textwrap
 from pathlib import Path
 
@@ -24,9 +25,11 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.scales import scales_text, take_scales
 from reflowshock.workflow.case.toml_file import read_toml
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.pipeline.schema import case_schema
 
 COMMENT_COLUMN = 44
 HEADER = """\
+#:schema reflowshock.schema.json
 # Case "{name}", from the template "{template}".
 # Every parameter is here. A quantity is a string with a unit, any unit of its dimension ("0.48 mm", "480 um").
 # Tables named "numerics" say how something is computed, all others what. Lines that repeat a default can be removed.
@@ -64,7 +67,13 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
     scales = scales_text(take_scales(read_toml(known[template]), []))
     path.write_text("\n".join([case_text(case, template), *scales]), encoding="utf-8")
+    write_schema(folder)
     return path
+
+
+def write_schema(folder: Path) -> None:
+    """Write the JSON schema that new case files name in their first line, by which editors help, beside them."""
+    (folder / "reflowshock.schema.json").write_text(json.dumps(case_schema(), indent=2), encoding="utf-8")
 
 
 def case_text(case: Case, template: str) -> str:

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Span, Text
 
 from reflowshock.workflow.case.text import against_limit
+from reflowshock.workflow.process.progress_file import teller
 
 REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
 
@@ -137,7 +138,7 @@ class ProgressBar(Protocol):
 def progress_bar(description: str) -> Iterator[ProgressBar]:
     """Show a bar with share, time spent and time left while something runs; it vanishes in the end.
 
-    Where there is no terminal, only the description is printed.
+    Where there is no terminal, only the description is printed. A second terminal sees it by ``status --follow``.
 
     Yields:
         What is called with the progress.
@@ -152,9 +153,15 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
     moving = console.is_terminal and not console.is_dumb_terminal
     if not moving:
         console.print(f"       {description} …", soft_wrap=True)
+    tell = teller(description)
     with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
         task = bar.add_task(visible(description), total=1.0)
-        yield lambda share, text="": bar.update(task, completed=share, description=visible(text or description))
+
+        def show(share: float, text: str = "") -> None:
+            bar.update(task, completed=share, description=visible(text or description))
+            tell(share, text)
+
+        yield show
 
 
 def new_table(title: str, *columns: str) -> Table:

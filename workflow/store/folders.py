@@ -110,6 +110,21 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
         os.close(descriptor)
 
 
+def is_busy(folder: Path) -> bool:
+    """Whether a process works in a folder."""
+    try:
+        descriptor = os.open(folder / LOCK, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
 def remove_own(folder: Path) -> list[str]:
     """Remove a folder's store, logs, mark and lock; and the folder, if nothing else is in it and nobody works in it.
 

@@ -145,11 +145,20 @@ def test_meshes_of_what_yields_are_varied_by_two_models():
     """One model takes small steps everywhere; it is a choice, to the end of the shock also where it is cut short."""
     study = package_study(case_of("jedec_bga", "scale=quick"))
     runs = {run.name: run for run in study.runs}
-    assert all(run.settings["shock.coupling.critical_joints"] == "1" for run in study.parameters[0].runs)
-    assert "1 fine" not in runs
+    assert all(run.settings["shock.coupling.fine_joints"] == "all" for run in study.parameters[0].runs)
+    assert {"1 fine", "3 fine", "1 fine: alone", "3 fine: alone"} <= runs.keys()
+    assert "all fine" not in runs
     assert runs["one model: alone"].against == SAME_MESH
     assert runs["one model"].settings["shock.numerics.dns_duration"] == "0.4 ms"
     assert all(run.settings["shock.numerics.modes"] == '["two_scale"]' for run in study.parameters[0].runs)
+
+
+def test_meshes_of_many_joints_that_yield_are_varied_with_some_of_them_fine():
+    study = package_study(case_of("jedec_bga"))
+    runs = {run.name: run for run in study.runs}
+    assert all(run.settings["shock.coupling.critical_joints"] == "3" for run in study.parameters[0].runs)
+    assert "3 fine" not in runs
+    assert {"1 fine", "all fine"} <= runs.keys()
 
 
 def test_a_package_is_judged_by_its_critical_joint(package, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.ecad.array import array_of, seen_from
 from reflowshock.workflow.ecad.case_text import standoff
-from reflowshock.workflow.ecad.command import read_layout, write_case
+from reflowshock.workflow.ecad.command import ask_for_case, read_layout, write_case
 from reflowshock.workflow.ecad.layout import Component, EcadError, EcadPad, Layout, round_diameter
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support import ecad_files
@@ -258,3 +258,66 @@ def test_sizes_of_shapes_are_those_of_circles_of_the_same_area():
     assert round_diameter("circle", 2.0, 2.0) == 2.0
     assert round_diameter("oval", 2.0, 2.0) == pytest.approx(2.0)
     assert round_diameter("rect", math.pi, 1.0) == pytest.approx(2.0)
+
+
+@pytest.fixture
+def asked():
+    """Answer questions in their order, and keep what was asked."""
+
+    class Asked(list):
+        def __init__(self, *answers):
+            super().__init__()
+            self.answers = list(answers)
+
+        def __call__(self, words, usual):
+            self.append(words)
+            return self.answers.pop(0) if self.answers else usual
+
+    return Asked
+
+
+def test_five_questions_make_a_case(in_tmp, asked):
+    questions = asked("mine", "6 x 6 at 0.8 mm", "0.45 mm", "60 x 50 x 1 mm", "B")
+    case = read_case(ask_for_case({}, questions))
+    assert len(questions) == 5
+    assert (case.package.rows, case.package.columns, case.package.pitch) == (6, 6, pytest.approx(8e-4))
+    assert case.solder.volume == pytest.approx(math.pi / 6 * 0.45e-3**3, rel=1e-4)
+    assert (case.board.length, case.board.width, case.board.thickness) == pytest.approx((0.06, 0.05, 1e-3))
+    assert (case.board.symmetry, case.shock.service_condition) == ("quarter", "B")
+    assert (in_tmp / "reflowshock.schema.json").exists()
+
+
+def test_usual_answers_are_the_board_of_jedec(in_tmp, asked):
+    case = read_case(ask_for_case({}, asked()))
+    assert sorted(case.board.hole_places)[-1] == pytest.approx((52.5e-3, 35.5e-3))
+
+
+def test_an_odd_array_has_a_whole_board(in_tmp, asked):
+    assert read_case(ask_for_case({"array": "5 x 7 at 0.65 mm"}, asked())).board.symmetry == "full"
+
+
+def test_a_question_is_asked_again_until_its_answer_is_understood(in_tmp, asked, capsys):
+    questions = asked(
+        "mine", "6 by 6", "1 x 6 at 1 mm", "6 x 6 at 1 m", "6 x 6 at 0.5 mm", "big", "usual", "3 mm", "60x50x1mm"
+    )
+    case = read_case(ask_for_case({}, questions))
+    assert case.package.pitch == pytest.approx(5e-4)
+    told = capsys.readouterr().err
+    for words in ("is not understood", "allowed: 2 x 2 to 100 x 100", "out of range"):
+        assert words in told
+
+
+@pytest.mark.parametrize(
+    "key, answer, words",
+    [
+        ("name", "a/b", "not a valid name"),
+        ("array", "6 x 6", "rows x columns at pitch"),
+        ("ball", "9 mm", "allowed: 0.02 mm to 3 mm"),
+        ("board", "9 m x 1 m x 1 mm", "out of range"),
+        ("drop", "Z", "allowed: A, B, C"),
+    ],
+)
+def test_a_given_answer_that_cannot_be_is_refused(key, answer, words, in_tmp, asked):
+    with pytest.raises(CaseError, match=words):
+        ask_for_case({key: answer}, asked())
+    assert not list(in_tmp.iterdir())

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from reflowshock.fem.problem.shock import Shock
 from reflowshock.workflow.convergence.errors import Error, errors_of
 from reflowshock.workflow.convergence.known import COARSEST, STALE, discretisation, own_accuracy
 from reflowshock.workflow.convergence.measured import Accuracy, Host, Measurement, StageCost, write_accuracy
 from reflowshock.workflow.convergence.page import section_for
 from reflowshock.workflow.convergence.series import Quantity, StudyRun
-from reflowshock.workflow.package_report.headline import headline
+from reflowshock.workflow.package_report.headline import headline, later_swings
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
 from reflowshock.workflow.store.keys import product_keys
@@ -98,6 +99,13 @@ def test_the_error_of_two_scales_is_the_difference_from_one_model():
     assert scheme_error("peel_stress", both | {"dns": result(50)}) == "not known: the DNS ends at 0.5 ms"
     assert scheme_error("peel_stress", {"two_scale": result()}).startswith("not known: no DNS")
     assert scheme_error("peel_stress", {"dns": result()}) == "none: one model"
+
+
+def test_an_undamped_run_that_ends_by_itself_says_that_more_may_come():
+    shock = Shock(duration="auto", service_condition="B")
+    assert "ends at 2.05 ms" in later_swings(shock, 2.05e-3)
+    assert not later_swings(shock.model_copy(update={"duration": 1e-3}), 1e-3)
+    assert not later_swings(Shock(duration="auto", damping={"mass_ratio": 0.02, "frequency": 300.0}), 2e-3)
 
 
 def test_what_is_left_out_stands_with_its_influence_the_largest_first():

@@ -1,0 +1,74 @@
+"""The commands that write a case file: from a template, from five answers, from a board of ECAD."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reflowshock.workflow.process.terminal import console, print_error
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
+    template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
+) -> None:
+    """Write a complete, commented case file."""
+    from reflowshock.workflow.pipeline.template import write_new_case
+
+    path = write_new_case(name, template)
+    console.print(f"wrote {path}; next: reflowshock plan {path}")
+
+
+def init(
+    name: Annotated[str | None, typer.Option(help="name of the case")] = None,
+    array: Annotated[str | None, typer.Option(help='rows x columns at pitch, e.g. "6 x 6 at 0.8 mm"')] = None,
+    ball: Annotated[str | None, typer.Option(help='diameter of a solder ball, e.g. "0.48 mm", or usual')] = None,
+    board: Annotated[str | None, typer.Option(help='length x width x thickness, e.g. "132 x 77 x 1 mm"')] = None,
+    drop: Annotated[str | None, typer.Option(help="service condition of JESD22-B110B, A to H")] = None,
+) -> None:
+    """Ask five questions about a package on a board, and write a case that runs."""
+    from reflowshock.workflow.ecad.command import ask_for_case
+
+    given = {"name": name, "array": array, "ball": ball, "board": board, "drop": drop}
+    with _in_words():
+        path = ask_for_case(given, lambda words, usual: typer.prompt(words, default=usual))
+    console.print(f"wrote {path}; next: reflowshock run {path}")
+
+
+def import_board(
+    board: Annotated[
+        Path, typer.Argument(metavar="BOARD", help="KiCad (.kicad_pcb), IPC-2581 (.xml), CSV, or a folder of Gerber X2")
+    ],
+    component: Annotated[
+        str | None, typer.Option(metavar="U8", help="component whose joints are computed; without: show what is there")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="name of the case [default: board and component]")] = None,
+    thickness: Annotated[
+        str | None, typer.Option(help='of the board, where the file does not say it: "1.6 mm"')
+    ] = None,
+    ball: Annotated[str | None, typer.Option(help="diameter of a solder ball [default: 0.6 of the pitch]")] = None,
+    holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes [default: 2 mm]")] = None,
+) -> None:
+    """Write a case file for a component of a board from ECAD."""
+    from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case
+
+    with _in_words():
+        if component is None:
+            show_layout(read_layout(board), console)
+            return
+        path = write_case(board, component, name, {"--thickness": thickness, "--ball": ball, "--holes": holes})
+    console.print(f"wrote {path}; put in what is ASSUMED, then: reflowshock plan {path}")
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """End with exit code 2 where a board is not what it should be."""
+    from reflowshock.workflow.ecad.layout import EcadError
+
+    try:
+        yield
+    except EcadError as error:
+        print_error(str(error))
+        raise typer.Exit(2) from error
