@@ -62,8 +62,8 @@ class FieldSeries:
             displacement[step] = np.concatenate([one[DISPLACEMENT].reshape(-1, 3) for one in found])[first]
             for name, values in fields.items():
                 if all(name in one for one in found):
-                    kept = [one[name][piece.is_own] for one, piece in zip(found, pieces, strict=True)]
-                    values.append(np.concatenate(kept))
+                    cells = [one[name][piece.is_own] for one, piece in zip(found, pieces, strict=True)]
+                    values.append(np.concatenate(cells))
         whole = {name: np.array(values) for name, values in fields.items() if len(values) == len(times)}
         return cls(points[first], place.ravel()[np.concatenate(own)], times, displacement, whole)
 
