@@ -16,13 +16,13 @@ from reflowshock.problem import as_toml
 from reflowshock.workflow import plan
 from reflowshock.workflow.case.case import Case as ResolvedCase
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.kinds import kind_of, stage_seconds
+from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.plan import PlannedStage
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.folders import read_mark
 from reflowshock.workflow.store.point import Point
-from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
 
 if TYPE_CHECKING:
@@ -48,15 +48,6 @@ class Metric(NamedTuple):
 
     value: float | str
     unit: str
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedStage:
-    """What a run would do with a stage: whether it runs, why, and its predicted wall time [s] where that is known."""
-
-    runs: bool
-    why: str
-    seconds: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +110,11 @@ class Case:
     def plan(self, out: str | Path | None = None) -> Plan:
         """Predict what a run in a folder would do and cost; nothing is run, nothing is written."""
         store, point = self._store(out), Point({}, self.resolved)
-        verdicts, seconds = examine(store, point), stage_seconds(self.resolved)
-        stages = {
-            name: PlannedStage(verdict.stale, plan.reason(verdict, self.resolved), seconds.get(name))
-            for name, verdict in verdicts.items()
-        }
         text = StringIO()
         plan.show_plan(store, point, Console(file=text, width=WIDTH))
-        return Plan(stages, kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue())
+        return Plan(
+            plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue()
+        )
 
     def run(
         self, out: str | Path | None = None, *, until: str = "report", cores: int | None = None, force: bool = False

@@ -94,13 +94,19 @@ def plan(
     out: Out = None,
     oversubscribe: Oversubscribe = False,
     force: Force = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print stages, effects and predicted times for a script")
+    ] = False,
 ) -> None:
     """Show what a run would do and what it would cost; nothing is run."""
-    from reflowshock.workflow.plan import show_plan
+    from reflowshock.workflow.plan import plan_record, show_plan
     from reflowshock.workflow.run import WHAT
 
     store, point = _load(case, settings, out, oversubscribe, force)
     check_folder(store.folder, WHAT, point.case.case.name, force)
+    if as_json:
+        print(json.dumps(plan_record(store, point), indent=2))
+        return
     show_plan(store, point, console)
 
 

@@ -1,6 +1,8 @@
 """What a run would do, and what it would cost. Nothing is run, nothing is written."""
 
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -18,6 +20,36 @@ from reflowshock.workflow.store.state import StageState, examine, why_stale
 from reflowshock.workflow.store.store import Store
 
 LONGEST_LIST = 4
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStage:
+    """What a run would do with a stage: whether it runs, why, and its predicted wall time [s] where that is known."""
+
+    runs: bool
+    why: str
+    seconds: float | None
+
+
+def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
+    """Return what a run would do with each stage, in order."""
+    seconds = stage_seconds(point.case)
+    return {
+        name: PlannedStage(state.stale, reason(state, point.case), seconds.get(name))
+        for name, state in examine(store, point).items()
+    }
+
+
+def plan_record(store: Store, point: Point) -> dict[str, Any]:
+    """Return a plan for scripts: stages, effects as in ``summary.json``, and the wall time [s] of what would run."""
+    stages = planned_stages(store, point)
+    return {
+        "case": point.case.case.name,
+        "folder": str(store.folder),
+        "stages": {name: asdict(stage) for name, stage in stages.items()},
+        "effects": dict(kind_of(point.case).forecast(point.case).effects),
+        "seconds": sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
+    }
 
 
 def show_plan(store: Store, point: Point, console: Console) -> None:

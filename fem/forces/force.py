@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class ForceTerm(Protocol):
-    """A part of the internal force."""
+    """A part of the internal force; one that has ``arrays`` can be part of ``kernels.levels.take_steps``."""
 
     @property
     def history(self) -> dict[str, NDArray]:

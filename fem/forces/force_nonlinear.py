@@ -23,6 +23,7 @@ from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.nonlinear_blocks import (
     Lanes,
+    alike,
     arrange,
     gradient_blocks,
     hexahedron_blocks,
@@ -56,6 +57,7 @@ class NonlinearElements:
         elements: The elements.
         numbers: ``(ne,)`` their numbers among all elements of the rank.
         path: Kinematics and step.
+        elasticity: ``(nm, 6, 6)`` [Pa] of the materials of blocks: equal ones of ``elements`` are one.
         lanes: Their order.
         blocks: What the kernel works on.
         kernel: Subtracts the force at a displacement; returns ``FINE`` or the block with an inverted element.
@@ -65,6 +67,7 @@ class NonlinearElements:
     elements: Elements
     numbers: NDArray[np.int64]
     path: Path
+    elasticity: NDArray[np.float64]
     lanes: Lanes
     blocks: AnyBlocks
     kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
@@ -83,20 +86,21 @@ class NonlinearElements:
             path: Kinematics and step.
         """
         elements = everything.subset(chosen)
-        lanes, finite = arrange(elements), path.finite
+        same, laws = alike(elements, plastic)
+        lanes, finite = arrange(same, same.material), path.finite
         blocks: AnyBlocks
         kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
         if elements.kind.name == HEXAHEDRON.name:
-            blocks = hexahedron_blocks(elements, lanes, plastic, finite)
+            blocks = hexahedron_blocks(same, lanes, laws, finite)
             kernel = partial(add_hexahedron_force, blocks, path)
         elif elements.kind.hourglass:
-            blocks = one_point_blocks(elements, lanes, plastic, finite)
+            blocks = one_point_blocks(same, lanes, laws, finite)
             kernel = partial(add_one_point_force, blocks, path)
         else:
-            blocks = gradient_blocks(elements, lanes, plastic, finite)
+            blocks = gradient_blocks(same, lanes, laws, finite)
             kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
         history = {name: getattr(blocks, kept) for name, kept in HISTORY.items() if hasattr(blocks, kept)}
-        return cls(elements, chosen, path, lanes, blocks, kernel, history)
+        return cls(elements, chosen, path, same.elasticity, lanes, blocks, kernel, history)
 
     @property
     def finite(self) -> bool:
@@ -122,7 +126,7 @@ class NonlinearElements:
         """Return the energies at the latest ``add``."""
         blocks, valid = self.blocks, self.lanes.valid
         return Energy(
-            strain=float(elastic_energy(blocks, self.elements.elasticity)[valid].sum()),
+            strain=float(elastic_energy(blocks, self.elasticity)[valid].sum()),
             plastic=float(blocks.plastic_work[valid].sum()),
             hourglass=float(self.history["hourglass"][valid].sum()) if "hourglass" in self.history else 0.0,
         )

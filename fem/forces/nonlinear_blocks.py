@@ -33,7 +33,7 @@ class Lanes:
     """The order of elements in blocks.
 
     Attributes:
-        element: ``(nb, 16)`` element of each lane; lanes past the last one of a material repeat it.
+        element: ``(nb, 16)`` element of each lane; lanes past the last one of a group repeat it.
         filled: ``(nb,)`` int32 elements of each block.
         pattern: ``(nb,)`` int32; blocks of equal shapes have the same.
         shape: ``(ns,)`` an element of each different shape.
@@ -57,19 +57,30 @@ class Lanes:
         return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
 
 
-def arrange(elements: Elements) -> Lanes:
-    """Sort elements into blocks of one material, equal shapes together."""
+def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
+    """Sort elements into blocks of one group ``(ne,)``, equal shapes together."""
     first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
-    order = np.lexsort((elements.cells.min(axis=1), shape, elements.material))
-    ends = np.flatnonzero(np.diff(elements.material[order], append=-1)) + 1
-    rows, count = [], []
-    for start, end in zip(np.concatenate([[0], ends[:-1]]), ends, strict=True):
-        padded = np.arange(start, start + -(-(end - start) // LANES) * LANES)
-        rows.append(order[np.minimum(padded, end - 1)].reshape(-1, LANES))
-        count.append(np.minimum(end - padded[::LANES], LANES))
-    element = np.concatenate(rows)
+    order = np.lexsort((elements.cells.min(axis=1), shape, group))
+    ends = np.flatnonzero(np.diff(group[order], append=-1)) + 1
+    parts = [in_blocks(order[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+    element, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     place, pattern = np.unique(shape[element], axis=0, return_inverse=True)
-    return Lanes(element, np.concatenate(count).astype(np.int32), pattern.reshape(-1).astype(np.int32), first, place)
+    return Lanes(element, filled, pattern.reshape(-1).astype(np.int32), first, place)
+
+
+def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Return the elements of each block ``(nb, 16)``, lanes past the last one repeat it, and how many it has."""
+    padded = np.arange(-(-len(order) // LANES) * LANES)
+    filled = np.minimum(len(order) - padded[::LANES], LANES)
+    return order[np.minimum(padded, len(order) - 1)].reshape(-1, LANES), filled.astype(np.int32)
+
+
+def alike(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
+    """Return elements and plastic constants ``(nm, 6)`` with equal materials as one: many parts are of the same."""
+    constants = np.column_stack([elements.elasticity.reshape(len(plastic), -1), plastic])
+    _, first, material = np.unique(constants, axis=0, return_index=True, return_inverse=True)
+    material = material.reshape(-1)[elements.material].astype(np.int32)
+    return replace(elements, material=material, elasticity=elements.elasticity[first]), plastic[first]
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:

@@ -16,7 +16,7 @@ from reflowshock.workflow.ecad.case_text import LEAST_HOLE, Wanted, case_text
 from reflowshock.workflow.ecad.gerber import read_gerber
 from reflowshock.workflow.ecad.ipc2581 import read_ipc2581
 from reflowshock.workflow.ecad.kicad import read_kicad
-from reflowshock.workflow.ecad.layout import Component, EcadError, Layout, in_mm
+from reflowshock.workflow.ecad.layout import Component, EcadError, Layout, checked_layout, in_mm
 from reflowshock.workflow.ecad.questions import QUESTIONS, AnswerError, case_of
 from reflowshock.workflow.ecad.table import read_table
 from reflowshock.workflow.pipeline.reader import read_case
@@ -32,12 +32,12 @@ MOST_SHOWN = 40
 def read_layout(path: Path) -> Layout:
     """Read a board: a file by its ending, or the Gerber and drill files in a folder; raise EcadError."""
     if path.is_dir():
-        return read_gerber(path)
+        return checked_layout(read_gerber(path))
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         endings = ", ".join(READERS)
         raise EcadError(path, f"has an unknown ending; allowed: {endings}, or a folder of Gerber X2 and drill files")
-    return reader(path)
+    return checked_layout(reader(path))
 
 
 def show_layout(layout: Layout, console: Console) -> None:

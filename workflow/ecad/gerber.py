@@ -172,6 +172,8 @@ def _cell(at: Point) -> tuple[int, int]:
 def _diameter(path: Path, item: Any) -> float:
     """Return the diameter [m] of a circle as large as a flash."""
     aperture = item.aperture
+    if aperture is None:
+        raise EcadError(path, "has a flash without an aperture")
     scale = MILLI if str(aperture.unit or item.unit) == "mm" else 25.4 * MILLI
     if hasattr(aperture, "diameter"):
         return scale * checked_number(path, "an aperture", aperture.diameter, 1e3)

@@ -9,6 +9,7 @@ from reflowshock.units import from_si
 LARGEST_FILE = 200_000_000  # bytes
 MOST_ITEMS = 200_000  # pads, holes or lines of an outline
 MILLI = 1.0e-3
+SMALLEST, SMALLEST_THICKNESS = 1.0e-3, 1.0e-5  # m: of a board
 Point = tuple[float, float]
 
 
@@ -96,6 +97,22 @@ def checked_size(path: Path) -> Path:
     if path.stat().st_size > LARGEST_FILE:
         raise EcadError(path, f"is larger than {LARGEST_FILE / 1e6:.0f} MB")
     return path
+
+
+def checked_layout(layout: Layout) -> Layout:
+    """Return a layout that can be a board; raise EcadError where a size of it is not positive."""
+    sides = [high - low for low, high in zip(layout.low, layout.high, strict=True)]
+    if min(sides) < SMALLEST:
+        raise EcadError(
+            layout.path, f"has an outline of {in_mm(sides[0], 4)} x {in_mm(sides[1], 4)}, which is no board"
+        )
+    if layout.thickness is not None and not layout.thickness >= SMALLEST_THICKNESS:
+        raise EcadError(layout.path, f"says that the board is {in_mm(layout.thickness, 4)} thick, which cannot be")
+    for name, component in layout.components.items():
+        sizes = [size for pad in component.pads for size in (pad.diameter, pad.mask_opening) if size is not None]
+        if not all(size > 0.0 for size in sizes):
+            raise EcadError(layout.path, f"has a pad of {name} with a size that is not positive")
+    return layout
 
 
 def text_of(path: Path) -> str:

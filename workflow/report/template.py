@@ -17,7 +17,10 @@ from reflowshock.workflow.report.page_data import PageData
 
 TEMPLATES = Path(__file__).parent / "templates"
 ASSETS = Path(__file__).parent / "assets"
-SCRIPTS = ("uplot.min.js", "ogl.min.js", "page.js", "charts.js", "shaders.js", "surfaces.js", "viewer.js", "start.js")
+SCRIPTS = (
+    "uplot.min.js", "ogl.min.js", "page.js", "charts.js", "shaders.js", "surfaces.js", "controls.js", "viewer.js",
+    "start.js",
+)  # fmt: skip
 STYLES = ("uplot.min.css", "style.css")
 
 

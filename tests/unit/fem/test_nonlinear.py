@@ -187,3 +187,18 @@ def test_material_that_couples_normal_strain_and_shear_is_refused():
     coupled[0, 0, 3] = coupled[0, 3, 0] = 0.1 * coupled[0, 0, 0]
     with pytest.raises(ValueError, match="couples"):
         elastic_constants(replace(elements, elasticity=coupled).elasticity)
+
+
+@every_kind
+def test_parts_of_one_material_share_blocks(name):
+    """Joints are parts of their own, with few elements each: their lanes are filled all the same."""
+    elements = distorted(name, SOLDER)
+    parts = np.arange(len(elements.cells), dtype=np.int32) % 3
+    of_parts = replace(elements, material=parts, elasticity=np.repeat(elements.elasticity, 3, axis=0))
+    one = nonlinear(elements, SOLDER, True)
+    (many,) = force_terms(of_parts, [SOLDER, SOLDER.model_copy(), SOLDER], "finite")
+    assert len(many.lanes.filled) == len(one.lanes.filled)
+    displacement = 2e-3 * np.random.default_rng(2).uniform(-1, 1, elements.points.shape)
+    assert np.array_equal(force_of(many, displacement), force_of(one, displacement))
+    assert many.energy(displacement) == one.energy(displacement)
+    assert many.energy(displacement).plastic > 0.0

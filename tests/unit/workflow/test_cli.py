@@ -52,6 +52,25 @@ def flat(table: dict, prefix: str = ""):
             yield prefix + key, value
 
 
+def test_a_plan_for_scripts(call):
+    code, output, _ = call("plan", str(CASE), "--set", "scale=quick", "--json")
+    found = json.loads(output)
+    assert code == 0
+    assert found["stages"]["shock"] == {
+        "runs": True,
+        "why": "no product yet",
+        "seconds": found["stages"]["shock"]["seconds"],
+    }
+    assert found["seconds"] == pytest.approx(sum(stage["seconds"] or 0.0 for stage in found["stages"].values()))
+    assert found["effects"]["gravity"]["why"]
+
+
+def test_a_dry_run_is_a_plan(call, tmp_path):
+    shown = call("run", str(CASE), "--set", "scale=quick", "--dry-run")
+    assert shown == call("plan", str(CASE), "--set", "scale=quick")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_new_case_passes_plan(call):
     call("new", "mine")
     code, output, _ = call("plan", "mine.toml")

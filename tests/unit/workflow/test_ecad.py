@@ -148,6 +148,9 @@ def test_no_part_of_a_file_gets_into_the_case_as_toml(in_tmp):
         (lambda text: text.replace("(size 0.36 0.36)", "(size big 0.36)"), "no number"),
         (lambda text: text.replace("(size 0.36 0.36)", "(size 0.36)"), "has 1 numbers, not 2"),
         (lambda text: text.replace("(thickness 1.55)", "(thickness 1e300)"), "allowed: up to"),
+        (lambda text: text.replace("(thickness 1.55)", "(thickness -1)"), "-1 mm thick"),
+        (lambda text: text.replace("(end 80.0 -60.0)", "(end 80.0 0)"), "80 mm x 0 mm, which is no board"),
+        (lambda text: text.replace("(size 0.36 0.36)", "(size 0 0)"), "pad of U8 with a size that is not positive"),
     ],
 )
 def test_damaged_boards_of_kicad(change, words, tmp_path):
@@ -184,6 +187,7 @@ def test_damaged_ipc_2581(change, words, tmp_path):
         ("top.gtl", lambda text: text.replace("%MOMM*%", ""), "cannot be read"),
         ("edge.gm1", lambda text: text.replace("Profile,NP", "Other,User"), "no outline"),
         ("drill.drl", lambda text: text.replace("M30", ""), "ends too early"),
+        ("mask.gts", lambda text: text.replace("D10*\n", ""), "without an aperture"),
     ],
 )
 def test_damaged_gerbers(name, change, words, tmp_path):

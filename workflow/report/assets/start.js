@@ -13,8 +13,10 @@ async function start() {
   document.documentElement.dataset.ready = "yes";
 }
 
+const hasWebGL = document.querySelector("[data-scene]") && document.createElement("canvas").getContext("webgl2") !== null;
+
 async function drawScene(place) {
-  if (!document.createElement("canvas").getContext("webgl2")) {
+  if (!hasWebGL) {
     place.append(element("p", { className: "note" }, "This browser has no WebGL: the 3D view cannot be shown."));
     return;
   }

@@ -13,7 +13,8 @@ class Viewer {
     this.field = scene.fields.length ? 0 : -1;
     this.canvasBox = element("div", { className: "view" });
     this.tip = element("div", { className: "tip", hidden: true });
-    this.renderer = new ogl.Renderer({ dpr: Math.min(devicePixelRatio, 2), antialias: true, preserveDrawingBuffer: true });
+    this.width = widthOf(place) - 2; // within its border
+    this.renderer = new ogl.Renderer({ width: this.width, height: VIEW_HEIGHT, dpr: Math.min(devicePixelRatio, 2), antialias: true, preserveDrawingBuffer: true });
     this.gl = this.renderer.gl;
     this.gl.clearColor(1, 1, 1, 1);
     this.gl.canvas.tabIndex = 0;
@@ -25,6 +26,9 @@ class Viewer {
 
   async build() {
     this.root = new ogl.Transform();
+    // One for all bodies: a browser without a graphics card takes long to compile each.
+    this.program = new ogl.Program(this.gl, { vertex: VERTEX, fragment: FRAGMENT, transparent: true });
+    this.program.setBlendFunc(this.gl.ONE, this.gl.ONE_MINUS_SRC_ALPHA);
     this.groups = [];
     for (const group of this.scene.groups) this.groups.push(await this.addGroup(group));
     this.hasContext = this.groups.some((group) => group.state === 1);
@@ -32,9 +36,9 @@ class Viewer {
     this.camera = new ogl.Camera(this.gl, { fov: 30 });
     this.orbit = new ogl.Orbit(this.camera, {
       element: this.gl.canvas, ease: 1, inertia: 0, rotateSpeed: 1, panSpeed: 1, zoomSpeed: 2,
-      minDistance: 0.02 * this.radius, maxDistance: 20 * this.radius,
+      minDistance: 0.02 * this.radius,
     });
-    this.place.append(this.toolbar(), this.canvasBox);
+    this.place.append(toolbar(this), this.canvasBox);
     this.listen();
     this.showFrame(this.frame);
     this.reset();
@@ -78,9 +82,13 @@ class Viewer {
   }
 
   addMesh(group, attributes, mode, uniforms) {
-    const program = new ogl.Program(this.gl, { vertex: VERTEX, fragment: FRAGMENT, uniforms, cullFace: false, transparent: true });
-    program.setBlendFunc(this.gl.ONE, this.gl.ONE_MINUS_SRC_ALPHA);
+    const { program } = this;
     const mesh = new ogl.Mesh(this.gl, { geometry: new ogl.Geometry(this.gl, attributes), program, mode, frustumCulled: false });
+    mesh.onBeforeRender(() => {
+      Object.assign(program.uniforms, uniforms);
+      program.depthWrite = group.state !== 1;
+      program.cullFace = group.state === 1 ? this.gl.BACK : false;
+    });
     mesh.setParent(this.root);
     group.meshes.push(mesh);
     return mesh;
@@ -119,6 +127,7 @@ class Viewer {
       this.slider.value = frame;
       this.time.textContent = this.scene.frames[frame];
     }
+    this.tellAgain();
     this.wake();
   }
 
@@ -159,6 +168,7 @@ class Viewer {
       this.fill(group);
     }
     this.legend.replaceChildren(...legendOf(field));
+    this.tellAgain();
     this.wake();
   }
 
@@ -167,11 +177,9 @@ class Viewer {
     const solder = this.groups.find((group) => group.name === "solder");
     const part = joint === "" ? -1 : this.scene.parts.findIndex((name) => name === `solder@${joint}`);
     if (!solder || (joint !== "" && part < 0)) return false;
-    this.chosen = part;
-    if (part < 0) this.look(this.hasContext);
-    else {
-      this.frameOn(this.hasContext);
-      this.drift = this.meanMotion();
+    this.look(this.hasContext);
+    if (part >= 0) {
+      this.chosen = part;
       const parts = solder.attributes.part.data;
       const own = [...parts.keys()].filter((k) => parts[k] === part);
       const range = [0, 1, 2].map((axis) => own.map((k) => solder.points[3 * k + axis]));
@@ -186,16 +194,36 @@ class Viewer {
 
   lookAt([x, y, z], distance) {
     const [a, b, c] = this.scene.view, length = Math.hypot(a, b, c);
+    this.orbit.maxDistance = 4 * distance;
     this.orbit.target.set(x, z, -y);
     this.camera.position.set(x + (a / length) * distance, z + (c / length) * distance, -y - (b / length) * distance);
     this.orbit.forcePosition();
     this.wake();
   }
 
+  /** Look at what matters, the rest as one sees through it; or at the whole, all of it solid. */
   look(solid) {
+    for (const group of this.groups) if (group.ghost && group.state !== 2) group.state = solid ? 1 : 0;
+    this.toggles.forEach((one) => one.tell());
     this.frameOn(solid);
     this.drift = this.meanMotion();
+    this.setFactor(solid ? this.scene.exaggeration : this.wholeFactor());
     this.reset();
+  }
+
+  setFactor(factor) {
+    this.factor = factor;
+    if (this.factorChanged) this.factorChanged();
+    this.wake();
+  }
+
+  /** Return how many times as large displacements are drawn where everything is seen: by 1, 2 or 5 times ten to a power. */
+  wholeFactor() {
+    const largest = Math.max(...this.groups.map((group) => 32767 * group.scale));
+    const wanted = (0.12 * 2 * this.radius) / (largest || Infinity);
+    const power = 10 ** Math.floor(Math.log10(wanted || 1));
+    const factor = Math.max(...[1, 2, 5].map((step) => step * power).filter((one) => one <= wanted), 1);
+    return this.hasContext ? Math.min(factor, this.scene.exaggeration) : this.scene.exaggeration;
   }
 
   reset() {
@@ -213,78 +241,6 @@ class Viewer {
     const reach = (axis) => 0.5 * this.extent.reduce((sum, one, k) => sum + Math.abs(one * axis[k]), 0);
     const half = Math.tan((15 * Math.PI) / 180), aspect = Math.max((this.canvasBox.clientWidth || 900) / VIEW_HEIGHT, 0.5);
     return 1.06 * Math.max(reach(up) / half, reach(right) / (half * 0.86 * aspect)) + reach(eye);
-  }
-
-  toolbar() {
-    const bar = element("div", { className: "toolbar" });
-    const { fields, frames } = this.scene;
-    if (fields.length) {
-      const choice = element("select", { title: "field" }, ...fields.map((one, k) => element("option", { value: k }, one.label)));
-      choice.addEventListener("change", () => this.showField(Number(choice.value)));
-      if (fields.length > 1) bar.append(choice);
-      this.showField(0);
-    }
-    if (frames.length > 1) {
-      this.slider = element("input", { type: "range", className: "time", min: 0, max: frames.length - 1, step: 1, title: "time" });
-      this.time = element("output");
-      this.slider.addEventListener("input", () => this.showFrame(Number(this.slider.value)));
-      const play = element("button", { type: "button", title: "play" }, "▶");
-      play.addEventListener("click", () => this.play(play));
-      bar.append(play, this.slider, this.time);
-    }
-    if (this.groups.some((group) => group.displacement)) bar.append(this.exaggeration());
-    bar.append(...this.groups.filter((group, k) => this.groups.findIndex((one) => one.name === group.name) === k).map((group) => this.toggle(group)));
-    const mesh = element("button", { type: "button", "aria-pressed": "false" }, "mesh");
-    mesh.addEventListener("click", () => {
-      this.meshed = !this.meshed;
-      mesh.setAttribute("aria-pressed", String(this.meshed));
-      this.wake();
-    });
-    const views = this.hasContext ? [["focus", true], ["whole view", false]] : [["whole view", false]];
-    const looks = views.map(([name, solid]) => {
-      const look = element("button", { type: "button" }, name);
-      look.addEventListener("click", () => this.look(solid));
-      return look;
-    });
-    if (this.groups.some((group) => group.edges)) bar.append(mesh);
-    bar.append(...looks);
-    return bar;
-  }
-
-  exaggeration() {
-    const most = Math.log10(Math.max(10 * this.scene.exaggeration, 10));
-    const told = element("output", {}, `× ${shortNumber(this.factor)}`);
-    const slider = element("input", { type: "range", min: 0, max: most, step: most / 100, value: Math.log10(this.factor), title: "displacement, times as large" });
-    slider.addEventListener("input", () => {
-      this.factor = Number((10 ** Number(slider.value)).toPrecision(2));
-      told.textContent = `× ${shortNumber(this.factor)}`;
-      this.wake();
-    });
-    return element("label", {}, "displacement ", slider, told);
-  }
-
-  toggle(group) {
-    const button = element("button", { type: "button", className: "toggle" });
-    const tell = () => (button.textContent = `${group.name}: ${STATES[group.state]}`);
-    button.addEventListener("click", () => {
-      const state = (group.state + 1) % STATES.length;
-      this.groups.filter((one) => one.name === group.name).forEach((one) => (one.state = state));
-      tell();
-      this.wake();
-    });
-    tell();
-    return button;
-  }
-
-  play(button) {
-    if (this.timer) {
-      clearInterval(this.timer);
-      this.timer = null;
-      button.textContent = "▶";
-      return;
-    }
-    button.textContent = "❚❚";
-    this.timer = setInterval(() => this.showFrame((this.frame + 1) % this.scene.frames.length), 250);
   }
 
   listen() {
@@ -307,8 +263,13 @@ class Viewer {
     this.tell(this.pick(x, y), x, y);
   }
 
+  tellAgain() {
+    if (!this.tip.hidden) this.tell(...this.told);
+  }
+
   /** Name a body, and say the largest value that it has now. */
   tell(part, x, y) {
+    this.told = [part, x, y];
     this.tip.hidden = part < 0;
     if (part < 0) return;
     const field = this.scene.fields[this.field];
@@ -372,8 +333,6 @@ class Viewer {
       group.uniforms.uSize.value = group.size * this.gl.canvas.height * 0.5;
       for (const mesh of group.meshes) {
         mesh.visible = shown && (mesh !== group.edges || (this.meshed && !picking && !ghost));
-        mesh.program.depthWrite = !ghost;
-        mesh.program.cullFace = ghost ? this.gl.BACK : false;
       }
     }
   }
@@ -388,9 +347,14 @@ class Viewer {
   }
 
   resize() {
-    const width = Math.max(this.canvasBox.clientWidth || shownWidth(this.canvasBox), 100);
-    this.renderer.setSize(width, VIEW_HEIGHT);
+    const width = widthOf(this.canvasBox);
+    if (width !== this.width) this.renderer.setSize(width, VIEW_HEIGHT);
+    this.width = width;
     this.aspect = width / VIEW_HEIGHT;
     this.wake();
   }
+}
+
+function widthOf(place) {
+  return Math.max(place.clientWidth || shownWidth(place), 100);
 }
