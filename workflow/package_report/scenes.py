@@ -31,9 +31,10 @@ def drop_scene(folder: Path, history: Arrays, result: Mapping[str, Any]) -> tupl
     """
     stress = VON_MISES.worse(history)
     own = stress[:, critical_joint(history)]
-    found = [FieldSeries.read(paths, CELL_FIELDS) for paths in _models(folder, result)]
-    joints, whole = found[0], found[-1]
-    scene = _scene(joints, whole, result["parts"], float(stress.max()), float(history["time"][np.argmax(own)]))
+    time = float(history["time"][np.argmax(own)])
+    found = [FieldSeries.read(paths, CELL_FIELDS, time) for paths in _models(folder, result)]
+    joints, whole = found[0], found[-1].at(found[0].times)
+    scene = _scene(joints, whole, result["parts"], float(stress.max()), time)
     return scene, (
         "The scale of the stress ends at the largest average over a joint's layer at a pad; single elements reach more,"
         " the more so the finer they are. Displacements are relative to the drop table."

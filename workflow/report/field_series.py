@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
+from reflowshock.workflow.report.scene import kept_frames
 
 SAME_PLACE = 1e-9  # m; ranks write their nodes each
 CORNERS = {8: 8, 4: 4, 10: 4}  # of a cell with so many nodes
 DISPLACEMENT = "displacement"
+MOST_BYTES = 400_000_000  # of files that are read
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +36,20 @@ class FieldSeries:
     fields: Mapping[str, Floats]
 
     @classmethod
-    def read(cls, paths: Sequence[Path], names: Sequence[str] = ()) -> "FieldSeries":
-        """Read the series of the models of a run.
+    def read(cls, paths: Sequence[Path], names: Sequence[str] = (), shown: float = 0.0) -> "FieldSeries":
+        """Read the series of the models of a run: all times, or of large files as many as take some seconds to read.
 
         Args:
-            paths: ``.pvd`` file of each model; all with the same number of times.
+            paths: ``.pvd`` file of each model; of the others the states next to the times of the first.
             names: of the cell fields that are read, where they are there.
+            shown: time [s] whose state is read in any case.
         """
         stored = [_steps(path) for path in paths]
         times = np.array([time for time, _ in stored[0]])
-        files = [[file for series in stored for file in series[step][1]] for step in range(len(times))]
+        files = [[file for series in stored for file in _next_to(time, series)] for time in times]
+        size = max(sum(file.stat().st_size for file in here) for here in files)
+        kept = kept_frames(len(times), MOST_BYTES // size, int(np.argmin(np.abs(times - shown))))
+        times, files = times[kept], [files[step] for step in kept]
         pieces = [_Piece.read(file) for file in files[0]]
         counts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
         points = np.concatenate([piece.points for piece in pieces])
@@ -56,14 +62,20 @@ class FieldSeries:
             displacement[step] = np.concatenate([one[DISPLACEMENT].reshape(-1, 3) for one in found])[first]
             for name, values in fields.items():
                 if all(name in one for one in found):
-                    kept = [one[name][piece.is_own] for one, piece in zip(found, pieces, strict=True)]
-                    values.append(np.concatenate(kept))
+                    cells = [one[name][piece.is_own] for one, piece in zip(found, pieces, strict=True)]
+                    values.append(np.concatenate(cells))
         whole = {name: np.array(values) for name, values in fields.items() if len(values) == len(times)}
         return cls(points[first], place.ravel()[np.concatenate(own)], times, displacement, whole)
 
     def nearest(self, time: float) -> int:
         """Return the number of the stored time next to a time [s]."""
         return int(np.argmin(np.abs(self.times - time)))
+
+    def at(self, times: Floats) -> "FieldSeries":
+        """Return the states next to other times ``(m,)`` [s]."""
+        rows = [self.nearest(time) for time in times]
+        fields = {name: values[rows] for name, values in self.fields.items()}
+        return FieldSeries(self.points, self.cells, times, self.displacement[rows], fields)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +102,11 @@ def _steps(path: Path) -> list[tuple[float, list[Path]]]:
     """Return the times of a series, and the files of all ranks at each."""
     sets = ElementTree.parse(path).getroot().iter("DataSet")
     return [(float(one.attrib["timestep"]), _pieces(path.with_name(one.attrib["file"]))) for one in sets]
+
+
+def _next_to(time: float, series: Sequence[tuple[float, list[Path]]]) -> list[Path]:
+    """Return the files of the state of a series next to a time [s]."""
+    return min(series, key=lambda step: abs(step[0] - time))[1]
 
 
 def _pieces(path: Path) -> list[Path]:

@@ -116,7 +116,7 @@ class Scene:
         """Return what the script draws, lengths in mm."""
         groups = [group for group in decimated(self.groups) if len(group.points)]
         always = sum(len(group.points) for group in groups if group.only is None)
-        frames = _kept_frames(len(self.frames), always, self.start)
+        frames = kept_frames(len(self.frames), MOST_VALUES // max(always, 1), self.start)
         return {
             "groups": [_record(group, self.fields, frames, page) for group in groups],
             "parts": list(self.parts),
@@ -192,10 +192,9 @@ def _as_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
     return faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-def _kept_frames(frames: int, vertices: int, start: int) -> list[int]:
-    """Return as many frames as the page may hold, evenly spread, the first shown one among them."""
-    count = min(frames, max(MOST_VALUES // max(vertices, 1), 1))
-    kept = sorted({round(place) for place in np.linspace(0, frames - 1, count)})
+def kept_frames(frames: int, most: int, start: int) -> list[int]:
+    """Return at most so many of the frames, but one at least, evenly spread, the one that is shown first among them."""
+    kept = sorted({round(place) for place in np.linspace(0, frames - 1, min(frames, max(most, 1)))})
     nearest = min(range(len(kept)), key=lambda k: abs(kept[k] - start))
     return sorted({*kept[:nearest], start, *kept[nearest + 1 :]})
 

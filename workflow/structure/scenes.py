@@ -15,7 +15,7 @@ STRESS = "von Mises stress"
 
 def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float) -> Scene:
     """Return the models of a structure at all stored times, at first the one next to a time [s]."""
-    series = FieldSeries.read(models, ("part", "von_mises"))
+    series = FieldSeries.read(models, ("part", "von_mises"), time)
     groups = _layers(series, parts, {STRESS: series.fields["von_mises"] / MEGA})
     size = float(np.linalg.norm(series.displacement, axis=2).max())
     unit, factor = ("mm", 1.0 / MILLI) if size > 0.01 * MILLI else ("µm", 1.0 / MICRO)

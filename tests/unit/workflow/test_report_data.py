@@ -6,15 +6,17 @@ import json
 import re
 import zlib
 
+import meshio
 import numpy as np
 import pytest
 
+from reflowshock.workflow.package_report.scenes import residual_scene
 from reflowshock.workflow.report.bodies import body_group
 from reflowshock.workflow.report.charts import MOST_POINTS, Axis, Chart, Series, thinned
 from reflowshock.workflow.report.colours import SCALES, colour_at, ink_on
 from reflowshock.workflow.report.field_series import FieldSeries
 from reflowshock.workflow.report.page_data import PageData
-from reflowshock.workflow.report.scene import FINEST, Field, Group, Scene, boundary, decimated
+from reflowshock.workflow.report.scene import FINEST, Field, Group, Scene, boundary, decimated, kept_frames
 from reflowshock.workflow.report.template import ASSETS, SCRIPTS, write_page
 
 HOSTILE = '</script><script>alert("1")</script><img src=x onerror=alert(2)>\x1b[31m & "\' {{ 7*7 }}'
@@ -87,6 +89,11 @@ def test_a_scene_keeps_its_first_frame_and_the_values_of_its_scale():
     assert decoded(data, record["points"]).reshape(8, 3) == pytest.approx(1e3 * points)
 
 
+@pytest.mark.parametrize(("most", "kept"), [(9, [0, 1, 2, 3, 4, 5]), (3, [0, 3, 5]), (1, [3]), (0, [3])])
+def test_of_too_many_frames_the_first_shown_one_stays(most, kept):
+    assert kept_frames(6, most, 3) == kept
+
+
 def test_a_long_line_keeps_its_peaks():
     x = np.linspace(0.0, 1.0, 100_000)
     y = np.sin(40 * x)
@@ -147,6 +154,21 @@ def test_series_of_several_ranks_are_read_as_one_body(tmp_path):
     assert series.fields["part"].tolist() == [[0.0, 1.0], [0.0, 1.0]]
     assert series.displacement[1] == pytest.approx(series.points) and series.nearest(0.9e-3) == 1
     assert len(boundary(series.cells)[0]) == 10
+    assert series.at(np.array([0.8e-3])).displacement == pytest.approx(series.displacement[1:])
+
+
+def test_what_cooling_left_is_shown_by_part(tmp_path):
+    points, cells = box(4, 1, 1)
+    parts = ["board", "solder@A1", "copper_board@A1", "substrate"]
+    data = {"von_mises": [np.array([0.0, 4e6, 2e6, 0.0])], "part": [np.arange(4)]}
+    mesh = meshio.Mesh(1e-3 * points, [("hexahedron", cells)], {"displacement": 1e-6 * points}, data)
+    mesh.write(tmp_path / "residual.vtu")
+    scene = residual_scene(tmp_path / "residual.vtu", parts, 3e6)
+    assert [(group.name, group.is_ghost) for group in scene.groups] == [
+        ("solder", False), ("copper", False), ("board", True), ("substrate", True),
+    ]  # fmt: skip
+    assert scene.groups[0].values["von Mises stress"] == pytest.approx(4.0) and scene.fields[0].high == 3.0
+    assert scene.fields[1].unit == "µm" and len(PageData().scene(scene)) > 0
 
 
 def page_of(tmp_path, **context) -> str:

@@ -1,0 +1,54 @@
+"""What a report costs: processor time beyond that of loading the program, and the size of the page.
+
+Run: .venv/bin/python benchmarks/report_cost.py [RUN ...]   (a minute; writes results/report_cost.json)
+Without run folders it first runs the shortened case of the tests, into build/report_cost.
+"""
+
+import json
+import platform
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks/results/report_cost.json"
+CASE, RUN = ROOT / "tests/pipeline/small.toml", ROOT / "build/report_cost"
+
+
+def small_run() -> Path:
+    """Run the shortened case, unless it is there."""
+    line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(RUN)]
+    subprocess.run(line, check=True, cwd=ROOT)
+    return RUN
+
+
+def cost(run: Path) -> dict:
+    """Write the report of a run once, in a process of its own."""
+    line = [sys.executable, __file__, "--one", str(run)]
+    told = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
+    return json.loads(told.splitlines()[-1])
+
+
+def one(run: Path) -> dict:
+    """Write the report of a run into a temporary folder; return what that took."""
+    from reflowshock.workflow.pipeline.points import read_case_of_run
+    from reflowshock.workflow.pipeline.report import write_report
+
+    case, loaded = read_case_of_run(run), process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        write_report(run, case, Path(folder))
+        size = (Path(folder) / "report.html").stat().st_size
+    return {"run": run.name, "processor_seconds": process_time() - loaded, "loading_seconds": loaded, "bytes": size}
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        print(json.dumps(one(Path(sys.argv[2]))))
+        raise SystemExit
+    rows = [cost(run) for run in map(Path, sys.argv[1:])] or [cost(small_run())]
+    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    RESULTS.write_text(json.dumps({"machine": platform.processor(), "reports": rows}, indent=1) + "\n")
+    for row in rows:
+        print("{run}: {processor_seconds:.2f} s, {bytes} B; loading the program {loading_seconds:.2f} s".format(**row))
