@@ -77,7 +77,7 @@ def petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
     return result
 
 
-def _cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
+def cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     """Factor a symmetric positive definite matrix with MUMPS."""
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(petsc(matrix))
@@ -97,7 +97,7 @@ class _FactoredInverse:
         self._diagonal = matrix.diagonal()
         self._solver = None
         if len(self._coupled) > 0:
-            self._solver = _cholesky(matrix[self._coupled][:, self._coupled])
+            self._solver = cholesky(matrix[self._coupled][:, self._coupled])
             self._solution, self._right = self._solver.getOperators()[0].createVecs()
 
     def __call__(self, right: Floats) -> Floats:

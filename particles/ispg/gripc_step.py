@@ -34,6 +34,12 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
+FLAW = (
+    "the printed pressure correction is unstable: with direct nodal integration eq 12 is a strong form, whose pressure "
+    "gradient and divergence are not each other's transpose, so that oscillations from particle to particle grow at "
+    'any time step; solder.numerics.scheme = "ispg" is the method in a form that holds'
+)
+
 
 class GripcStep:
     """Rotational incremental pressure correction; keeps the unsmoothed velocities of the last step."""
@@ -62,6 +68,11 @@ class GripcStep:
     def keeps_time(self) -> bool:
         """Always."""
         return True
+
+    @property
+    def flaw(self) -> str:
+        """Its pressure gradient."""
+        return FLAW
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedGripcStep":
         """Fit the operators at the current positions.

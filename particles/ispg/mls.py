@@ -14,7 +14,7 @@ from reflowshock.particles.ispg.mls_weights import linear_weights, quadratic_wei
 SUPPORT = {"linear": 2.0, "quadratic": 2.4}
 
 
-class DegenerateStencil(ValueError):
+class DegenerateStencil(ArithmeticError):
     """A particle has too few neighbours to fit a gradient."""
 
 

@@ -26,6 +26,9 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         pitch: distance of neighbouring joints [m].
     """
     effects = decide_effects(next(iter(geometries.values())), solder)
+    found = ispg_problems(solder, "joints between plates")
+    if found:
+        return found
     found = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
     if found:
         return found
@@ -46,6 +49,14 @@ def scheme_problems(solder: Solder) -> list[Problem]:
     return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
 
 
+def ispg_problems(solder: Solder, place: str) -> list[Problem]:
+    """Find the scheme ispg at a place where it does not hold, or is not verified; empty for other schemes."""
+    if solder.numerics.scheme != "ispg":
+        return []
+    message = f'the scheme "ispg" is for one drop on a uniform wall, with inertia; it is not verified for {place}'
+    return [Problem("solder.numerics.scheme", message, "ispg", "energy")]
+
+
 def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
     """Find solder that never comes to rest, since without surface tension nothing gives it a shape."""
     tension = effects["surface_tension"]
@@ -56,8 +67,10 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
 
 
 def _wall_problems(solder: Solder) -> list[Problem]:
-    if solder.numerics.scheme == "gripc" and solder.wall != "free-slip":
-        return [Problem("solder.wall", 'the scheme "gripc" has walls with free slip only', solder.wall, "free-slip")]
+    scheme = solder.numerics.scheme
+    if scheme != "energy" and solder.wall != "free-slip":
+        message = f'the scheme "{scheme}" has walls with free slip only'
+        return [Problem("solder.wall", message, solder.wall, "free-slip")]
     if (solder.wall == "slip") == (solder.slip_length is not None):
         return []
     value = "none" if solder.slip_length is None else mm(solder.slip_length)
@@ -78,7 +91,7 @@ def _basis_problems(solder: Solder) -> list[Problem]:
     basis = solder.numerics.basis
     if solder.numerics.scheme == "gripc" or basis == "quadratic":
         return []
-    message = 'the scheme "energy" has no basis to choose'
+    message = f'the scheme "{solder.numerics.scheme}" has no basis to choose'
     return [Problem("solder.numerics.basis", message, basis, 'quadratic, or any with scheme = "gripc"')]
 
 

@@ -189,8 +189,10 @@ class ViscosityEffect(MotionEffect):
     source = "Lamb 1932, art. 355"
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """As all motion, with its own number."""
+        """As all motion, with its own number; where inertia is asked for, nothing else brings the liquid to rest."""
         found = super().auto(liquid)
+        if liquid.solder.effects.inertia == "on":
+            found = found | decision(True, "inertia is on: only viscosity brings the liquid to rest")
         return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}; {found['why']}")
 
     def decide(self, liquid: LiquidScene) -> Decision:

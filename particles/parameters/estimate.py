@@ -13,6 +13,10 @@ SECONDS_PER_INERTIAL_STEP = 0.006
 SECONDS_PER_INERTIAL_STEP_OF_THOUSAND = 0.15
 INERTIAL_COST_EXPONENT = 1.5
 
+# Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
+SECONDS_PER_ISPG_STEP = 0.01
+SECONDS_PER_ISPG_STEP_AND_PARTICLE = 2.5e-5
+
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
     """Number of particles of a joint: layers of concentric rings of 6 j particles."""
@@ -34,6 +38,11 @@ def inertial_seconds(particles: int, steps: int) -> float:
     """Expected time of steps with inertia or viscosity on one core [s]."""
     growing = SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
     return steps * (SECONDS_PER_INERTIAL_STEP + growing)
+
+
+def ispg_seconds(particles: int, steps: int) -> float:
+    """Expected time of steps of the scheme ispg on one core [s]."""
+    return steps * (SECONDS_PER_ISPG_STEP + SECONDS_PER_ISPG_STEP_AND_PARTICLE * particles)
 
 
 def _seconds_per_step(particles: int) -> float:

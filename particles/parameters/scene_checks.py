@@ -18,6 +18,7 @@ FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
+ISPG_ANGLES = (pi / 3.0, 2.0 * pi / 3.0)
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -35,19 +36,41 @@ class HasWall(Protocol):
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    found = _flow_problems(drop, solder) or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    found = _flow_problems(drop, solder) or _ispg_problems(drop, solder)
+    found = found or _resolution_problems(drop) or _symmetry_problems(drop, solder)
     return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = _flow_problems(pair, solder) or free_problems(pair, solder) or _pair_resolution(pair)
+    found = checks.ispg_problems(solder, "two drops") or _flow_problems(pair, solder)
+    found = found or free_problems(pair, solder) or _pair_resolution(pair)
     return found or _distance_problems(pair, solder)
 
 
 def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     """Find a scheme that does not go with its numerics, and liquid that nothing brings to rest."""
     return checks.scheme_problems(solder) + checks.effect_problems(solder, decide_drop(solder, scene.is_free))
+
+
+def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find what the scheme ispg is not verified for."""
+    inertia = decide_drop(solder, drop.is_free)["inertia"]
+    places = {
+        "free drops": drop.is_free,
+        "pads": drop.pad_radius is not None,
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(drop.contact_angle),
+        "hysteresis": drop.hysteresis is not None,
+        "planes of symmetry": drop.symmetry != "none",
+        f"drops without inertia ({inertia['why']})": not inertia["on"],
+    }
+    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _is_between(angle: float | None) -> bool:
+    """Whether a contact angle [rad] is one that the scheme ispg is verified for."""
+    low, high = ISPG_ANGLES
+    return angle is None or low - ROUNDING <= angle <= high + ROUNDING
 
 
 def _pair_resolution(pair: Drops) -> list[Problem]:

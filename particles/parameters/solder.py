@@ -16,11 +16,12 @@ from reflowshock.quantity import Quantity
 class FlowNumerics(Parameters):
     """How a reflow is computed, apart from its resolution.
 
-    The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme gripc is the
-    paper's ISPG (the pressure correction that Hu et al. print), for comparison: time steps end at the capillary limit.
+    The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme ispg is the
+    paper's method in a form that holds, for a drop with inertia on a uniform wall. The scheme gripc is what Hu et al.
+    print, for comparison: time steps end at the capillary limit, and drops break up.
     """
 
-    scheme: Literal["energy", "gripc"] = "energy"
+    scheme: Literal["energy", "ispg", "gripc"] = "energy"
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)

@@ -41,16 +41,17 @@ class SurfaceTension:
         """Surface energy [J]."""
         return self.coefficient * surface_area(body.points, body.triangles)
 
-    def _stiffness(self, body: Body) -> sparse.csr_matrix:
+    def stiffness(self, body: Body) -> sparse.csr_matrix:
+        """Stiffness gamma K of the surface, `(n, n)` [N/m]."""
         return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
 
     def force(self, body: Body) -> Floats:
         """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
-        return -(self._stiffness(body) @ body.points)
+        return -(self.stiffness(body) @ body.points)
 
     def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
         """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
-        return sparse.kron(sparse.identity(3), time_step * self._stiffness(body), format="csr")
+        return sparse.kron(sparse.identity(3), time_step * self.stiffness(body), format="csr")
 
 
 @dataclass(frozen=True, slots=True)

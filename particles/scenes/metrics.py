@@ -9,8 +9,10 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
-from reflowshock.particles.core.surface_measure import ring_area
-from reflowshock.particles.core.symmetry import whole_points
+from reflowshock.particles.core.surface_measure import ring_area, wall_corners
+from reflowshock.particles.core.symmetry import on_plane, whole_points
+from reflowshock.particles.discretisation.inner_tetrahedra import winding_numbers
+from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import Force, plate_wrench
@@ -29,6 +31,7 @@ RULE = (
     ((1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0), 0.45),
 )  # fmt: skip
 Metrics = dict[str, tuple[float, str]]
+LITTLE = 1e-3  # spacings
 WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
 JOINT_NAMES = {
     "height": "drop_height",
@@ -69,7 +72,8 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
         shape["max_width_error"] = (width / reference.max_width - 1.0, "")
     if flow.physics.lines:
         shape |= _contact(solder, flow, reference)
-    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+    rest = _cost_and_rest(solder, flow, run) | _ledger(flow, run)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
 def with_shape_error(shape: JointShape, solder: Solder, reference: Meridian | None) -> JointShape:
@@ -225,6 +229,8 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     last, count = run.records[-1], len(flow.body.points)
     return {
         "at_rest": (float(run.at_rest), ""),
+        "time_at_rest": (flow.time if run.at_rest else float("nan"), "s"),
+        "particles_lost": (float(particles_lost(flow.body)), ""),
         "capillary_number_at_rest": (solder.viscosity * last.speed / solder.surface_tension, ""),
         "time_step_over_capillary_limit": (max(record.time_step for record in run.records) / limit, ""),
         "particles": (float(count), ""),
@@ -232,6 +238,37 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
         "seconds": (run.seconds, "s"),
         "particle_steps_per_second": (count * len(run.records) / run.seconds, "1/s"),
     }
+
+
+def particles_lost(body: Body) -> int:
+    """Number of particles below the surface that are outside the body: through the surface or a wall, or off the wall.
+
+    Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
+    """
+    cloud, inside, corners = body.cloud, body.points.copy(), [body.points[body.triangles]]
+    for wall, plate in enumerate(body.plates):
+        inside[cloud.wall == wall] -= LITTLE * cloud.spacing * plate.side * plate.normal
+    for wall, plate in enumerate(body.plates):
+        line = whole_points(cloud, body.points, wall)[0]
+        fan = wall_corners(line, np.arange(len(line), dtype=np.int32), plate)
+        corners.append(fan)
+    for axis in cloud.symmetry:
+        image = np.array([-1.0 if axis == other else 1.0 for other in range(3)])
+        corners[0] = np.concatenate((corners[0], (corners[0] * image)[:, ::-1]))
+        inside[on_plane(cloud, axis), axis] = LITTLE * cloud.spacing
+    below = inside[cloud.surface_count :]
+    return int((winding_numbers(below, np.concatenate(corners)) < 0.5).sum())
+
+
+def _ledger(flow: LiquidFlow, run: Run) -> Metrics:
+    """What became of the energy that the scheme ispg started with; over that energy."""
+    if not isinstance(flow.solver, IspgStep) or flow.solver.past is None:
+        return {}
+    past, first = flow.solver.past, flow.solver.first_energy
+    lost, kinetic, now = past.losses, past.kinetic_energy(), run.records[-1].energy / flow.body.cloud.parts
+    names = ("viscous", "smoothing", "integration", "transfer")
+    metrics: Metrics = {f"{name}_loss": (getattr(lost, name) / first, "") for name in names}
+    return metrics | {"energy_imbalance": ((now + kinetic + lost.total) / first - 1.0, "")}
 
 
 def width_change_bound(geometry: JointGeometry) -> float:

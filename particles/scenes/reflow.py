@@ -19,6 +19,7 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
 from reflowshock.particles.ispg.gripc_step import GripcStep
+from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
@@ -146,7 +147,9 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
 
 
 def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
-    """How steps are solved: as the paper does, on tetrahedra where momentum is carried or shared, else towards rest."""
+    """How steps are solved: as asked for, or on tetrahedra where momentum is carried or shared, else towards rest."""
+    if solder.numerics.scheme == "ispg":
+        return IspgStep()
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)
     if any(effects[name] for name in AT_REST):

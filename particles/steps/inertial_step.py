@@ -127,6 +127,11 @@ class InertialStep:
         """Always."""
         return True
 
+    @property
+    def flaw(self) -> None:
+        """None."""
+        return None
+
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
         """Start a step; tetrahedra need no neighbour list."""
         return self.start(body, physics)

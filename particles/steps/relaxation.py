@@ -76,6 +76,11 @@ class Relaxation:
         """Never: a step is no physical motion."""
         return False
 
+    @property
+    def flaw(self) -> None:
+        """None."""
+        return None
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""
         if self.centre is None and not body.plates and not body.cloud.symmetry:

@@ -15,6 +15,7 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from reflowshock.particles.steps.shape import Snapshot
+from reflowshock.particles.steps.time_step import StepCollapsed
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CALM_STEPS = 3
@@ -23,6 +24,10 @@ SNAPSHOT_DISPLACEMENT = 0.1
 RUPTURE_SPACINGS = 2.0
 RECORDS = (*FLOW_RECORDS, Snapshot)  # that a flow and its run consist of in a checkpoint
 COUNTS = ("seconds", "ruptured", "calm", "moved")
+
+
+class SchemeBroke(RuntimeError):
+    """A scheme that does not hold has come to its end."""
 
 
 class NoRest(RuntimeError):
@@ -189,10 +194,14 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
 
 def _step(flow: LiquidFlow) -> StepRecord:
     """Advance one step; an error of the solver tells where it happened and what may help."""
+    where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
     try:
         return flow.step()
-    except SolveFailed as error:
-        where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
+    except (ArithmeticError, SolveFailed, StepCollapsed) as error:
+        if flow.solver.flaw is not None:
+            raise SchemeBroke(f"{where}: {flow.solver.flaw} ({type(error).__name__}: {error})") from error
+        if not isinstance(error, SolveFailed):
+            raise
         raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
 
 

@@ -68,6 +68,10 @@ class StepSolver(Protocol):
     def keeps_time(self) -> bool:
         """Whether a motion takes its physical time; else only where it leads to counts."""
 
+    @property
+    def flaw(self) -> str | None:
+        """Why the scheme itself breaks, for the message when it does; None where it holds."""
+
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""
 

@@ -16,6 +16,7 @@ from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, Osc
 SCHEMES = {
     "energy": "minimum energy of the tracked surface at constant volume",
     "inertia": "moving tetrahedra, second order in space and time; cost of the maximum number of steps",
+    "ispg": "Galerkin form of the paper's method, second order in time; cost of the maximum number of steps",
     "gripc": "pressure correction of Hu et al., for comparison only; its steps are not part of the predicted cost",
 }
 
@@ -81,7 +82,7 @@ def _of_drops(case: DropsCase) -> SolderForecast:
 
 
 def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SolderForecast:
-    from reflowshock.particles.parameters.estimate import inertial_seconds
+    from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
     from reflowshock.particles.steps.time_step import capillary_limit
 
     solder = case.molten
@@ -89,9 +90,11 @@ def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, 
     limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
     largest = numerics.time_step_limit * limit
     scheme: str = numerics.scheme
+    steps = min(numerics.max_steps, ceil(solder.process_time / largest))
     if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
-        steps = min(numerics.max_steps, ceil(solder.process_time / largest))
         scheme, seconds = "inertia", inertial_seconds(particles, steps)
+    if scheme == "ispg":
+        seconds = ispg_seconds(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
     return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
 

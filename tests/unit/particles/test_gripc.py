@@ -12,10 +12,13 @@ from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure, viscous_pressure
 from reflowshock.particles.ispg.projection import Poisson, Velocities, correct_pressure, smooth, solve_gmres
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.scenes.reflow import start_flow
+from reflowshock.particles.steps.rest import SchemeBroke, StopRule, run_to_rest
 from reflowshock.particles.surface.contact_line import ContactLine
 
 
@@ -98,6 +101,20 @@ def test_plates_that_move_are_refused(box):
     physics = Physics((), (Mass(1.0),), (), (), (), (PlateMotion.__new__(PlateMotion),))
     with pytest.raises(ValueError, match="plates at rest"):
         GripcStep("quadratic").prepare(body, physics, neighbours)
+
+
+def test_the_end_of_the_printed_scheme_says_why(monkeypatch):
+    """Whatever it breaks with, such as a division by zero; the errors of other schemes stay as they are."""
+    solder = Solder(volume=1e-9, numerics=SolderNumerics(scheme="gripc", time_step_limit=0.5))
+    effects = {"gravity": False, "inertia": True, "viscosity": True, "surface_tension": True, "wall_adhesion": False}
+    printed = start_flow(box_cloud(1e-3, 5), solder, effects, ())
+    other = start_flow(box_cloud(1e-3, 5), Solder(volume=1e-9), effects, ())
+    for flow in (printed, other):
+        monkeypatch.setattr(flow, "step", lambda: 1 // 0)
+    with pytest.raises(SchemeBroke, match=r"step 1 at time 0 s: .*strong form.*\"ispg\".*ZeroDivisionError"):
+        run_to_rest(printed, StopRule(10, 1e-6, 1.0))
+    with pytest.raises(ZeroDivisionError):
+        run_to_rest(other, StopRule(10, 1e-6, 1.0))
 
 
 def test_walls_let_fluid_slip(box):

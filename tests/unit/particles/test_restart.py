@@ -94,10 +94,18 @@ def flow_of(scheme, limit):
     return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7), solder
 
 
-def flow_as_printed(checkpoint):
-    flow, run = flow_to_rest(*flow_of("gripc", 0.5), checkpoint=checkpoint)
+def flow_with(scheme, limit, checkpoint):
+    flow, run = flow_to_rest(*flow_of(scheme, limit), checkpoint=checkpoint)
     assert len(run.records) > 8
     return [flow.body.points, flow.body.velocity, flow.body.pressure, run.history(1.0)["energy"]]
+
+
+def flow_as_printed(checkpoint):
+    return flow_with("gripc", 0.5, checkpoint)
+
+
+def flow_in_galerkin_form(checkpoint):
+    return flow_with("ispg", 0.5, checkpoint)
 
 
 def swing(checkpoint):
@@ -115,7 +123,7 @@ def merge(checkpoint):
     return [drop.flow.body.points for drop in drops]
 
 
-@pytest.mark.parametrize("run", [settle, follow, carry, stand, flow_as_printed, swing, merge])
+@pytest.mark.parametrize("run", [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, swing, merge])
 def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):
@@ -151,8 +159,13 @@ def start_drop(scheme, limit):
 
 @pytest.mark.parametrize(
     "begin",
-    [lambda: start_joint(JOINT, SOLDER)[0], lambda: start_drop("energy", 20), lambda: start_drop("gripc", 0.5)],
-    ids=["relaxation", "inertial", "gripc"],
+    [
+        lambda: start_joint(JOINT, SOLDER)[0],
+        lambda: start_drop("energy", 20),
+        lambda: start_drop("ispg", 2.0),
+        lambda: start_drop("gripc", 0.5),
+    ],
+    ids=["relaxation", "inertial", "ispg", "gripc"],
 )
 def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
     """Whatever a flow, its solver or what acts on it may remember from now on must be saved, too."""

@@ -52,9 +52,12 @@ BAD_VALUES = {
     "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
     "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
-    "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, gripc", "did you mean gripc?"]),
+    "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, ispg, gripc", "did you mean gripc?"]),
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
     "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
+    "ispg without inertia": (DROP, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "without inertia", "energy"]),
+    "ispg of a joint": (JOINT, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "not verified for joints"]),
+    "ispg of two drops": (PAIR, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "not verified for two drops"]),
     "no surface tension": (JOINT, "solder.effects.surface_tension=off", ["effects.surface_tension", "to rest"]),
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
@@ -192,6 +195,23 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
     assert read_case(DROP).molten.numerics.scheme == "energy"
     asked = ["solder.numerics.scheme=gripc", "solder.numerics.time_step_limit=0.5"]
     assert read_case(DROP, asked).molten.numerics.scheme == "gripc"
+
+
+@pytest.mark.parametrize(
+    ("setting", "place"),
+    [
+        ("drop.pad_radius=0.5 mm", "pads"),
+        ("drop.symmetry=half", "planes of symmetry"),
+        ("drop.contact_angle=148 deg", "contact angles outside 60 deg to 120 deg"),
+        ("solder.wall=no-slip", "free slip only"),
+        ("drop={volume='1 mm^3'}", "free drops"),
+        ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
+    ],
+)
+def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
+    assert place in problems_of(DROP, *asked, setting)
 
 
 def test_motion_that_matters_costs_all_steps_allowed():

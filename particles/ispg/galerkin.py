@@ -1,0 +1,133 @@
+"""Space of the Galerkin scheme: linear MLS of the velocity, direct nodal integration, walls mirrored.
+
+Coefficients of a velocity are even along a wall and odd across it, so that nothing passes a wall. The operators act
+without being assembled; the transposed of each is made of the same weights, so that what a force does to coefficients
+is the virtual power of the velocity that they give, to rounding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.ispg import galerkin_kernels as kernels
+from reflowshock.particles.ispg.collocation import Ghosts, mirror
+from reflowshock.particles.ispg.mls import DegenerateStencil
+from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
+
+# Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
+REACHES = (2.6, 3.4, 4.4)
+# Of a particle's volume: the least that its coefficient carries.
+SMALLEST_CARRIED = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Galerkin:
+    """Shape functions at n particles and the volumes that stand for integrals.
+
+    Attributes:
+        volumes: `(n,)` of the particles as points of integration [m^3].
+        carried: `(n,)` that the coefficients carry: row sums of the mass matrix, over the density [m^3].
+        starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
+        ghosts: g images of the particles at the walls.
+    """
+
+    volumes: Floats
+    carried: Floats
+    starts: NDArray[np.int64]
+    columns: NDArray[np.int32]
+    weights: Floats
+    ghosts: Ghosts
+
+    @classmethod
+    def of(cls, body: Body) -> "Galerkin":
+        """Fit the shape functions at the particles of a body.
+
+        Raises:
+            DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
+            NoVolumes: the particles do not fill the body.
+        """
+        count, spacing = len(body.points), body.cloud.spacing
+        planes = [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in body.cloud.symmetry]
+        for reach in REACHES:
+            ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing)
+            points = np.concatenate((body.points, ghosts.points))
+            lists = find_neighbours(points, reach * spacing)
+            squares, lengths = kernels.supports(count, points, (*lists, reach * spacing), spacing)
+            if (squares > 0.0).all():
+                break
+        _check(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
+        starts = np.concatenate(([0], np.cumsum(lengths)))
+        shares = cell_share(body)
+        shares = np.concatenate((shares, shares[ghosts.source]))
+        columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
+        _check(body, density > 0.0, "has all its neighbours in a plane")
+        shape = sparse.csr_matrix((weights[:, 0], columns, starts), shape=(count, len(points)))
+        origin = np.concatenate((np.arange(count), ghosts.source))
+        volumes = nodal_volumes(body, density)
+        carried = np.bincount(origin, shape.T @ volumes).astype(float)
+        # Where a surface is stretched, weights of MLS are negative; a row sum that is no mass gives way to a small one.
+        carried = np.maximum(carried, SMALLEST_CARRIED * volumes)
+        return cls(volumes, carried * (volumes.sum() / carried.sum()), starts, columns, weights, ghosts)
+
+    def averages(self, coefficients: Floats) -> Floats:
+        """Values at the particles `(n,)` of a scalar that is even at the walls."""
+        count, origin = len(self.volumes), np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))
+        shape = sparse.csr_matrix((self.weights[:, 0], self.columns, self.starts), shape=(count, len(origin)))
+        return shape @ coefficients[origin]
+
+    def values(self, field: Floats) -> tuple[Floats, Floats]:
+        """Velocity `(n, 3)` [m/s] and its gradient `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, of coefficients."""
+        return kernels.velocity_and_gradient(self.starts, self.columns, self.weights, self._with_images(field))
+
+    def load(self, force: Floats, stress: Floats) -> Floats:
+        """Forces `(n, 3)` [N] on coefficients of forces `(n, 3)` [N] and stresses times volume `(n, 3, 3)` [N m]."""
+        result = self._nothing()
+        kernels.forces_of(self.starts, self.columns, self.weights, (force, stress), result)
+        return self._folded(result)
+
+    def divergence(self, field: Floats) -> Floats:
+        """Divergence of coefficients at the particles `(n,)` [1/s]."""
+        return kernels.divergence(self.starts, self.columns, self.weights, self._with_images(field))
+
+    def divergence_load(self, factor: Floats) -> Floats:
+        """The transposed of `divergence`: forces on the coefficients `(n, 3)` of factors `(n,)` [N m]."""
+        result = self._nothing()
+        kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
+        return self._folded(result)
+
+    def divergence_rows(self) -> sparse.csr_matrix:
+        """Rows of `divergence` as a matrix `(n, 3 n)`, coefficients by particle."""
+        count = len(self.starts) - 1
+        columns = (3 * self.columns[:, None] + np.arange(3, dtype=np.int32)).ravel()
+        size = 3 * (count + len(self.ghosts.source))
+        rows = sparse.csr_matrix((self.weights[:, 1:].ravel(), columns, 3 * self.starts), shape=(count, size))
+        return rows @ self._reflection(count)
+
+    def _reflection(self, count: int) -> sparse.csr_matrix:
+        """Extension of coefficients by their images, `(3 (n + g), 3 n)`."""
+        blocks = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), self.ghosts.reflection))
+        source = np.concatenate((np.arange(count), self.ghosts.source))
+        starts = np.arange(len(source) + 1)
+        return sparse.bsr_matrix((blocks, source, starts), shape=(3 * len(source), 3 * count)).tocsr()
+
+    def _with_images(self, field: Floats) -> Floats:
+        return kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
+
+    def _folded(self, forces: Floats) -> Floats:
+        return kernels.folded(forces, self.ghosts.source, self.ghosts.reflection)
+
+    def _nothing(self) -> Floats:
+        return np.zeros((len(self.starts) - 1 + len(self.ghosts.source), 3))
+
+
+def _check(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
+    if not sound.all():
+        worst = int(np.argmin(sound))
+        place = ", ".join(f"{coordinate:.4g}" for coordinate in body.points[worst])
+        raise DegenerateStencil(f"particle {worst} at ({place}) m {trouble}")

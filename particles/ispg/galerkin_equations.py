@@ -1,0 +1,173 @@
+"""Linear equations of a step of the Galerkin scheme: predicted velocity, then its projection.
+
+    (M/dt + V + S + dt N^T K N) v* = M v_n/dt + N^T f + B^T p
+    dt B M^-1 B^T phi = g - B v*,     v = v* + dt M^-1 B^T phi,     p_new = p + phi - mu div v*
+
+M is the lumped mass, row sums of N^T m N; V is viscosity (2 mu D : D), K implicit surface tension, S the smoothing. The
+rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface. They
+add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
+uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces N^T f
+of an energy of particles that move with N v, no mode of the linearised scheme grows. The gradient that is collocated,
+as printed, has modes that do.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+
+# Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
+NEGLIGIBLE = 1e-9
+MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Fluid:
+    """What the liquid is made of, and how fast velocities that the shape functions do not show die away.
+
+    Attributes:
+        density: [kg/m^3].
+        viscosity: [Pa s].
+        smoothing: rate [1/s].
+    """
+
+    density: float
+    viscosity: float
+    smoothing: float
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """Power that a velocity loses [W]: to viscosity, to smoothing."""
+
+    viscous: float
+    smoothing: float
+
+
+@dataclass(frozen=True, slots=True)
+class GalerkinEquations:
+    """The equations of a body at its current positions; fields of vectors are `(n, 3)`.
+
+    Attributes:
+        space: shape functions and volumes.
+        fluid: its density, viscosity and smoothing.
+        basis: `(3 n, d)` admissible coefficients, orthonormal columns, by particle.
+        stiffness: `(n, n)` of the surface tension, gamma K [N/m].
+        unbalanced: `(n, 3)` rate of the body's volume by the coefficients, less that of all volumes [m^2].
+        spacing: of the particles [m].
+        time_step: [s].
+    """
+
+    space: Galerkin
+    fluid: Fluid
+    basis: sparse.csr_matrix
+    stiffness: sparse.csr_matrix
+    unbalanced: Floats
+    spacing: float
+    time_step: float
+
+    @property
+    def masses(self) -> Floats:
+        """Of the coefficients, `(n,)` [kg]."""
+        return self.fluid.density * self.space.carried
+
+    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
+        """Coefficients v* [m/s] under the last pressure.
+
+        Args:
+            velocity: coefficients that the step starts with, `(n, 3)` [m/s].
+            force: on the particles at the end of the step, were they at rest, `(n, 3)` [N].
+            pressure: at the particles, `(n,)` [Pa].
+
+        Raises:
+            SolveFailed: the linear solve failed.
+        """
+        space, basis, impulse = self.space, self.basis, (self.masses / self.time_step)[:, None]
+        load = impulse * velocity + self.push(pressure) + space.load(force, np.zeros((len(force), 3, 3)))
+        mean = NEGLIGIBLE * self.spacing * float(impulse.mean()) / self.time_step
+        inverse = self.time_step * self._inverse_masses()
+        solution, _ = conjugate_gradients(
+            lambda free: basis.T @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
+            basis.T @ load.ravel(),
+            basis.T @ velocity.ravel(),
+            lambda residual: inverse * residual,
+            Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
+        )
+        return (basis @ solution).reshape(-1, 3)
+
+    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
+        """Coefficients v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].
+
+        Args:
+            start: predicted coefficients v*, `(n, 3)` [m/s].
+            rate: of the body's volume [m^3/s].
+            factors: of an earlier pressure equation.
+
+        Raises:
+            SolveFailed: the linear solve failed.
+        """
+        space, basis = self.space, self.basis
+        inverse = self.time_step * self._inverse_masses()
+        divergence = self.constraint(start)
+
+        def accelerated(pressure: Floats) -> Floats:
+            return (basis @ (inverse * (basis.T @ self.push(pressure).ravel()))).reshape(-1, 3)
+
+        def matrix() -> sparse.csr_matrix:
+            rows = (sparse.diags(space.volumes) @ space.divergence_rows() @ basis).tocsr()
+            return (rows @ sparse.diags(inverse) @ rows.T).tocsr()
+
+        missing = rate * space.volumes / space.volumes.sum() - divergence
+        enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        potential = factors.solve(
+            lambda pressure: self.constraint(accelerated(pressure)),
+            matrix,
+            missing,
+            Tolerance(VOLUME_TOLERANCE, enough),
+        )
+        change = potential - self.fluid.viscosity * divergence / space.volumes
+        return start + accelerated(potential), change
+
+    def _inverse_masses(self) -> Floats:
+        """Of the admissible coefficients, `(d,)` [1/kg]: each is one particle's."""
+        return np.asarray(self.basis.multiply(self.basis).T @ np.repeat(1.0 / self.masses, 3)).ravel()
+
+    def operator(self, field: Floats) -> Floats:
+        """M/dt + V + S + dt N^T K N of coefficients, [N]."""
+        velocity, gradient = self.space.values(field)
+        friction = self._friction(field - velocity)
+        inertia = (self.masses / self.time_step)[:, None] * field
+        tension = self.time_step * (self.stiffness @ velocity)
+        return inertia + friction + self.space.load(tension - friction, self._stress(gradient))
+
+    def constraint(self, field: Floats) -> Floats:
+        """B v: rates of volume `(n,)` [m^3/s]."""
+        volumes = self.space.volumes
+        return volumes * (self.space.divergence(field) + (self.unbalanced * field).sum() / volumes.sum())
+
+    def push(self, pressure: Floats) -> Floats:
+        """B^T p, [N]."""
+        parts = self.space.volumes * pressure
+        return self.space.divergence_load(parts) + parts.sum() / self.space.volumes.sum() * self.unbalanced
+
+    def losses(self, field: Floats) -> Losses:
+        """What coefficients lose."""
+        velocity, gradient = self.space.values(field)
+        rough = field - velocity
+        return Losses(
+            viscous=float((self._stress(gradient) * gradient).sum()),
+            smoothing=float((self._friction(rough) * rough).sum()),
+        )
+
+    def _stress(self, gradient: Floats) -> Floats:
+        """Viscous stress times volume `(n, 3, 3)` [N m]."""
+        factor = self.fluid.viscosity * self.space.volumes
+        return factor[:, None, None] * (gradient + gradient.transpose(0, 2, 1))
+
+    def _friction(self, rough: Floats) -> Floats:
+        """Resistance to velocities `(n, 3)` that the shape functions do not show [N]."""
+        return (self.fluid.smoothing * self.masses)[:, None] * rough

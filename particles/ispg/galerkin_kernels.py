@@ -1,0 +1,239 @@
+"""Kernels of the Galerkin scheme: linear MLS shape functions with their derivatives, and what is summed over them.
+
+Columns are particles and, after them, their images at the walls. A row has its weights side by side, (psi, psi,x psi,y
+psi,z) of a pair: sums over a row or, transposed, over a column touch each pair once. Sums run in one order whatever the
+number of threads.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from reflowshock.particles.ispg.mls_weights import factor_spd, substitute
+
+# Support radius in spacings; but the 16th neighbour lies within 1 / 1.2 of it: four must not lie in a plane.
+SUPPORT, FEWEST, WIDER = 2.0, 16, 1.2
+
+
+@njit(cache=True, parallel=True)
+def supports(count, points, lists, spacing):
+    """Square of the support radius of each of the first `count` points, and the number of points within it.
+
+    The radius is zero where the lists, which reach `lists[2]`, do not hold enough points.
+    """
+    offsets, indices, reach = lists
+    squares, lengths = np.zeros(count), np.zeros(count, np.int64)
+    for i in prange(count):
+        first, last = offsets[i], offsets[i + 1]
+        distances = np.empty(last - first)
+        near = 0
+        for k in range(first, last):
+            j, square = indices[k], 0.0
+            for d in range(3):
+                square += (points[j, d] - points[i, d]) ** 2
+            distances[k - first] = square
+            near += square < (SUPPORT / WIDER * spacing) ** 2
+        support = (SUPPORT * spacing) ** 2
+        if near < FEWEST:
+            support = 0.0
+            if last - first >= FEWEST:
+                support = WIDER**2 * np.partition(distances, FEWEST - 1)[FEWEST - 1]
+                support = max(support, (SUPPORT * spacing) ** 2)
+        if support > reach**2:
+            support = 0.0
+        squares[i] = support
+        lengths[i] = 1 + (distances < support).sum()
+    return squares, lengths
+
+
+@njit(cache=True)
+def _offset(points, pair, support, basis):
+    """Linear basis of a pair (written), offsets in units of the support; square of the distance."""
+    i, j = pair
+    square = 0.0
+    basis[0] = 1.0
+    for d in range(3):
+        basis[1 + d] = (points[j, d] - points[i, d]) / support
+        square += basis[1 + d] * basis[1 + d]
+    return square
+
+
+@njit(cache=True)
+def _moments(points, row, support, moments, basis):
+    """Moment matrix and its three derivatives by the position of the row's particle, lower triangles."""
+    i, columns = row
+    moments[:] = 0.0
+    for j in columns:
+        rest = 1.0 - _offset(points, (i, j), support, basis)
+        weight, slope = rest * rest * rest, 6.0 * rest * rest
+        for a in range(4):
+            for b in range(a + 1):
+                product = basis[a] * basis[b]
+                moments[0, a, b] += weight * product
+                product *= slope
+                moments[1, a, b] += product * basis[1]
+                moments[2, a, b] += product * basis[2]
+                moments[3, a, b] += product * basis[3]
+
+
+@njit(cache=True)
+def _coefficients(moments, right):
+    """B and b,x b,y b,z, columns of `right` (4, 4); M b = (1, 0, 0, 0), M b,c = e_c - M,c b. False if M is singular."""
+    if not factor_spd(moments[0], 4):
+        return False
+    right[:, :] = 0.0
+    right[0, 0] = 1.0
+    first = right[:, :1]
+    substitute(moments[0], first, 4)
+    for c in range(3):
+        for a in range(4):
+            total = 0.0
+            for b in range(4):
+                total += (moments[1 + c, a, b] if b <= a else moments[1 + c, b, a]) * right[b, 0]
+            right[a, 1 + c] = -total
+        right[1 + c, 1 + c] += 1.0
+    rest = right[:, 1:]
+    substitute(moments[0], rest, 4)
+    return True
+
+
+@njit(cache=True, parallel=True)
+def shape_rows(points, lists, squares, starts, shares):
+    """Columns and weights `(k, 4)` of all rows, and the density of particles `(count,)` [1/m^3].
+
+    The density counts each point by its share `(n + g,)`, without a constant factor; it is zero where the moment matrix
+    of a row is singular.
+    """
+    offsets, indices = lists
+    count = squares.shape[0]
+    columns, weights = np.empty(starts[count], np.int32), np.empty((starts[count], 4))
+    density = np.zeros(count)
+    for i in prange(count):
+        support, at = np.sqrt(squares[i]), starts[i]
+        basis, moments, right = np.empty(4), np.empty((4, 4, 4)), np.empty((4, 4))
+        columns[at] = i
+        for k in range(offsets[i], offsets[i + 1]):
+            square = 0.0
+            for d in range(3):
+                square += (points[indices[k], d] - points[i, d]) ** 2
+            if square < squares[i]:
+                at += 1
+                columns[at] = indices[k]
+        own = columns[starts[i] : starts[i + 1]]
+        _moments(points, (i, own), support, moments, basis)
+        if not _coefficients(moments, right):
+            continue
+        for k in range(starts[i], starts[i + 1]):
+            rest = 1.0 - _offset(points, (i, columns[k]), support, basis)
+            density[i] += shares[columns[k]] * rest * rest * rest / support**3
+            value = 0.0
+            for a in range(4):
+                value += basis[a] * right[a, 0]
+            weights[k, 0] = value * rest * rest * rest
+            for c in range(3):
+                slope = 0.0
+                for a in range(4):
+                    slope += basis[a] * right[a, 1 + c]
+                weights[k, 1 + c] = (slope * rest + 6.0 * value * basis[1 + c]) * rest * rest / support
+    return columns, weights, density
+
+
+@njit(cache=True)
+def velocity_and_gradient(starts, columns, weights, field):
+    """Velocity `(n, 3)` and velocity gradient `(n, 3, 3)`, [i, c, d] = d v_c / d x_d, of coefficients `(n + g, 3)`."""
+    count = starts.shape[0] - 1
+    velocity, gradient = np.empty((count, 3)), np.empty((count, 3, 3))
+    for i in range(count):
+        u0 = u1 = u2 = g00 = g01 = g02 = g10 = g11 = g12 = g20 = g21 = g22 = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j, w = columns[k], weights[k]
+            w0, wx, wy, wz = w[0], w[1], w[2], w[3]
+            x, y, z = field[j, 0], field[j, 1], field[j, 2]
+            u0 += w0 * x
+            u1 += w0 * y
+            u2 += w0 * z
+            g00 += wx * x
+            g01 += wy * x
+            g02 += wz * x
+            g10 += wx * y
+            g11 += wy * y
+            g12 += wz * y
+            g20 += wx * z
+            g21 += wy * z
+            g22 += wz * z
+        velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
+        gradient[i, 0, 0], gradient[i, 0, 1], gradient[i, 0, 2] = g00, g01, g02
+        gradient[i, 1, 0], gradient[i, 1, 1], gradient[i, 1, 2] = g10, g11, g12
+        gradient[i, 2, 0], gradient[i, 2, 1], gradient[i, 2, 2] = g20, g21, g22
+    return velocity, gradient
+
+
+@njit(cache=True)
+def forces_of(starts, columns, weights, loads, result):
+    """Add the transposed: forces on coefficients `(n + g, 3)` of forces `(n, 3)` and stresses `(n, 3, 3)`."""
+    force, stress = loads
+    for i in range(starts.shape[0] - 1):
+        f0, f1, f2 = force[i, 0], force[i, 1], force[i, 2]
+        s = stress[i]
+        s00, s01, s02 = s[0, 0], s[0, 1], s[0, 2]
+        s10, s11, s12 = s[1, 0], s[1, 1], s[1, 2]
+        s20, s21, s22 = s[2, 0], s[2, 1], s[2, 2]
+        for k in range(starts[i], starts[i + 1]):
+            j, w = columns[k], weights[k]
+            w0, wx, wy, wz = w[0], w[1], w[2], w[3]
+            result[j, 0] += w0 * f0 + wx * s00 + wy * s01 + wz * s02
+            result[j, 1] += w0 * f1 + wx * s10 + wy * s11 + wz * s12
+            result[j, 2] += w0 * f2 + wx * s20 + wy * s21 + wz * s22
+
+
+@njit(cache=True)
+def divergence(starts, columns, weights, field):
+    """Divergence `(n,)` of coefficients `(n + g, 3)`."""
+    count = starts.shape[0] - 1
+    result = np.empty(count)
+    for i in range(count):
+        total = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j, w = columns[k], weights[k]
+            total += w[1] * field[j, 0] + w[2] * field[j, 1] + w[3] * field[j, 2]
+        result[i] = total
+    return result
+
+
+@njit(cache=True)
+def divergence_transposed(starts, columns, weights, factor, result):
+    """Add the transposed of `divergence` to forces `(n + g, 3)`."""
+    for i in range(starts.shape[0] - 1):
+        f = factor[i]
+        if f != 0.0:
+            for k in range(starts[i], starts[i + 1]):
+                j, w = columns[k], weights[k]
+                result[j, 0] += f * w[1]
+                result[j, 1] += f * w[2]
+                result[j, 2] += f * w[3]
+
+
+@njit(cache=True)
+def reflected(field, source, reflection):
+    """A vector field `(n, 3)` with its images `(n + g, 3)`."""
+    count = field.shape[0]
+    result = np.empty((count + source.shape[0], 3))
+    result[:count] = field
+    for g in range(source.shape[0]):
+        for c in range(3):
+            total = 0.0
+            for d in range(3):
+                total += reflection[g, c, d] * field[source[g], d]
+            result[count + g, c] = total
+    return result
+
+
+@njit(cache=True)
+def folded(forces, source, reflection):
+    """Forces `(n, 3)` of those on the particles and their images `(n + g, 3)`: the transposed of `reflected`."""
+    count = forces.shape[0] - source.shape[0]
+    result = forces[:count].copy()
+    for g in range(source.shape[0]):
+        for d in range(3):
+            for c in range(3):
+                result[source[g], d] += reflection[g, c, d] * forces[count + g, c]
+    return result

@@ -1,0 +1,302 @@
+"""ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, with BDF2 in time.
+
+A particle moves with the velocity N v that the shape functions show at it, and carries the momentum of its coefficient
+v; between steps nothing is interpolated. What evening out and the shift of particles below the surface displace takes
+the velocity there. The smoothing is part of the equations: a friction on v - N v, which vanishes for linear velocities,
+so that momentum and angular momentum stay; it acts at the rate at which the capillary waves of the grid swing, whatever
+the time step.
+
+As in `inertial_step`, forces and operators are taken at predicted positions, and the implicit surface tension acts on
+the change of the velocity only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.data_file import fields_of
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin_equations import Fluid, GalerkinEquations
+from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
+from reflowshock.particles.physics.forces import SurfaceTension
+from reflowshock.particles.physics.operators import Mass, Viscosity
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.step_equations import Admissible
+from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
+
+SUPPORT = 1.5
+# Of the frequency sqrt(gamma / (rho h^3)).
+SMOOTHING = 1.0
+# Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """Energies that a flow has lost [J].
+
+    Attributes:
+        viscous: to viscosity.
+        smoothing: to the smoothing of velocities.
+        integration: to the time integration.
+        transfer: to the shift of particles, which take the velocity where they come.
+    """
+
+    viscous: float = 0.0
+    smoothing: float = 0.0
+    integration: float = 0.0
+    transfer: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """All of them."""
+        return self.viscous + self.smoothing + self.integration + self.transfer
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What the last step left.
+
+    Attributes:
+        points: `(n, 3)` where it took the particles [m].
+        coefficients: `(n, 3)` of the velocity [m/s].
+        gradient: `(n, 3, 3)` of the velocity at the particles [1/s].
+        masses: `(n,)` of the coefficients [kg].
+        pressure: `(n,)` coefficients [Pa].
+        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s]; None before the first step.
+        history: its displacement and change of the coefficients.
+        losses: of all steps.
+    """
+
+    points: Floats
+    coefficients: Floats
+    gradient: Floats
+    masses: Floats
+    pressure: Floats
+    momenta: Floats | None
+    history: BackwardDifference
+    losses: Losses
+
+    @classmethod
+    def start(cls, body: Body, losses: Losses | None = None) -> "Past":
+        """A body that starts with its velocity."""
+        count = len(body.points)
+        start = BackwardDifference.start(count)
+        slope, masses = np.zeros((count, 3, 3)), np.zeros(count)
+        return cls(body.points, body.velocity, slope, masses, body.pressure, None, start, losses or Losses())
+
+    def kinetic_energy(self) -> float:
+        """Of the coefficients [J]."""
+        return 0.5 * float(self.masses @ (self.coefficients**2).sum(axis=1))
+
+    def carried_on(self, body: Body, physics: Physics) -> "Past":
+        """The past of particles that are now elsewhere: they have the velocity there."""
+        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
+        moved = replace(self, points=body.points, coefficients=physics.admit(body, self.coefficients + change))
+        lost = self.kinetic_energy() - moved.kinetic_energy()
+        return replace(moved, losses=replace(self.losses, transfer=self.losses.transfer + lost))
+
+
+@dataclass(slots=True)
+class IspgStep:
+    """The Galerkin scheme with memory of the last step.
+
+    Attributes:
+        past: what the last step left, None before the first.
+        first_energy: of the forces before the first step [J].
+        factors: of the pressure equation.
+    """
+
+    past: Past | None = None
+    first_energy: float = 0.0
+    factors: LaggedCholesky = field(default_factory=LaggedCholesky)
+
+    @property
+    def support(self) -> float:
+        """Radius of the neighbour list, in spacings: what the shift of the particles needs."""
+        return SUPPORT
+
+    @property
+    def smoothing_passes(self) -> int:
+        """How often the triangles are evened out after a step: the liquid takes them along."""
+        return 1
+
+    @property
+    def descends(self) -> bool:
+        """No: the energy that falls is one of the surface and of the velocities."""
+        return False
+
+    @property
+    def keeps_time(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def flaw(self) -> None:
+        """None."""
+        return None
+
+    def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
+        """Carry the velocity to where the particles are now; without inertia it is zero."""
+        if self.past is None:
+            self.past, self.first_energy = Past.start(body), physics.energy(body)
+        elif not physics.momenta:
+            body.velocity = np.zeros_like(body.velocity)
+            self.past = Past.start(body, self.past.losses)
+        else:
+            self.past = self.past.carried_on(body, physics)
+        return PreparedIspgStep(self, body, physics, self.past)
+
+    def saved(self) -> dict[str, Any]:
+        """What it remembers of earlier steps, for a checkpoint."""
+        past = self.past
+        kept = past and fields_of(past) | {"history": fields_of(past.history), "losses": fields_of(past.losses)}
+        return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        past = saved["past"]
+        if past:
+            history, losses = BackwardDifference(**past["history"]), Losses(**past["losses"])
+            past = Past(**{**past, "history": history, "losses": losses})
+        self.past, self.first_energy = past, saved["first_energy"]
+        self.factors.restore(saved["factors"])
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedIspgStep:
+    """A step from the body's current positions.
+
+    Attributes:
+        solver: remembers the step.
+        body: the liquid body.
+        physics: what acts on it.
+        past: of the particles where they are now.
+    """
+
+    solver: IspgStep
+    body: Body
+    physics: Physics
+    past: Past
+
+    def solve(self, time_step: float, volume: float) -> Motion:
+        """Return the motion in a time step [s] that ends at a volume [m^3].
+
+        Raises:
+            SolveFailed: a linear solve failed.
+            DegenerateStencil: a particle has too few neighbours.
+            NoVolumes: the particles do not fill the body.
+        """
+        body, past = self.body, self.past
+        base = past.history.base(body.points, past.coefficients, time_step)
+        guess = self._guess(base)
+        predicted = replace(body, points=base.points + base.time_step * guess)
+        enclosed, slope = predicted.volume()
+        equations = self.equations(predicted, base.time_step)
+        lost = self._lost_momentum(equations.masses)
+        past, base = replace(past, coefficients=past.coefficients + lost), replace(base, velocity=base.velocity + lost)
+        force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
+        pressure = past.pressure
+        start = equations.predict(base.velocity, force, pressure)
+        rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
+        coefficients, change = equations.project(start, rate, self.solver.factors)
+        pressure = pressure + change
+        velocity, gradient = equations.space.values(coefficients)
+        points = base.points + base.time_step * velocity
+        momenta = rigid_momenta(rigid_motions(points), equations.masses, coefficients)
+        history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
+        losses = self._losses(equations, base, coefficients, time_step)
+        self.solver.past = Past(points, coefficients, gradient, equations.masses, pressure, momenta, history, losses)
+        return Motion(
+            velocity=velocity,
+            transport=history.displacement / time_step,
+            pressure=equations.space.averages(pressure),
+            surface_pressure=float(pressure @ equations.space.volumes / equations.space.volumes.sum()),
+            twists={},
+            iterations=self.solver.factors.iterations,
+        )
+
+    def _lost_momentum(self, masses: Floats) -> Floats:
+        """Velocity `(n, 3)` [m/s] that gives back the momenta of the last step along rigid motions that walls admit.
+
+        Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
+        """
+        body, momenta = self.body, self.past.momenta
+        motions = rigid_motions(body.points)
+        admitted = [
+            np.allclose(self.physics.admit(body, motion), motion, rtol=0.0, atol=ROUNDING * np.abs(motion).max())
+            for motion in motions
+        ]
+        if momenta is None or not any(admitted):
+            return np.zeros_like(body.points)
+        motions = motions[admitted]
+        missing = momenta[admitted] - rigid_momenta(motions, masses, self.past.coefficients)
+        inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions])
+        return np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
+
+    def _guess(self, base: Base) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
+        velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
+        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+        bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
+        return velocity if way <= bound else bound / way * velocity
+
+    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
+        """The equations of a body at other positions, for a time step [s]."""
+        space, spacing = Galerkin.of(body), body.cloud.spacing
+        tensions = [part for part in self.physics.operators if isinstance(part, SurfaceTension)]
+        density = sum(part.density for part in self.physics.operators if isinstance(part, Mass))
+        viscosity = sum(part.coefficient for part in self.physics.operators if isinstance(part, Viscosity))
+        coefficient = sum(part.coefficient for part in tensions)
+        fluid = Fluid(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
+        basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
+        flux = space.load(body.volume()[1], np.zeros((len(body.points), 3, 3)))
+        nothing = sparse.csr_matrix((len(body.points),) * 2)
+        return GalerkinEquations(
+            space=space,
+            fluid=fluid,
+            basis=basis,
+            spacing=spacing,
+            stiffness=sum((part.stiffness(body) for part in tensions), nothing),
+            unbalanced=flux - space.divergence_load(space.volumes),
+            time_step=time_step,
+        )
+
+    def _losses(self, equations: GalerkinEquations, base: Base, coefficients: Floats, time_step: float) -> Losses:
+        """Those of all steps, this one included.
+
+        Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
+        """
+        before, last, now = self.past.losses, self.past.coefficients, equations.losses(coefficients)
+        change = time_step / base.time_step * (coefficients * (coefficients - base.velocity)).sum(axis=1)
+        kinetic = 0.5 * ((coefficients**2).sum(axis=1) - (last**2).sum(axis=1))
+        return replace(
+            before,
+            viscous=before.viscous + time_step * now.viscous,
+            smoothing=before.smoothing + time_step * now.smoothing,
+            integration=before.integration + float(equations.masses @ (change - kinetic)),
+        )
+
+
+def rigid_motions(points: Floats) -> Floats:
+    """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
+    axes = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
+    return np.array([*axes, *(np.cross(axis, points) for axis in axes)])
+
+
+def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
+    """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
+    return np.tensordot(motions, masses[:, None] * velocity, axes=2)
+
+
+def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A basis whose rows are ordered by component, with its rows ordered by particle."""
+    return basis[np.arange(basis.shape[0]).reshape(3, -1).T.ravel()]
