@@ -1,0 +1,52 @@
+"""Cost of a step of the scheme ispg against the number of particles: a cube of solder, values of the paper, 60 degrees.
+
+Run: OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (a minute; results/ispg.json)
+Seconds are those of the processor, over the first swing, where factors of the pressure equation age fastest.
+"""
+
+import json
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+from reflowshock.particles.core.cloud import box_cloud
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.scenes.reflow import contact_line, start_flow
+
+RESULTS = Path(__file__).parent / "results" / "ispg.json"
+EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": True, "viscosity": True}
+PER_EDGE = (6, 7, 9, 11)
+STEPS = 60
+
+
+def measure(count: int) -> dict[str, float]:
+    numerics = SolderNumerics(scheme="ispg", time_step_limit=20)
+    angle = float(np.radians(60))
+    solder = Solder(volume=1e-9, pad_contact_angle=angle, surface_tension=4.985, viscosity=0.227, numerics=numerics)
+    cloud = box_cloud(1e-3, count)
+    flow = start_flow(cloud, solder, EFFECTS, (contact_line(cloud, 0, np.inf, solder),))
+    flow.step()
+    start = process_time()
+    records = [flow.step() for _ in range(STEPS)]
+    seconds = (process_time() - start) / STEPS
+    particles = len(flow.body.points)
+    return {
+        "particles": particles,
+        "seconds_a_step": seconds,
+        "particle_steps_per_second": particles / seconds,
+        "iterations": float(np.mean([record.iterations for record in records])),
+    }
+
+
+def main() -> None:
+    measure(5)
+    rows = [measure(count) for count in PER_EDGE]
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(rows, indent=1))
+    for row in rows:
+        print("  ".join(f"{name} {value:.4g}" for name, value in row.items()))
+
+
+if __name__ == "__main__":
+    main()
