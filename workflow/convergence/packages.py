@@ -59,8 +59,8 @@ def _dropped(case: BoardDropCase) -> ConvergenceStudy:
     """Meshes; then what other couplings on the case's mesh lose.
 
     Where all is linear, meshes are varied by one model in implicit steps. One that yields or turns takes small explicit
-    steps everywhere: there two models vary them. All joints are fine as long as they are few. Coarse ones are tied to
-    boxes, and the softer the finer these are: with one fine joint among them, no figure converges with the mesh.
+    steps everywhere: there two models vary them. All joints are fine as long as they are few: coarse ones are tied to
+    boxes, and the softer the finer these are. Where masses are scaled to a step, this is as long as the elements are.
     """
     linear = _is_linear(case)
     whole = _one_model(case) if linear else _mostly_fine(case)
@@ -212,6 +212,9 @@ def _of_joints(case: BoardDropCase, size: float) -> dict[str, str]:
         settings |= {f"{key}.copper_layers": f"{_count(own.copper_layers, size)}"}
     if own.pad_layer is not None:
         settings |= {f"{key}.pad_layers": f"{_count(own.pad_layers, size)}"}
+    scaled = case.shock.numerics.mass_scaled_step
+    if scaled is not None:  # the same share of mass is added then; at one step it would grow with the mesh
+        settings |= {"shock.numerics.mass_scaled_step": from_si(size * scaled, "ns", digits=4)}
     return settings | _of_columns(case, size)
 
 
