@@ -197,6 +197,9 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
     assert read_case(DROP, asked).molten.numerics.scheme == "gripc"
 
 
+ISPG = ("drop.particles_per_edge=7", "solder.numerics.time_step_limit=20")
+
+
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
@@ -205,11 +208,13 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
         ("drop.contact_angle=148 deg", "contact angles outside 60 deg to 120 deg"),
         ("solder.wall=no-slip", "free slip only"),
         ("drop={volume='1 mm^3'}", "free drops"),
+        ("drop.particles_per_edge=11", "more than drop.particles_per_edge = 7"),
+        ("solder.numerics.time_step_limit=100", "time_step_limit above 20"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
 )
 def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
-    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG]
     assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(DROP, *asked, setting)
 
