@@ -192,10 +192,10 @@ def test_communicators_of_any_placement():
 
 def test_forecast_knows_placement_and_levels():
     plan = WindowPlan(1e-6, 20, 1000, 1)
-    two_scale, dns = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2, placement="shared"))
-    levels, _ = predict_seconds(1e5, [(9e3, 2), (1e3, 20)], plan, Ranks(total=2, placement="shared"))
+    two_scale, dns = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2, placement="shared"), at_once=False)
+    levels, _ = predict_seconds(1e5, [(9e3, 2), (1e3, 20)], plan, Ranks(total=2, placement="shared"), at_once=False)
     assert two_scale / dns == pytest.approx((1e5 / 4.3 + 2e5) / (20 * (1e5 / 4.3 + 1e4)), rel=0.1)
     assert levels < 0.4 * two_scale
-    apart, _ = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2, placement="disjoint"))
-    auto, _ = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2))
+    apart, _ = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2, placement="disjoint"), at_once=False)
+    auto, _ = predict_seconds(1e5, [(1e4, 20)], plan, Ranks(total=2), at_once=False)
     assert auto == min(apart, two_scale)
