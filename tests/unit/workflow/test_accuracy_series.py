@@ -146,7 +146,7 @@ def test_meshes_of_what_yields_are_varied_by_two_models():
     study = package_study(case_of("jedec_bga", "scale=quick"))
     runs = {run.name: run for run in study.runs}
     assert all(run.settings["shock.coupling.fine_joints"] == "all" for run in study.parameters[0].runs)
-    assert runs["all x 0.5"].settings["shock.numerics.mass_scaled_step"] == "4 ns"
+    assert runs["all x 0.5"].settings["shock.numerics.mass_scaled_step"] == "2 ns"
     assert {"1 fine", "3 fine", "1 fine: alone", "3 fine: alone"} <= runs.keys()
     assert "all fine" not in runs
     assert runs["one model: alone"].against == SAME_MESH
