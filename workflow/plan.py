@@ -33,7 +33,7 @@ class PlannedStage:
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
     """Return what a run would do with each stage, in order."""
-    seconds = stage_seconds(point.case)
+    seconds = corrected(point.case, stage_seconds(point.case))
     return {
         name: PlannedStage(state.stale, reason(state, point.case), seconds.get(name))
         for name, state in examine(store, point).items()

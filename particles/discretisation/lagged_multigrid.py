@@ -1,8 +1,6 @@
 """Conjugate gradients on a sequence of similar Laplacians, with the multigrid hierarchy of an earlier one."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
@@ -10,6 +8,7 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import SolveFailed, petsc
+from reflowshock.particles.discretisation.lagged_solver import LaggedSolver
 
 RELATIVE_TOLERANCE = 1e-6
 RESIDUAL_LIMIT = 1e-5
@@ -22,33 +21,8 @@ OPTIONS = {"pc_gamg_square_graph": 0, "pc_gamg_aggressive_coarsening": 0}
 
 
 @dataclass(slots=True)
-class LaggedMultigrid:
-    """Algebraic multigrid that is set up anew when its last use took many iterations.
-
-    It keeps the matrix that it was set up for, so that a run from a checkpoint continues with the same bits.
-
-    Attributes:
-        origin: matrix of the hierarchy.
-        iterations: of the last solve.
-    """
-
-    origin: sparse.csr_matrix | None = None
-    iterations: int = 0
-    _solver: PETSc.KSP | None = field(default=None, repr=False)
-
-    def saved(self) -> dict[str, Any]:
-        """All but the PETSc objects, for a checkpoint."""
-        origin = self.origin
-        rows = None if origin is None else {name: getattr(origin, name) for name in ("data", "indices", "indptr")}
-        return {"origin": rows, "iterations": self.iterations}
-
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
-        rows, self.iterations, self._solver = saved["origin"], saved["iterations"], None
-        self.origin = None
-        if rows is not None:
-            count = len(rows["indptr"]) - 1
-            self.origin = sparse.csr_matrix((rows["data"], rows["indices"], rows["indptr"]), shape=(count, count))
+class LaggedMultigrid(LaggedSolver):
+    """Algebraic multigrid that is set up anew when its last use took many iterations."""
 
     def solve(self, laplacian: sparse.csr_matrix, flux: Floats) -> tuple[Floats, int]:
         """Solve L phi = b.

@@ -26,7 +26,7 @@ MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class Fluid:
+class Flow:
     """What the liquid is made of, and how fast velocities that the shape functions do not show die away.
 
     Attributes:
@@ -41,7 +41,7 @@ class Fluid:
 
 
 @dataclass(frozen=True, slots=True)
-class Losses:
+class LostPower:
     """Power that a velocity loses [W]: to viscosity, to smoothing."""
 
     viscous: float
@@ -63,7 +63,7 @@ class GalerkinEquations:
     """
 
     space: Galerkin
-    fluid: Fluid
+    fluid: Flow
     basis: sparse.csr_matrix
     stiffness: sparse.csr_matrix
     unbalanced: Floats
@@ -154,11 +154,11 @@ class GalerkinEquations:
         parts = self.space.volumes * pressure
         return self.space.divergence_load(parts) + parts.sum() / self.space.volumes.sum() * self.unbalanced
 
-    def losses(self, field: Floats) -> Losses:
+    def losses(self, field: Floats) -> LostPower:
         """What coefficients lose."""
         velocity, gradient = self.space.values(field)
         rough = field - velocity
-        return Losses(
+        return LostPower(
             viscous=float((self._stress(gradient) * gradient).sum()),
             smoothing=float((self._friction(rough) * rough).sum()),
         )

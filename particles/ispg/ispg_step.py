@@ -22,7 +22,7 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.galerkin_equations import Fluid, GalerkinEquations
+from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, Viscosity
@@ -40,7 +40,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Losses:
+class LostEnergy:
     """Energies that a flow has lost [J].
 
     Attributes:
@@ -62,7 +62,7 @@ class Losses:
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class GalerkinPast:
     """What the last step left.
 
     Attributes:
@@ -83,21 +83,21 @@ class Past:
     pressure: Floats
     momenta: Floats | None
     history: BackwardDifference
-    losses: Losses
+    losses: LostEnergy
 
     @classmethod
-    def start(cls, body: Body, losses: Losses | None = None) -> "Past":
+    def start(cls, body: Body, losses: LostEnergy | None = None) -> "GalerkinPast":
         """A body that starts with its velocity."""
         count = len(body.points)
         start = BackwardDifference.start(count)
         slope, masses = np.zeros((count, 3, 3)), np.zeros(count)
-        return cls(body.points, body.velocity, slope, masses, body.pressure, None, start, losses or Losses())
+        return cls(body.points, body.velocity, slope, masses, body.pressure, None, start, losses or LostEnergy())
 
     def kinetic_energy(self) -> float:
         """Of the coefficients [J]."""
         return 0.5 * float(self.masses @ (self.coefficients**2).sum(axis=1))
 
-    def carried_on(self, body: Body, physics: Physics) -> "Past":
+    def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
         """The past of particles that are now elsewhere: they have the velocity there."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
         moved = replace(self, points=body.points, coefficients=physics.admit(body, self.coefficients + change))
@@ -115,7 +115,7 @@ class IspgStep:
         factors: of the pressure equation.
     """
 
-    past: Past | None = None
+    past: GalerkinPast | None = None
     first_energy: float = 0.0
     factors: LaggedCholesky = field(default_factory=LaggedCholesky)
 
@@ -147,10 +147,10 @@ class IspgStep:
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
         """Carry the velocity to where the particles are now; without inertia it is zero."""
         if self.past is None:
-            self.past, self.first_energy = Past.start(body), physics.energy(body)
+            self.past, self.first_energy = GalerkinPast.start(body), physics.energy(body)
         elif not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
-            self.past = Past.start(body, self.past.losses)
+            self.past = GalerkinPast.start(body, self.past.losses)
         else:
             self.past = self.past.carried_on(body, physics)
         return PreparedIspgStep(self, body, physics, self.past)
@@ -165,8 +165,8 @@ class IspgStep:
         """Continue from what `saved` returned."""
         past = saved["past"]
         if past:
-            history, losses = BackwardDifference(**past["history"]), Losses(**past["losses"])
-            past = Past(**{**past, "history": history, "losses": losses})
+            history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
+            past = GalerkinPast(**{**past, "history": history, "losses": losses})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
@@ -185,7 +185,7 @@ class PreparedIspgStep:
     solver: IspgStep
     body: Body
     physics: Physics
-    past: Past
+    past: GalerkinPast
 
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
@@ -214,7 +214,9 @@ class PreparedIspgStep:
         momenta = rigid_momenta(rigid_motions(points), equations.masses, coefficients)
         history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
         losses = self._losses(equations, base, coefficients, time_step)
-        self.solver.past = Past(points, coefficients, gradient, equations.masses, pressure, momenta, history, losses)
+        self.solver.past = GalerkinPast(
+            points, coefficients, gradient, equations.masses, pressure, momenta, history, losses
+        )
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
@@ -256,7 +258,7 @@ class PreparedIspgStep:
         density = sum(part.density for part in self.physics.operators if isinstance(part, Mass))
         viscosity = sum(part.coefficient for part in self.physics.operators if isinstance(part, Viscosity))
         coefficient = sum(part.coefficient for part in tensions)
-        fluid = Fluid(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
+        fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
         flux = space.load(body.volume()[1], np.zeros((len(body.points), 3, 3)))
         nothing = sparse.csr_matrix((len(body.points),) * 2)
@@ -270,7 +272,7 @@ class PreparedIspgStep:
             time_step=time_step,
         )
 
-    def _losses(self, equations: GalerkinEquations, base: Base, coefficients: Floats, time_step: float) -> Losses:
+    def _losses(self, equations: GalerkinEquations, base: Base, coefficients: Floats, time_step: float) -> LostEnergy:
         """Those of all steps, this one included.
 
         Of the time integration: what the change of momentum takes beyond the change of kinetic energy.

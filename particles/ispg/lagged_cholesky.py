@@ -1,15 +1,14 @@
 """Conjugate gradients without a matrix, and preconditioned with the factors of an earlier step's matrix."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import SolveFailed, cholesky
+from reflowshock.particles.discretisation.lagged_solver import LaggedSolver
 
 Apply = Callable[[Floats], Floats]
 MAX_ITERATIONS = 500
@@ -68,32 +67,8 @@ def conjugate_gradients(
 
 
 @dataclass(slots=True)
-class LaggedCholesky:
-    """Factors that are made anew when their last use took many iterations.
-
-    It keeps the matrix that it has factored, so that a run from a checkpoint continues with the same bits.
-
-    Attributes:
-        origin: the matrix.
-        iterations: of the last solve.
-    """
-
-    origin: sparse.csr_matrix | None = None
-    iterations: int = 0
-    _solver: PETSc.KSP | None = field(default=None, repr=False)
-
-    def saved(self) -> dict[str, Any]:
-        """All but the PETSc objects, for a checkpoint."""
-        origin = self.origin
-        rows = None if origin is None else {name: getattr(origin, name) for name in ("data", "indices", "indptr")}
-        return {"origin": rows, "iterations": self.iterations}
-
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
-        rows, self.iterations, self._solver, self.origin = saved["origin"], saved["iterations"], None, None
-        if rows is not None:
-            count = len(rows["indptr"]) - 1
-            self.origin = sparse.csr_matrix((rows["data"], rows["indices"], rows["indptr"]), shape=(count, count))
+class LaggedCholesky(LaggedSolver):
+    """Factors that are made anew when their last use took many iterations."""
 
     def solve(
         self, operator: Apply, matrix: Callable[[], sparse.csr_matrix], right: Floats, tolerance: Tolerance
