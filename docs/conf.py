@@ -24,8 +24,7 @@ source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 myst_enable_extensions = ["dollarmath", "colon_fence", "linkify"]
 myst_linkify_fuzzy_links = False
 myst_heading_anchors = 3
-nb_execution_mode = "cache"
-nb_execution_cache_path = "build/docs/notebooks"
+nb_execution_mode = "force"
 nb_execution_timeout = 1200  # [s] for a cell, on a machine with other work
 nb_execution_raise_on_error = True
 

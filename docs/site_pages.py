@@ -122,7 +122,8 @@ def rooms() -> Iterator[str]:
 def _tables(node: dict, defs: dict, place: str) -> Iterator[tuple[str, dict]]:
     """Yield place and definition of a table and of the tables in it."""
     yield place, node
-    for name, value in node.get("properties", {}).items():
+    tables = sorted(node.get("properties", {}).items(), key=lambda item: "additionalProperties" in item[1])
+    for name, value in tables:  # those of the user's own names last
         inner = f"{place}.{name}".lstrip(".")
         for own, reference in _references(value):
             found = defs[reference]
@@ -152,7 +153,7 @@ def _default(value: dict) -> str:
     found = value.get("default")
     if found is None:
         return ""
-    return f"`{found if isinstance(found, str) else json.dumps(found)}`"
+    return f"`{found if isinstance(found, str) and found else json.dumps(found)}`"
 
 
 def _takes(value: dict) -> str:

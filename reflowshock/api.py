@@ -116,7 +116,7 @@ class Case:
         """Predict what a run in a folder would do and cost; nothing is run, nothing is written."""
         store, point = self._store(out), Point({}, self.resolved)
         text = StringIO()
-        plan.show_plan(store, point, Console(file=text, width=WIDTH))
+        plan.show_plan(store, point, Console(file=text, width=WIDTH, force_jupyter=False))
         return Plan(
             plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue()
         )
