@@ -70,7 +70,7 @@ class Coupling(Parameters):
     @classmethod
     def _of_local_steps(cls, value: int | str, info: ValidationInfo) -> int | str:
         scheme = info.data.get("scheme", "auto")
-        if value != "auto" and scheme not in ("auto", "local_steps"):
+        if value != "auto" and scheme not in ("auto", "local_steps", "held_velocity"):
             raise PydanticCustomError("inadmissible", f"does not go with scheme = {scheme}", {"allowed": "auto"})
         return value
 
