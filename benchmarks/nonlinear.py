@@ -25,6 +25,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -235,11 +236,11 @@ def drift() -> tuple[Bars, dict]:
     }
 
 
-def growth() -> tuple[Bars, dict]:
-    """Return how many windows grow, and the worst of each scheme."""
+def growth(every: int = 1) -> tuple[Bars, dict]:
+    """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some."""
     found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
-    for pair, fraction in grid():
+    for pair, fraction in list(grid())[::every]:
         for name, values in found.items():
             coupled = flowing_pair(pair, SCHEMES[name], fraction)
             values[repr(pair)] = coupled.spectral_radius() - 1.0
@@ -260,10 +261,13 @@ PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter,
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; without, all")
-    chosen = parser.parse_args().parts or list(PARTS)
+    parser.add_argument("--every", type=int, default=1, help="growth: takes one of so many pairs of the grid")
+    options = parser.parse_args()
+    parts = PARTS | {"growth": partial(growth, options.every)}
+    chosen = options.parts or list(parts)
     found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
     for name in chosen:
-        bars, rest = PARTS[name]()
+        bars, rest = parts[name]()
         found["bars"] |= bars
         found[name] = rest
         turns.write("nonlinear", found)
