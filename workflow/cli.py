@@ -13,6 +13,7 @@ import typer
 
 from reflowshock.workflow import __version__
 from reflowshock.workflow.compare.command import compare
+from reflowshock.workflow.examples import examples
 from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
 from reflowshock.workflow.new_case import import_board, init, new
 from reflowshock.workflow.pipeline.points import read_case_of_run
@@ -40,7 +41,7 @@ Settings = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help='override a value, e.g. "shock.peak_acceleration=1000 G"'),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>-<scale>]")
+    Path | None, typer.Option("--out", metavar="DIR", help="run folder (default: runs/<case name>-<scale>)")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
 Force = Annotated[
@@ -56,7 +57,7 @@ AtOnce = Annotated[
         "--cores",
         min=1,
         max=MOST_AT_ONCE,
-        help=f"cores to use [default: all]; on a cluster: jobs at a time [default: {JOBS}]",
+        help=f"cores to use (default: all); on a cluster: jobs at a time (default: {JOBS})",
     ),
 ]
 ExecutorOption = Annotated[
@@ -67,7 +68,7 @@ ProfileOption = Annotated[
     typer.Option(
         "--profile",
         metavar="DIR",
-        help="profile of the cluster [default: profiles/slurm if it exists, else the built-in one]",
+        help="profile of the cluster (default: profiles/slurm if it exists, else the built-in one)",
     ),
 ]
 
@@ -160,15 +161,15 @@ def accuracy(
     case: CasePath,
     tolerance: Annotated[
         str | None,
-        typer.Option(metavar="SHARE", help='allowed error, e.g. "2%" [default: 2% if no budget is given]'),
+        typer.Option(metavar="SHARE", help='allowed error, e.g. "2%" (default: 2% if no budget is given)'),
     ] = None,
     budget: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help='total wall time of all runs, e.g. "10min" [default: no limit]'),
+        typer.Option(metavar="TIME", help='total wall time of all runs, e.g. "10min" (default: no limit)'),
     ] = None,
     settings: Settings = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="folder [default: runs/<case name>-accuracy]")
+        Path | None, typer.Option("--out", metavar="DIR", help="folder (default: runs/<case name>-accuracy)")
     ] = None,
     oversubscribe: Oversubscribe = False,
     force: Force = False,
@@ -252,16 +253,16 @@ def clean(
 
 @app.command()
 def stress_test(
-    cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases [default: all]")] = None,
+    cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases (default: all)")] = None,
     family: Annotated[
-        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh [default: all]")
+        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh (default: all)")
     ] = None,
     random: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="random cases [default: 200, none beside given CASES]")
+        int | None, typer.Option(min=0, metavar="N", help="random cases (default: 200, none beside given CASES)")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the random cases")] = 1,
     cores: Annotated[
-        int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time [default: cores]")
+        int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time (default: cores)")
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
@@ -298,7 +299,7 @@ def study(
     cores: AtOnce = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would be computed and its cost")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="folder of the study [default: runs/<study name>]")
+        Path | None, typer.Option("--out", metavar="DIR", help="folder of the study (default: runs/<study name>)")
     ] = None,
     oversubscribe: Oversubscribe = False,
     executor: ExecutorOption = ExecutorName.LOCAL,
@@ -357,6 +358,10 @@ def stage(
     shutil.rmtree(folder)
     if mark is not None:
         mark.touch()
+
+
+for command in app.registered_commands:
+    command.epilog = examples(command.name or getattr(command.callback, "__name__", "").replace("_", "-"))
 
 
 def main() -> None:
