@@ -3,8 +3,6 @@
 import json
 import shutil
 import webbrowser
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +18,7 @@ from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores, prepare
 from reflowshock.workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.terminal import console, interruptible, print_error
 from reflowshock.workflow.store.folders import check_folder, read_mark
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
@@ -71,16 +69,6 @@ ProfileOption = Annotated[
         help="profile of the cluster (default: profiles/slurm if it exists, else the built-in one)",
     ),
 ]
-
-
-@contextmanager
-def interruptible(what: str) -> Iterator[None]:
-    """End with exit code 1 on Ctrl-C, and say what is kept."""
-    try:
-        yield
-    except KeyboardInterrupt as error:
-        print_error(f"interrupted; {what}")
-        raise typer.Exit(1) from error
 
 
 app.command()(new)
@@ -208,11 +196,15 @@ def report(
     settings: Settings = None,
     out: Out = None,
     show: Annotated[bool, typer.Option("--open", help="open it in the browser")] = False,
+    movie: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="write what moves in it as a GIF too")] = None,
 ) -> None:
     """Write the report again from the existing products."""
     from reflowshock.workflow.pipeline.report import write_report
-    from reflowshock.workflow.run import report_again
+    from reflowshock.workflow.run import check_movie, report_again, write_run_movie
     from reflowshock.workflow.stages import report as stage_function
+
+    if movie is not None:
+        check_movie(movie)
 
     store, point = _load(case, settings, out, True, True)
     if read_mark(store.folder) is None:
@@ -221,6 +213,8 @@ def report(
     if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
     console.print(f"report: {store.folder / 'report.html'}")
+    if movie is not None:
+        write_run_movie(store.folder, movie)
     if show and not webbrowser.open((store.folder / "report.html").resolve().as_uri()):
         print_error("no browser can be opened here")
         raise typer.Exit(1)

@@ -21,7 +21,7 @@ EXAMPLES = {
     ),
     "status": ("reflowshock status mine.toml", "reflowshock status mine.toml --follow"),
     "verify": ("reflowshock verify mine.toml",),
-    "report": ("reflowshock report mine.toml --open", "reflowshock report mine.toml --out runs/softer"),
+    "report": ("reflowshock report mine.toml --open", "reflowshock report mine.toml --movie drop.gif"),
     "compare": ("reflowshock compare runs/mine runs/softer --out compared.html",),
     "clean": ("reflowshock clean mine.toml", "reflowshock clean mine.toml --unused"),
     "study": ("reflowshock study study.toml --dry-run", "reflowshock study study.toml -j 2"),

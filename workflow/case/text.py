@@ -9,7 +9,7 @@ CHECK_UNITS = {
 LONGEST_IN_MS = 0.1
 LEAST_IN_NEWTON = 1.0
 SHOWN = {
-    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm^3"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m^3"),
+    "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm³"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m³"),
     "N": (1e3, "mN"), "N m": (1e3, "N mm"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
 }  # fmt: skip
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal, Protocol
 
+import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -89,6 +90,16 @@ def print_error(text: str) -> None:
     errors.print(styled("[bold red]error:[/] {}", first), soft_wrap=True)
     if rest:
         errors.print(rest, soft_wrap=True)
+
+
+@contextmanager
+def interruptible(what: str) -> Iterator[None]:
+    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        print_error(f"interrupted; {what}")
+        raise typer.Exit(1) from error
 
 
 def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:

@@ -193,3 +193,13 @@ def test_help_ends_with_examples_that_the_command_takes(call, command):
     assert 1 <= len(EXAMPLES[command]) <= 3
     for line in EXAMPLES[command]:
         parse(line)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"), [("drop.mp4", "is not the name of a GIF"), ("a.gif", "exists and is not a GIF")]
+)
+def test_a_movie_is_written_over_nothing_else(call, tmp_path, name, why):
+    (tmp_path / "a.gif").write_text("mine")
+    code, _, errors = call("report", str(CASE), "--movie", name)
+    assert (code, why in errors) == (2, True)
+    assert (tmp_path / "a.gif").read_text() == "mine"
