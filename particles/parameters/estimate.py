@@ -15,7 +15,7 @@ INERTIAL_COST_EXPONENT = 1.5
 
 # Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
 SECONDS_PER_ISPG_STEP = 0.005
-SECONDS_PER_ISPG_STEP_AND_PARTICLE = 5.5e-5
+SECONDS_PER_ISPG_STEP_AND_PARTICLE = 1.25e-4
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
