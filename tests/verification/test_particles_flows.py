@@ -1,0 +1,80 @@
+"""Flows by delta-SPH against exact solutions and measurements: channel, vortices, a tank at rest, a dam break."""
+
+from math import log2, sqrt
+
+import numpy as np
+import pytest
+
+from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
+from reflowshock.particles.scenes.dam_break import dam, solve_dam_break
+from reflowshock.particles.scenes.viscous_flows import solve_poiseuille, solve_taylor_green
+
+
+def value(result, name):
+    return result.metrics[name][0]
+
+
+def test_a_channel_starts_as_the_exact_one():
+    errors = []
+    for across in (10, 20):
+        scene = Poiseuille(width=1e-3, speed=0.01, duration=0.2, numerics=SphNumerics(particles_across=across))
+        errors.append(value(solve_poiseuille(scene), "profile_error"))
+    assert errors[1] < 0.01
+    assert log2(errors[0] / errors[1]) > 1.0
+
+
+def test_vortices_die_out_at_the_exact_rate():
+    errors = []
+    for across in (16, 32):
+        scene = TaylorGreen(side=1e-3, speed=0.1, numerics=SphNumerics(particles_across=across))
+        result = solve_taylor_green(scene)
+        errors.append(value(result, "speed_error"))
+    assert abs(value(result, "decay_rate_error")) < 0.05
+    assert log2(errors[0] / errors[1]) > 1.0
+
+
+def tank(diffusion, across=20):
+    """The pressures of a tank at rest over rho g H less the exact ones, after ten times sqrt(H / g)."""
+    numerics = SphNumerics(particles_across=across, density_diffusion=diffusion)
+    scene = DamBreak(height=1.0, width=1.0, tank_length=1.0, sensor_height=0.2, duration=1.0, numerics=numerics)
+    simulation = dam(scene)
+    errors, energies = [], []
+    while simulation.time < 5.0 * scene.unit_of_time:
+        simulation.step(simulation.time_step())
+        liquid, fields = slice(simulation.fluids), simulation.fields
+        exact = 1.0 - fields.z[liquid]
+        errors.append(fields.pressure[liquid] / (scene.density * scene.gravity * scene.height) - exact)
+        energies.append(fields.mass[liquid] @ (fields.u[liquid] ** 2 + fields.w[liquid] ** 2))
+    late = np.array(errors[len(errors) // 2 :])
+    return late, np.array(energies) / (scene.gravity * scene.height * simulation.fields.mass[liquid].sum())
+
+
+def test_a_tank_rests_under_its_weight_and_diffusion_takes_the_noise():
+    smooth, motion = tank(0.1)
+    rough, _ = tank(0.0)
+    assert np.abs(smooth.mean(axis=0)).mean() < 0.02
+    assert motion.max() < 1e-3
+    assert smooth.std() < rough.std()
+
+
+def dam_break(across, duration):
+    numerics = SphNumerics(particles_across=across)
+    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
+    return solve_dam_break(DamBreak(**given, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
+
+
+def test_a_dam_break_strikes_the_wall_as_measured():
+    result = dam_break(20, 5.1)
+    assert value(result, "impact_onset") == pytest.approx(2.5, abs=0.1)
+    assert value(result, "plateau_mean") == pytest.approx(0.5, abs=0.1)
+    assert value(result, "particles_lost") == 0
+    assert value(result, "energy_rise") < 0.01
+
+
+@pytest.mark.long
+def test_the_wave_that_falls_back_strikes_as_measured():
+    result = dam_break(60, 7.2)
+    assert value(result, "impact_onset") == pytest.approx(2.5, abs=0.1)
+    assert value(result, "plateau_mean") == pytest.approx(0.5, abs=0.1)
+    assert 5.6 <= value(result, "second_rise") <= 6.2
+    assert value(result, "particles_lost") == 0
