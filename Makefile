@@ -43,13 +43,18 @@ test-mpi: setup  ## run the tests that start several MPI ranks
 lint: setup  ## ruff, mypy, import rules
 	$(PYTHON) -m pytest tests/unit/test_code.py
 
+docs: setup  ## build the site: build/docs/html/index.html
+	@$(PYTHON) -c 'import furo, myst_nb, sphinx_copybutton' 2>/dev/null || \
+	    $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --no-build-isolation --editable '.[docs]'
+	$(PYTHON) -m sphinx --fail-on-warning --keep-going --quiet -c docs -d build/docs/doctrees . build/docs/html
+
 bench: export PYTHONPATH = $(CURDIR)
 bench: setup  ## run the benchmarks; JSON in benchmarks/results
 	@for script in benchmarks/*.py; do [ -e "$$script" ] || continue; echo "$$script"; $(PYTHON) "$$script" || exit 1; done
 
 clean:  ## remove runs and caches (keeps .venv)
-	rm -rf runs build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf runs build docs/generated *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
-.PHONY: help setup demo test test-long test-debian13 test-golden test-mpi lint bench clean
+.PHONY: help setup demo test test-long test-debian13 test-golden test-mpi lint docs bench clean
 .DEFAULT_GOAL := help

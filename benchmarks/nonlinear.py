@@ -14,6 +14,8 @@ Parts, each by itself where it is named; figures of earlier calls stay:
   finite rotation, solder that yields; ``errors``: their histories on a smaller board under a shorter pulse, in
   which solder flows.
 - ``drift``: energy over 1e5 windows of two models in finite rotation, elastic, no damping.
+- ``growth``: of one window of every scheme, over the grid of coupling_stability.py, where the models have turned by 40
+  degrees and strained by half a per cent, and the block flows: its elements have their tangents.
 
 Sides take turns; ratios are of processor seconds. Bars that stand in ``not_measured`` need longer runs.
 """
@@ -23,6 +25,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +35,7 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks import peers
+from benchmarks.coupling_stability import GROWTH, grid
 from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
 from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
@@ -49,6 +53,7 @@ from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 from reflowshock.fem.model.assembly import ForceOptions, make_body
 from reflowshock.fem.output.compare import compare_histories
+from tests.support.fem_tangent import flowing_pair
 
 RESULT = turns.RESULTS / "nonlinear.json"
 FINITE = {"kinematics": "corotational", "plasticity": "on", "formulation": "one_point"}
@@ -64,10 +69,10 @@ SIDES: dict[str, tuple[dict, dict]] = {
 FINE = {"three_joints": CRITICAL, "one_joint": CRITICAL[:1]}
 MATERIAL = "materials.solder='SAC405'"
 PEAK, DURATION = 4000 * STANDARD_GRAVITY, 1.2e-4  # [m/s^2], [s], of errors: solder flows
+ALONG_PATHS = ("held_velocity", "impulse", "gravouil_combescure")
 WINDOWS, SAMPLES = 100_000, 200
 ROUNDS = 5
 NOT_MEASURED = {
-    "nonlinear windows, growth over the grid of the linear schemes": "not tried",
     "default case, answer complete": "its run folder tells: reflowshock run cases/jedec_bga/case.toml",
     "hu_bga_drop, full size, finite + J2, two scales": "its run folder tells: --set scale=physical",
 }
@@ -231,16 +236,38 @@ def drift() -> tuple[Bars, dict]:
     }
 
 
-PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter, two_scales, errors, drift)}
+def growth(every: int = 1) -> tuple[Bars, dict]:
+    """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some."""
+    found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
+    levels: dict[str, int] = {}
+    for pair, fraction in list(grid())[::every]:
+        for name, values in found.items():
+            coupled = flowing_pair(pair, SCHEMES[name], fraction)
+            values[repr(pair)] = coupled.spectral_radius() - 1.0
+            if name == "held_velocity":
+                levels[repr(pair)] = len(coupled.meso.motion.body.schedule)
+    grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
+    bars = {
+        f"nonlinear windows that grow by more than {GROWTH:g}, {name}": turns.bar(count, 0, False)
+        for name, count in grown.items()
+    }
+    worst = {name: max(values.values()) for name, values in found.items()}
+    return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
+
+
+PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter, two_scales, errors, drift, growth)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; without, all")
-    chosen = parser.parse_args().parts or list(PARTS)
+    parser.add_argument("--every", type=int, default=1, help="growth: takes one of so many pairs of the grid")
+    options = parser.parse_args()
+    parts = PARTS | {"growth": partial(growth, options.every)}
+    chosen = options.parts or list(parts)
     found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
     for name in chosen:
-        bars, rest = PARTS[name]()
+        bars, rest = parts[name]()
         found["bars"] |= bars
         found[name] = rest
         turns.write("nonlinear", found)

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rich.console import Console
 
 from reflowshock.names import nearest
+from reflowshock.notebook import Metrics, ReportView, case_html, plan_html, run_html
 from reflowshock.problem import as_toml
 from reflowshock.workflow import plan
 from reflowshock.workflow.case.case import Case as ResolvedCase
+from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.points import read_case_of_run
@@ -72,6 +74,9 @@ class Plan:
     def __str__(self) -> str:
         return self.text
 
+    def _repr_html_(self) -> str:
+        return plan_html(self.stages, self.effects, self.seconds)
+
 
 @dataclass(frozen=True, slots=True)
 class Case:
@@ -111,7 +116,7 @@ class Case:
         """Predict what a run in a folder would do and cost; nothing is run, nothing is written."""
         store, point = self._store(out), Point({}, self.resolved)
         text = StringIO()
-        plan.show_plan(store, point, Console(file=text, width=WIDTH))
+        plan.show_plan(store, point, Console(file=text, width=WIDTH, force_jupyter=False))
         return Plan(
             plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue()
         )
@@ -143,6 +148,9 @@ class Case:
         if done.returncode and not store.is_complete(Point({}, self.resolved), until):
             raise RunFailed(done.stderr.strip() or f"the command ended with exit code {done.returncode}")
         return Run.open(store.folder)
+
+    def _repr_html_(self) -> str:
+        return case_html(self.name, self.resolved.case.title, display_values(self.resolved))
 
     def _store(self, out: str | Path | None) -> Store:
         return Store(Path(out) if out is not None else Path("runs") / self.resolved.run_name, one_run=True)
@@ -182,9 +190,15 @@ class Run:
         return read_json(self._product("summary.json"))
 
     @property
-    def metrics(self) -> dict[str, Metric]:
-        """Results by name, each with its unit."""
-        return {name: Metric(found["value"], found["unit"]) for name, found in self.summary["metrics"].items()}
+    def metrics(self) -> Metrics:
+        """Results by name, each a ``Metric`` with its unit."""
+        found = self.summary["metrics"].items()
+        return Metrics({name: Metric(one["value"], one["unit"]) for name, one in found})
+
+    @property
+    def report(self) -> ReportView:
+        """The report, which shows itself in a notebook: tables, charts, the 3D view."""
+        return ReportView(self._product("report.html"))
 
     @property
     def is_healthy(self) -> bool:
@@ -235,6 +249,11 @@ class Run:
         surface = pyvista.PolyData.from_regular_faces(closed.points, closed.triangles)
         surface.cell_data["boundary"] = closed.boundary
         return surface
+
+    def _repr_html_(self) -> str:
+        picture = self.folder / "geometry/preview.png"
+        shown = picture.read_bytes() if picture.exists() else None
+        return run_html(self.summary, self.case.case.title, shown)
 
     def _product(self, name: str) -> Path:
         path = self.folder / name

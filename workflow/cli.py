@@ -3,8 +3,6 @@
 import json
 import shutil
 import webbrowser
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -13,13 +11,14 @@ import typer
 
 from reflowshock.workflow import __version__
 from reflowshock.workflow.compare.command import compare
+from reflowshock.workflow.examples import examples
 from reflowshock.workflow.jobs.executor import JOBS, ExecutorName, executor_for
 from reflowshock.workflow.new_case import import_board, init, new
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores, prepare
 from reflowshock.workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.terminal import console, interruptible, print_error
 from reflowshock.workflow.store.folders import check_folder, read_mark
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
@@ -40,7 +39,7 @@ Settings = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help='override a value, e.g. "shock.peak_acceleration=1000 G"'),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="run folder [default: runs/<case name>-<scale>]")
+    Path | None, typer.Option("--out", metavar="DIR", help="run folder (default: runs/<case name>-<scale>)")
 ]
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
 Force = Annotated[
@@ -56,7 +55,7 @@ AtOnce = Annotated[
         "--cores",
         min=1,
         max=MOST_AT_ONCE,
-        help=f"cores to use [default: all]; on a cluster: jobs at a time [default: {JOBS}]",
+        help=f"cores to use (default: all); on a cluster: jobs at a time (default: {JOBS})",
     ),
 ]
 ExecutorOption = Annotated[
@@ -67,19 +66,9 @@ ProfileOption = Annotated[
     typer.Option(
         "--profile",
         metavar="DIR",
-        help="profile of the cluster [default: profiles/slurm if it exists, else the built-in one]",
+        help="profile of the cluster (default: profiles/slurm if it exists, else the built-in one)",
     ),
 ]
-
-
-@contextmanager
-def interruptible(what: str) -> Iterator[None]:
-    """End with exit code 1 on Ctrl-C, and say what is kept."""
-    try:
-        yield
-    except KeyboardInterrupt as error:
-        print_error(f"interrupted; {what}")
-        raise typer.Exit(1) from error
 
 
 app.command()(new)
@@ -160,15 +149,15 @@ def accuracy(
     case: CasePath,
     tolerance: Annotated[
         str | None,
-        typer.Option(metavar="SHARE", help='allowed error, e.g. "2%" [default: 2% if no budget is given]'),
+        typer.Option(metavar="SHARE", help='allowed error, e.g. "2%" (default: 2% if no budget is given)'),
     ] = None,
     budget: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help='total wall time of all runs, e.g. "10min" [default: no limit]'),
+        typer.Option(metavar="TIME", help='total wall time of all runs, e.g. "10min" (default: no limit)'),
     ] = None,
     settings: Settings = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="folder [default: runs/<case name>-accuracy]")
+        Path | None, typer.Option("--out", metavar="DIR", help="folder (default: runs/<case name>-accuracy)")
     ] = None,
     oversubscribe: Oversubscribe = False,
     force: Force = False,
@@ -207,11 +196,15 @@ def report(
     settings: Settings = None,
     out: Out = None,
     show: Annotated[bool, typer.Option("--open", help="open it in the browser")] = False,
+    movie: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="write what moves in it as a GIF too")] = None,
 ) -> None:
     """Write the report again from the existing products."""
     from reflowshock.workflow.pipeline.report import write_report
-    from reflowshock.workflow.run import report_again
+    from reflowshock.workflow.run import check_movie, report_again, write_run_movie
     from reflowshock.workflow.stages import report as stage_function
+
+    if movie is not None:
+        check_movie(movie)
 
     store, point = _load(case, settings, out, True, True)
     if read_mark(store.folder) is None:
@@ -220,6 +213,8 @@ def report(
     if not report_again(store.folder, point.case.case.name, write_report, stage_function):
         raise typer.Exit(1)
     console.print(f"report: {store.folder / 'report.html'}")
+    if movie is not None:
+        write_run_movie(store.folder, movie)
     if show and not webbrowser.open((store.folder / "report.html").resolve().as_uri()):
         print_error("no browser can be opened here")
         raise typer.Exit(1)
@@ -252,16 +247,16 @@ def clean(
 
 @app.command()
 def stress_test(
-    cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases [default: all]")] = None,
+    cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases (default: all)")] = None,
     family: Annotated[
-        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh [default: all]")
+        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling or remesh (default: all)")
     ] = None,
     random: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="random cases [default: 200, none beside given CASES]")
+        int | None, typer.Option(min=0, metavar="N", help="random cases (default: 200, none beside given CASES)")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the random cases")] = 1,
     cores: Annotated[
-        int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time [default: cores]")
+        int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time (default: cores)")
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
@@ -298,7 +293,7 @@ def study(
     cores: AtOnce = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would be computed and its cost")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="folder of the study [default: runs/<study name>]")
+        Path | None, typer.Option("--out", metavar="DIR", help="folder of the study (default: runs/<study name>)")
     ] = None,
     oversubscribe: Oversubscribe = False,
     executor: ExecutorOption = ExecutorName.LOCAL,
@@ -357,6 +352,10 @@ def stage(
     shutil.rmtree(folder)
     if mark is not None:
         mark.touch()
+
+
+for command in app.registered_commands:
+    command.epilog = examples(command.name or getattr(command.callback, "__name__", "").replace("_", "-"))
 
 
 def main() -> None:

@@ -44,12 +44,12 @@ def import_board(
     component: Annotated[
         str | None, typer.Option(metavar="U8", help="component whose joints are computed; without: show what is there")
     ] = None,
-    name: Annotated[str | None, typer.Option(help="name of the case [default: board and component]")] = None,
+    name: Annotated[str | None, typer.Option(help="name of the case (default: board and component)")] = None,
     thickness: Annotated[
         str | None, typer.Option(help='of the board, where the file does not say it: "1.6 mm"')
     ] = None,
-    ball: Annotated[str | None, typer.Option(help="diameter of a solder ball [default: 0.6 of the pitch]")] = None,
-    holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes [default: 2 mm]")] = None,
+    ball: Annotated[str | None, typer.Option(help="diameter of a solder ball (default: 0.6 of the pitch)")] = None,
+    holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes (default: 2 mm)")] = None,
 ) -> None:
     """Write a case file for a component of a board from ECAD."""
     from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.jobs.batch import Machine, failure_of, run_points, show_products
 from reflowshock.workflow.pipeline.points import read_case_of_run
@@ -80,6 +82,39 @@ def _conclude(store: Store, point: Point) -> str:
     design = summary["verdict"]["design"]
     console.print(styled(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
     return design
+
+
+def check_movie(path: Path) -> None:
+    """Refuse a file that a GIF cannot be written to.
+
+    Raises:
+        CaseError: it is not a GIF by its name, it exists and is none, or its folder does not exist.
+    """
+    why = ""
+    if path.suffix.lower() != ".gif":
+        why = "is not the name of a GIF; allowed: FILE.gif"
+    elif not path.parent.is_dir():
+        why = f"cannot be written: there is no folder {path.parent}"
+    elif path.exists() and (path.is_dir() or path.read_bytes()[:3] != b"GIF"):
+        why = "exists and is not a GIF; give another --movie"
+    if why:
+        raise CaseError(str(path), [Problem("", why)])
+
+
+def write_run_movie(folder: Path, path: Path) -> None:
+    """Write what moves in the report of a run as a GIF.
+
+    Raises:
+        CaseError: nothing moves in it, since the stage that would has not run.
+    """
+    from reflowshock.workflow.pipeline.report import moving_scene
+    from reflowshock.workflow.report.movie import write_movie
+
+    scene = moving_scene(folder, read_case_of_run(folder))
+    if scene is None:
+        raise CaseError(str(folder), [Problem("", "has nothing that moves: its drop, or its reflow, has not been run")])
+    write_movie(scene, path)
+    console.print(f"movie: {path}, {len(scene.frames)} frames, {path.stat().st_size / 1e6:.2g} MB")
 
 
 def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], object], stage: Callable) -> bool:

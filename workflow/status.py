@@ -17,7 +17,7 @@ from reflowshock.workflow.store.state import StageState, examine
 from reflowshock.workflow.store.store import Store
 
 LOOK = 0.5  # s between two looks at a run
-SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "kg": "mg", "s": "ns"}
+SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "J/m^3": "kJ/m^3", "kg": "mg", "s": "ns"}
 FIGURES = {
     "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
     "reflow": (

@@ -164,8 +164,9 @@ class Driven(Continued):
         self._channels.velocities.receive(motion.velocity)
         given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
         change, impulses = np.outer(self._lags, acceleration), np.zeros((2, len(counted), 3))
+        push = motion.push()
         for weight, sum_so_far in zip(self._weights[0], impulses, strict=True):
-            add_impulse(counted, motion.force, weight, sum_so_far)
+            add_impulse(counted, push, weight, sum_so_far)
         motion.take_steps(
             self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
         )

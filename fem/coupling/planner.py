@@ -52,22 +52,17 @@ class ModelWork:
 
     Attributes:
         mesh: Its mesh on rank 0, None on the others.
-        level: ``(ne,)`` level of the step of each cell, 0 for that of the motion.
-        ratios: Steps of level k + 1 in one of level k.
+        level: ``(ne,)`` level of the step of each cell.
+        rates: ``(levels,)`` steps of each level in a window.
         steps: Steps of its motion in a window.
         kind: What its elements are like.
     """
 
     mesh: MeshData | None
     level: NDArray[np.int32]
-    ratios: tuple[int, ...]
+    rates: NDArray[np.int64]
     steps: int
     kind: Kind
-
-    @property
-    def rates(self) -> NDArray[np.int64]:
-        """Return the steps ``(levels,)`` of each level in a window."""
-        return self.steps * np.cumprod([1, *self.ratios])
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +96,11 @@ def works_of(divided: Divided[Tables], request: RunInput | StructureInput) -> di
         step = divided.steps.step_of(role)
         kind = Kind(assigned, request.formulation, request.kinematics, step)
         steps = round(divided.steps.plan.window / step)
-        works[role] = ModelWork(divided.meshes.get(role), tables.level, tables.ratios, steps, kind)
+        paces, level = np.unique(tables.every, return_inverse=True)
+        rates = steps // paces
+        if len(paces) == 1:
+            level, rates = tables.level, steps * np.cumprod([1, *tables.ratios])
+        works[role] = ModelWork(divided.meshes.get(role), level, rates, steps, kind)
     return works
 
 

@@ -108,7 +108,7 @@ def steps_of(
     cells, plan = whole.mesh.cells, division.plan
     if division.scheme == "local_steps":
         pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
-        steps = plan.window / np.cumprod([1, *division.ratios])
+        steps = plan.window / division.counts
         shares = steps / least_steps(division.ratios, pace)  # of a critical step that a level may use
         for level, (step, share) in enumerate(zip(steps.tolist(), shares.tolist(), strict=True)):
             yield f"the step of level {level}", step, division.level == level, share * survey.step
@@ -117,7 +117,8 @@ def steps_of(
     if division.scheme in BUFFERED and not division.overlaps:
         slow = slow | touching(cells, cut_nodes(cells, division.meso, len(whole.mesh.points)))
     yield "the window", plan.window, slow, critical
-    yield "the step", plan.step, division.meso, critical
+    for level, count in enumerate(division.counts[1:].tolist(), 1):
+        yield "the step", plan.window / count, division.meso & (division.level == level), critical
 
 
 def check_pulses(durations: Iterable[float], window: float, fraction: float) -> None:

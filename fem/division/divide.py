@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
 from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
+from reflowshock.fem.division.path_levels import with_path_levels
 from reflowshock.fem.division.whole import Survey, Whole
 from reflowshock.fem.errors import CouplingError, LevelError
 from reflowshock.fem.estimates.estimate import (
@@ -35,7 +36,7 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     if rules.copied is not None and rules.copy is not None:
         return replace(submodel(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
     divided = {
-        "held_velocity": by_buffer,
+        "held_velocity": along_paths,
         "impulse": carried,
         "gravouil_combescure": at_ties,
         "local_steps": by_levels,
@@ -84,6 +85,12 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
     cells = whole.mesh.cells
     buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
     return held(whole, survey, rules, ~rules.coarse | buffer)
+
+
+def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Give the models the cells that ``by_buffer`` gives them, and the meso model levels where nothing else acts."""
+    division = by_buffer(whole, survey, rules)
+    return division if rules.pushed else with_path_levels(whole, survey, division, rules)
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -140,7 +147,7 @@ def two_steps(
     slow, critical = steps
     damped = damped_critical_step(critical, rules.stiffness)
     plan = rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
-    return Division(scheme, *models, np.zeros(len(critical), np.int32), (), plan)
+    return Division(scheme, *models, models[1].astype(np.int32), (plan.substeps,), plan)
 
 
 def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:

@@ -27,6 +27,8 @@ class Rules:
         copied: One way, ``(ne,)`` fine cells of which the driving model has a coarse copy.
         copy: These copies.
         sprung: Whether supports have springs.
+        pushed: Whether more than body accelerations and elements act in the meso model: damping, springs, stress at
+            rest.
     """
 
     coupling: Coupling
@@ -38,6 +40,7 @@ class Rules:
     copied: NDArray[np.bool_] | None = None
     copy: NDArray[np.bool_] | None = None
     sprung: bool = False
+    pushed: bool = True
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
         """Return the windows that follow from two critical steps [s]."""
@@ -80,9 +83,27 @@ class Division:
         return bool((self.macro & self.meso).any())
 
     @property
+    def local(self) -> bool:
+        """Whether levels are inside the meso model's force; else its motion has the step of the innermost one."""
+        return self.scheme == "local_steps"
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Return the steps ``(levels + 1,)`` of each level in a window."""
+        return np.cumprod([1, *self.ratios])
+
+    @property
+    def every(self) -> NDArray[np.int32]:
+        """Return in how many steps of its model's motion each cell ``(ne,)`` acts once."""
+        if self.local:
+            return np.ones(len(self.level), np.int32)
+        rest = self.plan.substeps // self.counts
+        return np.where(self.meso, rest[self.level], 1).astype(np.int32)
+
+    @property
     def meso_step(self) -> float:
         """Return the step of the meso model's motion [s]: with local steps these are inside its force."""
-        return self.plan.window if self.scheme == "local_steps" else self.plan.step
+        return self.plan.window if self.local else self.plan.step
 
 
 @dataclass(frozen=True, slots=True)

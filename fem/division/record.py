@@ -11,15 +11,13 @@ from reflowshock.fem.division.whole import Survey
 def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
     """Return the scheme and why, the share of the meso model, its interface, levels of steps with their elements."""
     plan = division.plan
-    held = division.scheme != "local_steps"
-    level = division.meso.astype(np.int32) if held else division.level
-    steps = [plan.window, plan.step] if held else (plan.window / np.cumprod([1, *division.ratios])).tolist()
+    level, steps = division.level, (plan.window / division.counts).tolist()
     cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])
     return {
         "scheme": division.scheme,
         "why": division.why,
         "m": plan.substeps,
-        "ratios": [plan.substeps] if held else list(division.ratios),
+        "ratios": list(division.ratios),
         "meso_share": float(division.meso.mean()),
         "cut_nodes": cut_nodes,
         "levels": [

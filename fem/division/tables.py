@@ -39,6 +39,7 @@ class Tables:
         nodes: Number of nodes of the model.
         level: ``(ne,)`` int32 level of the step of each cell, 0 for the model's own step.
         ratios: Steps of level k + 1 in one of level k.
+        every: ``(ne,)`` int32 in how many steps of the model each cell acts once, see ``path_levels``.
     """
 
     part: NDArray[np.int32]
@@ -52,6 +53,7 @@ class Tables:
     nodes: int
     level: NDArray[np.int32]
     ratios: tuple[int, ...]
+    every: NDArray[np.int32]
 
     @classmethod
     def undivided(cls, whole: Whole, held: NDArray[np.bool_], **own: Any) -> Self:
@@ -75,6 +77,7 @@ class Tables:
             nodes=len(whole.mesh.points),
             level=np.zeros(len(whole.mesh.cells), np.int32),
             ratios=(),
+            every=np.ones(len(whole.mesh.cells), np.int32),
             **own,
         )
 
@@ -197,8 +200,9 @@ def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, Model
     coarse = part_input(whole, tables, macro, (macro.number, macro.cell_number))
     fine = part_input(whole, tables, meso, rest)
     coarse_tables = replace(coarse.tables, interface=macro.number[interface])
-    level = division.level[division.meso]
-    fine_tables = replace(fine.tables, interface=meso.number[interface], level=level, ratios=division.ratios)
+    fine_tables = replace(fine.tables, interface=meso.number[interface], every=division.every[division.meso])
+    if division.local:
+        fine_tables = replace(fine_tables, level=division.level[division.meso], ratios=division.ratios)
     return {"macro": replace(coarse, tables=coarse_tables), "meso": replace(fine, tables=fine_tables)}
 
 
@@ -227,6 +231,7 @@ def part_input(
         held=tables.held[held >= 0],
         nodes=part.nodes,
         level=np.zeros(len(part.mesh.cells), np.int32),
+        every=np.ones(len(part.mesh.cells), np.int32),
         **tables.counted(part, *counted),
     )
     return ModelInput(part.mesh, restricted, np.flatnonzero(part.cell_number >= 0))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce, no_interface
 from reflowshock.fem.forces.force import TermWithPath
-from reflowshock.fem.kernels.levels import Interface, StepArrays
+from reflowshock.fem.kernels.levels import Interface, add_pushed
 from reflowshock.fem.kernels.motion import add_impulse, advance
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
@@ -21,9 +21,12 @@ class ExplicitMotion(Motion):
     """The state of one model on one rank, and its step.
 
     Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
-    Nodes that several ranks hold are updated by each of them, from equal sums of forces.
+    Nodes that several ranks hold are updated by each of them, from equal sums of forces. A force term of pace r acts
+    once in r steps by an impulse of r dt f (r-RESPA, see ``division.path_levels``).
 
     Attributes as ``Motion``; ``velocity`` is that at ``time - dt / 2``.
+        ahead: ``(n, 3)`` [N] sum of (r - 1) f of terms that have just acted, which the next step adds; ``(0, 3)``
+            where all terms act in each step.
     """
 
     def __init__(
@@ -49,6 +52,8 @@ class ExplicitMotion(Motion):
         self.counted_mass[held] = 0.0
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
+        self._substep, self._longest = 0, max(body.schedule)
+        self.ahead = np.zeros((len(mass) if self._longest > 1 else 0, 3))
         self._tied = len(body.tie.slave) > 0
         self.slave_force = np.zeros((len(body.tie.slave), 3))
         self.gravity = self.body_acceleration(0.0)
@@ -63,7 +68,7 @@ class ExplicitMotion(Motion):
         for load in self._loads:
             load.drive(self.velocity, -step)
         self.velocity -= 0.5 * step * self.acceleration()
-        self._at_once = StepsAtOnce.of(body.terms, self._loads)
+        self._at_once = StepsAtOnce.of(body, self._loads)
 
     @property
     def external_work(self) -> float:
@@ -97,6 +102,9 @@ class ExplicitMotion(Motion):
         """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""
         for load in self._loads:
             load.drive(self.velocity, self.time)
+        if len(self.ahead):
+            self.force += self.ahead
+            self._substep = (self._substep + 1) % self._longest
         advance(self._state, self.mobility, self.gravity, self.step)
         for load in self._loads:
             load.collect(self)
@@ -111,12 +119,21 @@ class ExplicitMotion(Motion):
     def update_force(self) -> None:
         """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
         self.force.fill(0.0)
-        for term in self.body.terms:
-            term.add(self.displacement, self.force)
+        self.ahead.fill(0.0)
+        for term, pace in self.body.paced:
+            if pace == 1:
+                term.add(self.displacement, self.force)
+            elif self._substep % pace == 0:
+                pushed = np.zeros_like(self.force)
+                term.add(self.displacement, pushed)
+                add_pushed(pushed, pace, self.force, self.ahead)
         if self._tied:
             np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
             self.body.tie.gather(self.force)
         self.body.shared.add(self.force)
+        if any(pace > 1 and self._substep % pace == 0 for pace in self.body.schedule):
+            self.body.tie.gather(self.ahead)
+            self.body.shared.add(self.ahead)
         for load in self._loads:
             load.add(self)
         for load in self._loads:
@@ -124,18 +141,16 @@ class ExplicitMotion(Motion):
 
     def take_steps(self, count: int, interface: Interface | None = None) -> None:
         """Take steps, each with its force; what moves an interface and what it bears is counted there."""
-        if self.body.shared.exchanged or self._at_once is None:
+        whole = self._substep == 0 and count % self._longest == 0
+        if self.body.shared.exchanged or self._at_once is None or not whole:
             self._take_each(count, interface)
             return
         ends = [self.time]
         for _ in range(count):
             ends.append(ends[-1] + self.step)
         accelerations = np.array([self.gravity, *self.accelerations(ends[1:])])
-        tie = self.body.tie
-        arrays = StepArrays(
-            self._state, self.mobility, self.counted_mass, tie.slave, tie.master, tie.weight, self.slave_force
-        )
-        self._body_work += self._at_once.take(self, arrays, interface or no_interface(count), accelerations)
+        state = self._state, self.ahead
+        self._body_work += self._at_once.take(self, state, interface or no_interface(count), accelerations)
         self.gravity = accelerations[-1]
 
     def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
@@ -150,8 +165,13 @@ class ExplicitMotion(Motion):
             self.advance()
             self.update_force()
             if interface is not None:
+                push = self.push()
                 for weight, impulse in zip(interface.weights[k + 1], interface.impulses, strict=True):
-                    add_impulse(interface.counted, self.force, weight, impulse)
+                    add_impulse(interface.counted, push, weight, impulse)
+
+    def push(self) -> NDArray[np.float64]:
+        """Return the impulse over dt ``(n, 3)`` [N] of the step that begins: the force, and what acts for others."""
+        return self.force + self.ahead if len(self.ahead) else self.force
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
@@ -174,6 +194,8 @@ class ExplicitMotion(Motion):
     def _following_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(n, 3)`` [m/s] at ``time + dt / 2``."""
         following = self.velocity + self.step * self.acceleration()
+        if len(self.ahead):
+            following += self.step * self.mobility * self.ahead
         for load in self._loads:
             load.drive(following, self.time)
         return following
@@ -195,7 +217,7 @@ class ExplicitMotion(Motion):
         Args:
             foreign: ``(n, 3)`` [N], part of the force that is not this model's.
         """
-        force = self.force - foreign
+        force = self.push() - foreign
         for load in self._loads:
             load.remove(force)
         owned = self.body.shared.owned
@@ -205,23 +227,29 @@ class ExplicitMotion(Motion):
         """Return all that changes with time, for a checkpoint."""
         local, tie = self.body.local, self.body.tie
         nodal = {"displacement": self.displacement, "velocity": self.velocity, "force": self.force}
+        nodal |= {"ahead": self.ahead} if len(self.ahead) else {}
         rows = {name: Rows(local.nodes, value) for name, value in nodal.items()}
         at_slaves = Shares(local.nodes[tie.slave], self.slave_force, self.body.shared.owned[tie.slave])
         loads = {str(k): load.state(self.body) for k, load in enumerate(self._loads)}
-        paths = {str(k): term.state(local.cell_numbers) for k, term in enumerate(self._terms_with_path())}
+        paths = {name: term.state(local.cell_numbers) for name, term in self._terms_with_path().items()}
         scalars: State = {"gravity": Same(self.gravity), "time": Same(self.time), "body_work": Sum(self._body_work)}
         return {**rows, **scalars, "slave_force": at_slaves, "paths": paths, "loads": loads}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from the values of what ``state`` returned, in a motion that was built alike."""
-        for name in ("displacement", "velocity", "force", "slave_force"):
+        for name in ("displacement", "velocity", "force", "slave_force", *(["ahead"] if len(self.ahead) else [])):
             getattr(self, name)[:] = state[name]
         self.gravity, self.time, self._body_work = state["gravity"], state["time"], state["body_work"]
-        for k, term in enumerate(self._terms_with_path()):
-            term.restore(state["paths"][str(k)])
+        for name, term in self._terms_with_path().items():
+            term.restore(state["paths"][name])
         for k, load in enumerate(self._loads):
             load.restore(state["loads"][str(k)])
 
-    def _terms_with_path(self) -> list[TermWithPath]:
-        """Return the force terms whose history must be kept; the same ones in the same order on all ranks with any."""
-        return [term for term in self.body.terms if isinstance(term, TermWithPath)]
+    def _terms_with_path(self) -> dict[str, TermWithPath]:
+        """Return the force terms whose history must be kept, each under a name that is the same on all ranks."""
+        kept = [(term, pace) for term, pace in self.body.paced if isinstance(term, TermWithPath)]
+        found: dict[str, TermWithPath] = {}
+        for term, pace in kept:
+            end = f" of {pace}" if pace > 1 else ""
+            found[f"{sum(pace == other for _, other in kept[: len(found)])}{end}"] = term
+        return found

@@ -8,12 +8,21 @@ import numpy as np
 
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.errors import InvertedElementError
-from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.kernels.lanes import LANES
-from reflowshock.fem.kernels.levels import ALL_FINE, NAMES, ForceArrays, Interface, StepArrays, take_steps
+from reflowshock.fem.kernels.levels import (
+    ALL_FINE,
+    NAMES,
+    PACES,
+    ForceArrays,
+    Interface,
+    PacedForces,
+    StepArrays,
+    take_steps,
+)
 from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
 from reflowshock.fem.loads.load import Load
+from reflowshock.fem.model.body import Body
 
 
 def none_of(*shape: int, kind: type = np.float64) -> Any:
@@ -48,38 +57,63 @@ class StepsAtOnce:
     """The compiled steps of a motion.
 
     Attributes:
-        arrays: Of its force terms.
-        terms: Entry of ``ForceArrays`` -> the term.
+        forces: Its force terms by pace.
+        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, and ``moved`` as there.
+        terms: By pace, entry of ``ForceArrays`` -> the term.
     """
 
-    arrays: ForceArrays
-    terms: dict[str, Any]
+    forces: PacedForces
+    order: np.ndarray
+    moved: np.ndarray
+    terms: list[dict[str, Any]]
 
     @classmethod
-    def of(cls, terms: Sequence[ForceTerm], loads: Sequence[Load]) -> "StepsAtOnce | None":
-        """Return the steps of force terms under loads; None where some of either act between steps in their own way."""
-        found: dict[str, Any] = {}
-        for term in terms:
-            arrays = getattr(term, "arrays", {})
-            if not arrays or found.keys() & arrays.keys():
-                return None
-            found |= dict.fromkeys(arrays, term)
-        if any(acts_at_nodes(load) for load in loads):
-            return None
-        entries = {name: term.arrays[name] for name, term in found.items()}
-        return cls(NOTHING._replace(**entries), found)
+    def of(cls, body: Body, loads: Sequence[Load]) -> "StepsAtOnce | None":
+        """Return the steps of a body under loads.
 
-    def take(self, motion: Motion, steps: StepArrays, interface: Interface, accelerations: np.ndarray) -> float:
+        None where some of either act between steps in their own way, or there are more than ``PACES``.
+        """
+        found: dict[int, dict[str, Any]] = {}
+        for term, pace in body.paced:
+            arrays, alike = getattr(term, "arrays", {}), found.setdefault(pace, {})
+            if not arrays or alike.keys() & arrays.keys():
+                return None
+            alike |= dict.fromkeys(arrays, term)
+        if len(found) > PACES or any(acts_at_nodes(load) for load in loads):
+            return None
+        entries = [{name: term.arrays[name] for name, term in alike.items()} for alike in found.values()]
+        rest = PACES - len(found)
+        arrays = (*(NOTHING._replace(**own) for own in entries), *(NOTHING,) * rest)
+        slowest = np.full(len(body.mass), max(found, default=1))
+        if len(body.element_paces):
+            np.minimum.at(slowest, body.elements.cells, body.element_paces[:, None])
+        every, own = np.array([*found, *[0] * rest]), slowest[body.tie.slave]
+        moved = np.sum(own[:, None] <= every, axis=0)
+        return cls(PacedForces(arrays, every), np.argsort(own, kind="stable"), moved, list(found.values()))
+
+    def take(
+        self, motion: Motion, state: tuple[np.ndarray, np.ndarray], interface: Interface, accelerations: np.ndarray
+    ) -> float:
         """Take steps; return the work of the accelerations ``(m + 1, 3)`` [m/s^2] at the ends of steps [J].
+
+        Args:
+            motion: Of which ``state`` is the ``state`` and ``ahead`` of ``StepArrays``.
+            state: See above.
+            interface: See ``take_steps``.
+            accelerations: See above.
 
         Raises:
             InvertedElementError: An element is turned inside out; the motion's time is that of the step.
         """
-        work, taken, which, block = take_steps(steps, self.arrays, interface, accelerations, motion.step)
+        tie, force = motion.body.tie, motion.slave_force[self.order]
+        tied = tie.slave[self.order], tie.master[self.order], tie.weight[self.order]
+        steps = StepArrays(*state, motion.mobility, motion.counted_mass, *tied, self.moved, force)
+        work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
+        motion.slave_force[self.order] = force
         for _ in range(taken):
             motion.time += motion.step
         if which != ALL_FINE:
-            error: InvertedElementError = self.terms[NAMES[which]].inverted(block, motion.displacement)
+            error: InvertedElementError = self.terms[pace][NAMES[which]].inverted(block, motion.displacement)
             raise error
         return float(work)
 

@@ -74,6 +74,13 @@ def force_terms(
         laws: Index of ``elements.elasticity`` -> law in UFL that stands in the place of this material.
     """
     own = ~np.isin(elements.material, list(laws))
+    return terms_of(elements, own, materials, kinematics, step) + ufl_terms(elements, laws)
+
+
+def terms_of(
+    elements: Elements, own: NDArray[np.bool_], materials: Sequence[Material], kinematics: Kinematics, step: float
+) -> list[ForceTerm]:
+    """Return the force terms of those elements that are ``own (ne,)``; other arguments as ``force_terms``."""
     plastic = np.array([plastic_constants(material) for material in materials])
     elastic = own & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
     linear = elastic if kinematics == "small" else np.zeros_like(elastic)
@@ -84,7 +91,7 @@ def force_terms(
     if path.any():
         finite = kinematics != "small"
         terms.append(NonlinearElements.build(elements, np.flatnonzero(path), plastic, Path(finite, step)))
-    return terms + ufl_terms(elements, laws)
+    return terms
 
 
 def ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]:

@@ -19,6 +19,7 @@ from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces
 
 ALL_FINE = -1  # no element is turned inside out
+PACES = 3  # at which force terms may act
 NAMES = ("congruent", "assembled", "turning_rows", "turning_boxes", "turning", "one_point")
 
 
@@ -44,23 +45,39 @@ class ForceArrays(NamedTuple):
     path: Path
 
 
+class PacedForces(NamedTuple):
+    """Force terms by the steps in which they act.
+
+    Attributes:
+        arrays: ``PACES`` of them; there is one compiled program for all numbers of paces.
+        every: ``(PACES,)`` in how many steps each of them acts once; 0 where there is none.
+    """
+
+    arrays: tuple[ForceArrays, ...]
+    every: NDArray[np.int64]
+
+
 class StepArrays(NamedTuple):
     """What a motion on one rank steps with, see ``ExplicitMotion``; slaves, masters and weights are those of the tie.
 
     Attributes:
         state: ``(3, n, 3)`` displacement [m], velocity half a step back [m/s], force [N].
+        ahead: ``(n, 3)`` [N], or ``(0, 3)``: see ``ExplicitMotion``.
         mobility: ``(n, 3)`` [1/kg].
         counted_mass: ``(n,)`` [kg].
-        slave, master, weight: See ``fem.mesh.tie``.
-        slave_force: ``(ns, 3)`` [N].
+        slave, master, weight: See ``fem.mesh.tie``; first those of elements that act most often.
+        moved: ``(PACES,)`` how many of them elements of each pace and of smaller ones have.
+        slave_force: ``(ns, 3)`` [N] of the elements on them, when they acted last.
     """
 
     state: NDArray[np.float64]
+    ahead: NDArray[np.float64]
     mobility: NDArray[np.float64]
     counted_mass: NDArray[np.float64]
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
     weight: NDArray[np.float64]
+    moved: NDArray[np.int64]
     slave_force: NDArray[np.float64]
 
 
@@ -120,41 +137,112 @@ def add_forces(arrays, displacement, force):
 
 
 @njit(cache=True)
-def take_steps(motion, arrays, interface, accelerations, step):
+def take_steps(motion, forces, interface, accelerations, step):
     """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do, in the same order.
 
     Args:
         motion: ``StepArrays``.
-        arrays: ``ForceArrays``.
+        forces: ``PacedForces``; all of them have just acted.
         interface: ``Interface``.
         accelerations: ``(m + 1, 3)`` [m/s^2] of all masses as each step begins, and after the last.
         step: dt [s].
 
     Returns:
-        Work of the accelerations [J]; steps taken; what ``add_forces`` returned last.
+        Work of the accelerations [J]; steps taken; what ``add_forces`` returned last; at which pace that was.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
+    pushed, due = np.zeros_like(motion.ahead), len(motion.ahead) > 0
     work = 0.0
     for k in range(len(accelerations) - 1):
-        for i in range(len(interface.rows)):
-            for c in range(3):
-                velocity[interface.rows[i], c] = interface.given[i, c] + interface.change[k, c]
+        move_interface(interface, k, velocity)
+        if due:
+            add_ahead(motion.ahead, force)
         advance(motion.state, motion.mobility, accelerations[k], step)
-        spread_to_slaves(motion.slave, motion.master, motion.weight, displacement)
+        moved = slaves_moved(motion, forces, k + 1)
+        spread_to_slaves(motion.slave[:moved], motion.master[:moved], motion.weight[:moved], displacement)
         mean = 0.5 * (accelerations[k] + accelerations[k + 1])
         if mean.any():
             work += step * power_of(mean, motion.counted_mass, velocity)
-        force[:] = 0.0
-        which, block = add_forces(arrays, displacement, force)
+        which, block, pace, due = add_paced_forces(motion, forces, k + 1, pushed)
         if which != ALL_FINE:
-            return work, k + 1, which, block
-        for i in range(len(motion.slave)):
-            for c in range(3):
-                motion.slave_force[i, c] = force[motion.slave[i], c]
-        gather_from_slaves(motion.slave, motion.master, motion.weight, force)
+            return work, k + 1, which, block, pace
+        gather_forces(motion, moved, due)
         for j in range(2):
             add_impulse(interface.counted, force, interface.weights[k + 1, j], interface.impulses[j])
-    return work, len(accelerations) - 1, ALL_FINE, 0
+            if due:
+                add_impulse(interface.counted, motion.ahead, interface.weights[k + 1, j], interface.impulses[j])
+    return work, len(accelerations) - 1, ALL_FINE, 0, 0
+
+
+@njit(cache=True)
+def move_interface(interface, substep, velocity):
+    """Prescribe the velocities of an ``Interface`` in a step."""
+    for i in range(len(interface.rows)):
+        for c in range(3):
+            velocity[interface.rows[i], c] = interface.given[i, c] + interface.change[substep, c]
+
+
+@njit(cache=True)
+def add_ahead(ahead, force):
+    """Add to the force ``(n, 3)`` [N] what has acted for the steps that follow, and zero it."""
+    for i in range(len(force)):
+        for c in range(3):
+            force[i, c] += ahead[i, c]
+            ahead[i, c] = 0.0
+
+
+@njit(cache=True)
+def slaves_moved(motion, forces, substep):
+    """Return how many of the slaves elements have that act after a step."""
+    moved = 0
+    for pace in range(PACES):
+        if forces.every[pace] and substep % forces.every[pace] == 0:
+            moved = max(moved, motion.moved[pace])
+    return moved
+
+
+@njit(cache=True)
+def add_paced_forces(motion, forces, substep, pushed):
+    """Put the forces that act after a step into those of a motion; ``pushed (n, 3)`` is zero between calls.
+
+    Returns:
+        What ``add_forces`` returned last, at which pace, and whether something acts for steps that follow.
+    """
+    force, due = motion.state[2], False
+    force[:] = 0.0
+    for pace in range(PACES):
+        every = forces.every[pace]
+        if every and substep % every == 0:
+            which, block = add_forces(forces.arrays[pace], motion.state[0], force if every == 1 else pushed)
+            if which != ALL_FINE:
+                return which, block, pace, due
+            if every > 1:
+                due = True
+                add_pushed(pushed, every, force, motion.ahead)
+    return ALL_FINE, 0, 0, due
+
+
+@njit(cache=True)
+def add_pushed(pushed, every, force, ahead):
+    """Add to the force ``(n, 3)`` [N] what acts once in some steps, to ``ahead`` its share of the others; zero it."""
+    for i in range(len(pushed)):
+        for c in range(3):
+            force[i, c] += pushed[i, c]
+            ahead[i, c] += (every - 1) * pushed[i, c]
+            pushed[i, c] = 0.0
+
+
+@njit(cache=True)
+def gather_forces(motion, moved, due):
+    """Keep the forces of the first slaves, and move them to their masters; those for steps that follow, too."""
+    slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
+    force = motion.state[2]
+    for i in range(moved):
+        for c in range(3):
+            motion.slave_force[i, c] = force[slave[i], c]
+    gather_from_slaves(slave, master, weight, force)
+    if due:
+        gather_from_slaves(slave, master, weight, motion.ahead)
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.kind import Geometry
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import LevelError, MassError, RankError
-from reflowshock.fem.forces.force import ForceTerm, force_terms, linear_terms
+from reflowshock.fem.forces.force import ForceTerm, force_terms, linear_terms, terms_of
 from reflowshock.fem.forces.force_ufl import Law, tangent_at_rest
 from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.materials.kinematics import Kinematics
@@ -162,9 +162,31 @@ def make_body(
     free[tie.slave] = False
     interface = local.locate(tables.interface).astype(np.int32)
     body = Body(local, elements, pieces.geometry, [], tie, shared, interface, mass, free)
-    terms = response_terms(comm, body, pieces, tables, response) if response else linear_terms(elements)
-    warm_up(terms, len(mass))
-    return replace(body, terms=terms)
+    if response and tables.every.max() > 1:
+        body = with_paces(body, pieces, tables, response)
+    else:
+        terms = response_terms(comm, body, pieces, tables, response) if response else linear_terms(elements)
+        body = replace(body, terms=terms)
+    warm_up(body.terms, len(mass))
+    return body
+
+
+def with_paces(body: Body, pieces: Pieces, tables: Tables, response: ForceOptions) -> Body:
+    """Return a body with force terms for each of the paces at which its elements act.
+
+    Raises:
+        LevelError: Some elements have a law in UFL; on every rank.
+    """
+    if pieces.laws:
+        raise LevelError("parts with a law in UFL act in each step: choose coupling.levels = 1")
+    every, schedule = tables.every[body.local.cell_numbers], np.unique(tables.every).tolist()
+    terms: list[ForceTerm] = []
+    paces: list[int] = []
+    for pace in schedule:
+        step = pace * response.step
+        found = terms_of(body.elements, every == pace, pieces.materials, response.kinematics, step)
+        terms, paces = [*terms, *found], [*paces, *[pace] * len(found)]
+    return replace(body, terms=terms, paces=tuple(paces), schedule=tuple(schedule), element_paces=every)
 
 
 def response_terms(

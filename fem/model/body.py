@@ -1,7 +1,7 @@
 """One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,10 @@ class Body:
         elements: Its elements with their density, mass scaling included.
         geometry: Their volumes and mean gradients.
         terms: Force terms.
+        paces: In how many steps of the model each of the first terms acts once, by impulses (``path_levels``); the
+            others act in each step.
+        schedule: The paces of the model's terms on all ranks.
+        element_paces: ``(ne,)`` those of the elements; empty where all act in each step.
         tie: Slaves and masters, local numbers.
         shared: Nodes that several ranks hold.
         interface: ``(nc,)`` local number of each interface node, -1 where another rank has it.
@@ -47,6 +51,14 @@ class Body:
     initial_stress: NDArray[np.float64] | None = None
     lumped: float = 0.0
     begin: Callable[[NonlinearElements], None] | None = None
+    paces: tuple[int, ...] = ()
+    schedule: tuple[int, ...] = (1,)
+    element_paces: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
+
+    @property
+    def paced(self) -> list[tuple[ForceTerm, int]]:
+        """Return the terms, each with its pace."""
+        return list(zip(self.terms, (*self.paces, *(1,) * (len(self.terms) - len(self.paces))), strict=True))
 
     @property
     def turns(self) -> bool:

@@ -57,8 +57,9 @@ class Coupling(Parameters):
 
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
     velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
-    model, which takes nothing back. ``levels`` are those of the meso model's steps below the window. ``buffer_layers``
-    of board elements lie between joints and an interface of held velocity.
+    model, which takes nothing back. ``levels`` are those of the meso model's steps below the window; with held velocity
+    there are three at most, and one under damping, springs, a large mass or stress of cooling. ``buffer_layers`` of
+    board elements lie between joints and an interface of held velocity, and of any elements between its levels.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
@@ -70,7 +71,7 @@ class Coupling(Parameters):
     @classmethod
     def _of_local_steps(cls, value: int | str, info: ValidationInfo) -> int | str:
         scheme = info.data.get("scheme", "auto")
-        if value != "auto" and scheme not in ("auto", "local_steps"):
+        if value != "auto" and scheme not in ("auto", "local_steps", "held_velocity"):
             raise PydanticCustomError("inadmissible", f"does not go with scheme = {scheme}", {"allowed": "auto"})
         return value
 

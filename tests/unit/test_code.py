@@ -24,7 +24,7 @@ def run_tool(*arguments: str) -> None:
 
 
 def test_ruff():
-    run_tool("-m", "ruff", "check", *PACKAGES, "tests", "benchmarks")
+    run_tool("-m", "ruff", "check", *PACKAGES, "reflowshock", "docs", "tests", "benchmarks")
 
 
 @pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) >= "2.0.0", reason="types are those that NumPy 1 declares")

@@ -25,7 +25,7 @@ from reflowshock.workflow.jobs import batch
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.terminal import progress_bar, styled
+from reflowshock.workflow.process.terminal import progress_bar, styled, text_table
 from reflowshock.workflow.store.folders import check_folder, locked
 from reflowshock.workflow.store.keys import product_keys
 from reflowshock.workflow.store.point import Point
@@ -186,8 +186,11 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     tried = (*_left_out(runner), *_impossible(runner), *_failed(runner))
     remarks = (*tried, *unproved(accuracy), *_unhealthy(accuracy, runner), *_own_size(request, accuracy))
     write_pages(folder, accuracy, remarks)
-    console.print(table(tables.runs(accuracy), f"Errors and costs (smallest of repeated runs) on {accuracy.machine}"))
-    console.print(styled("[dim]{}", tables.legend(accuracy)), soft_wrap=True)
+    every = tables.runs(accuracy)
+    title = f"\nErrors and costs (smallest of repeated runs) on {accuracy.machine}"
+    console.print(text_table(title, every["head"][:-1], [row[:-1] for row in every["rows"]]))
+    for remark in (tables.legend(accuracy), *tables.remarks(accuracy)):
+        console.print(styled("[dim]{}", remark), soft_wrap=True)
     console.print(
         table(
             tables.orders(accuracy),
@@ -306,13 +309,5 @@ def _show_choice(accuracy: Accuracy, console: Console) -> None:
 
 
 def table(texts: dict, title: str) -> Table:
-    """Lay out head and rows of text; the last column takes what room is left."""
-    shown = Table(
-        title=f"\n{title}" if title else None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False
-    )
-    for place, name in enumerate(texts["head"]):
-        last = place == len(texts["head"]) - 1
-        shown.add_column(name, no_wrap=not last, justify="left" if last or place == 0 else "right")
-    for row in texts["rows"]:
-        shown.add_row(*row)
-    return shown
+    """Lay out head and rows of text."""
+    return text_table(f"\n{title}" if title else "", texts["head"], texts["rows"], remarks=texts.get("prose", False))

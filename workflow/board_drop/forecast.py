@@ -7,7 +7,7 @@ from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
-from reflowshock.workflow.board_drop.board_deflection import decided
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
@@ -97,19 +97,20 @@ def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> 
 
 
 def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
+    share = expected_duration(case) / longest_duration(case)
     of_shock, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
-    shock = forecast_shock(case, parts)
+    shock = forecast_shock(case, parts, share)
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     cooling, seconds = shock_cooling.forecast(case, parts)
     modes = {
-        "two_scale": shock.two_scale + seconds_around(case, two_scale_parts(case)),
-        "dns": dns + seconds_around(case, parts, shock.dns_share),
+        "two_scale": share * shock.two_scale + seconds_around(case, two_scale_parts(case), share),
+        "dns": share * dns + seconds_around(case, parts, share * shock.dns_share),
     }
     again = modes["two_scale" if "two_scale" in numerics.modes else "dns"]
     if shock.search:
-        modes["two_scale"] += shock.search + seconds_around(case, coarse_parts(case))
+        modes["two_scale"] += share * shock.search + seconds_around(case, coarse_parts(case), share)
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,

@@ -52,6 +52,12 @@ def _joints(case: PackageCase, outlook: PackageForecast) -> str:
     return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}{ranks}"
 
 
+def _expected(shock: ShockForecast, seconds: float) -> str:
+    """Write what is expected of a wall time [s] for the longest duration, and that time where it is another."""
+    most = f", at most {duration(seconds)}" if shock.share < 1.0 else ""
+    return f"about {duration(shock.share * seconds)}{most}"
+
+
 def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     every = case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
@@ -59,21 +65,22 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("scheme", scheme.replace("_", " "), why)
     table.add_row("fine joints", *_fine_joints(case))
     if case.shock.duration == "auto":
-        table.add_row("duration", f"at most {short(longest_duration(case))}", SETTLES)
+        longest, expected = short(longest_duration(case)), short(shock.share * longest_duration(case))
+        table.add_row("duration", f"about {expected}, at most {longest}", SETTLES)
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
     if shock.search:
-        table.add_row("coarse run", f"about {duration(shock.search)}", "all joints coarse, to find the critical ones")
-    table.add_row("two-scale", f"about {duration(shock.two_scale)}", _placement(case) + _absent("two_scale", case))
+        table.add_row("coarse run", _expected(shock, shock.search), "all joints coarse, to find the critical ones")
+    table.add_row("two-scale", _expected(shock, shock.two_scale), _placement(case) + _absent("two_scale", case))
     if case.shock.identical_joints:
         again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns
         table.add_row(
-            "identical joints", f"about {duration(again)}", "the first mode again, to see what the real shapes change"
+            "identical joints", _expected(shock, again), "the first mode again, to see what the real shapes change"
         )
     part = f"; the first {short(shock.dns_share * longest_duration(case))}" if shock.dns_share < 1.0 else ""
     dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
-    table.add_row("DNS", f"about {duration(shock.dns)}", dns)
+    table.add_row("DNS", _expected(shock, shock.dns), dns)
     table.add_row(
         "DNS, implicit steps", f"about {duration(shock.implicit)}", "one rank; elastic only (shock.numerics.dns_solver)"
     )

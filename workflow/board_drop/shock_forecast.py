@@ -68,6 +68,7 @@ class ShockForecast:
         two_scale: the same of the two-scale run.
         dns: the same of the DNS in explicit steps.
         dns_share: of the windows, those that the DNS has.
+        share: of the simulated time, what is expected where the duration is ``auto``; the seconds are for all of it.
         implicit: the same in implicit steps on one rank, where everything is elastic.
         updates_per_second: element updates per second and rank that the prediction assumes.
     """
@@ -81,6 +82,7 @@ class ShockForecast:
     two_scale: float
     dns: float
     dns_share: float
+    share: float
     implicit: float
     updates_per_second: float
 
@@ -153,12 +155,13 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
     }
 
 
-def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
+def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> ShockForecast:
     """Predict the scheme, the time steps and the wall time of the shock.
 
     Args:
         case: the case.
         parts: of the mesh with all joints fine.
+        share: see ``ShockForecast``.
     """
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
     from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
@@ -168,7 +171,7 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
     search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
     plan, dns = _direct(case, parts)
     direct = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
-    share = direct.windows / plan.windows
+    of_dns = direct.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
     slow = implicit_plan(direct, largest_implicit_step(longest_duration(case), pulses))
     elements = sum(part.elements for part in parts.values())
@@ -181,8 +184,9 @@ def forecast_shock(case: "BoardDropCase", parts: Parts) -> ShockForecast:
         windows=plan.windows,
         search=search,
         two_scale=seconds,
-        dns=share * dns,
-        dns_share=share,
+        dns=of_dns * dns,
+        dns_share=of_dns,
+        share=share,
         implicit=implicit,
         updates_per_second=UPDATES_PER_SECOND,
     )

@@ -27,6 +27,7 @@ def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"
+SMALLEST_ERROR = 5e-5  # that is told
 
 
 def every_run(accuracy: Accuracy) -> list[Measurement]:
@@ -55,11 +56,27 @@ def runs(accuracy: Accuracy) -> dict:
     head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
     rows = []
     for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
-        errors = [percent(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
-        cost = ["", ""] if one.failed else [f"{one.seconds:.1f}", f"{one.core_seconds:.1f}"]
+        errors = [_error(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
+        cost = ["", ""] if one.failed else [number(float(f"{cost:.3g}")) for cost in (one.seconds, one.core_seconds)]
         name = f"{one.run} {ON_FRONT}" if one.run in best else one.run
         rows.append([name, *errors, *cost, _remark(one, accuracy, usual)])
-    return {"head": head, "rows": rows, "prose": True}
+    last = len(head) - 1
+    shown = [column for column in range(len(head)) if column in {0, last} or any(row[column] for row in rows)]
+    picked = [[row[column] for column in shown] for row in rows]
+    return {"head": [head[column] for column in shown], "rows": picked, "prose": True}
+
+
+def _error(share: float) -> str:
+    """Write an error to a hundredth of a per cent."""
+    return percent(share) if share >= 0.001 else f"{100.0 * share:.2f} %" if share >= SMALLEST_ERROR else "< 0.01 %"
+
+
+def remarks(accuracy: Accuracy) -> list[str]:
+    """Return what the last column of `runs` says, each remark once with the runs that it is about."""
+    about: dict[str, list[str]] = {}
+    for row in runs(accuracy)["rows"]:
+        about.setdefault(row[-1], []).append(row[0].removesuffix(f" {ON_FRONT}"))
+    return [f"{remark}: {', '.join(names)}" for remark, names in about.items() if remark]
 
 
 def short(quantity: str) -> str:
@@ -79,7 +96,9 @@ def _remark(one: Measurement, accuracy: Accuracy, usual: str) -> str:
         words = " ".join(one.failed.split())
         return f"failed: {words if len(words) <= LONGEST_MESSAGE else words[:LONGEST_MESSAGE] + ' …'}"
     error = one.errors.get(accuracy.judged)
-    return "" if error is None or error.against == usual else f"from {error.against.removeprefix('run ')}"
+    if error is None:
+        return "not compared, nothing finer was run"
+    return "" if error.against == usual else f"compared with {error.against.removeprefix('run ')}"
 
 
 def legend(accuracy: Accuracy) -> str:

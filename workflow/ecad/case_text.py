@@ -97,6 +97,7 @@ def _package(array: Array, component: Component, wanted: Wanted) -> Package:
     body = component.body or [side + array.pitch for side in arrays]
     length, width = (max(size, side + pad) for size, side in zip(body, arrays, strict=True))
     column = min(array.pitch, length - arrays[0], width - arrays[1])
+    imprint = {"size": column} if column < (1.0 - 1e-6) * array.pitch else {}  # else it follows the pitch
     smd = opening < array.diameter
     if not smd and opening <= array.diameter * (1.0 + 1e-6):
         opening = 1.2 * array.diameter
@@ -110,7 +111,7 @@ def _package(array: Array, component: Component, wanted: Wanted) -> Package:
             "substrate": {"length": length, "width": width, "thickness": 4e-4},
             "die": {"length": DIE * length, "width": DIE * width, "thickness": 4e-4},
             "numerics": {"element_size": 0.25 * array.pitch},
-            "imprint": {"size": column} if column > LEAST_ROOM * pad else None,
+            "imprint": imprint if column > LEAST_ROOM * pad else None,
         }
     )  # fmt: skip
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.workflow.report import tables
-from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
+from reflowshock.workflow.report.errors import NOT_KNOWN, Discretisation, left_out, scheme_error
 
 FIGURES = (
     ("critical_joint", "critical joint"),
@@ -56,6 +56,9 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
         ]
         for name, label in found.items()
     ]
-    unknown = any(row[2] == "not known" for row in rows)
-    note = f"{NOTE} Discretisation error not known: {known.unknown}." if unknown else NOTE
+    note = NOTE
+    if any(row[2] == NOT_KNOWN for row in rows):
+        note += f" Discretisation error not known: {known.unknown}."
+    if any(row[3] == NOT_KNOWN for row in rows) and len(results) == 1:
+        note += ' Error of two scales not known: shock.numerics.modes has no "dns", one model at the small step.'
     return {"head": HEAD, "rows": rows, "left_out": left_out(summary["effects"]), "note": note}

@@ -38,10 +38,10 @@ def add_joints(run_folder: Path, context: dict) -> None:
 
 def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
     """The figures of the joints at the top of the page."""
-    standoffs = [1e6 * joint["standoff"] for joint in joints]
+    standoffs = sorted({f"{1e6 * joint['standoff']:.0f}" for joint in joints}, key=float)
     shapes = len({joint["shape"] for joint in joints})
     return [
-        {"value": f"{min(standoffs):.0f}–{max(standoffs):.0f} µm", "label": "standoff over the array"},
+        {"value": f"{'–'.join(dict.fromkeys((standoffs[0], standoffs[-1])))} µm", "label": "standoff over the array"},
         {"value": f"{len(joints)} / {shapes}", "label": "joints / distinct shapes"},
     ]
 

@@ -14,6 +14,7 @@ from reflowshock.workflow.effects.table import report_table
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.errors import Discretisation
+from reflowshock.workflow.report.scene import Scene
 from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.store.keys import inputs_digest
 from reflowshock.workflow.store.product import read_record
@@ -30,11 +31,24 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
     Returns:
         The summary.
     """
-    summary, known = collect_summary(run_folder, case), discretisation(run_folder, case)
-    kind_of(case).conclude(run_folder, case, summary, known)
+    summary, known = _concluded(run_folder, case)
     write_summary(folder, summary)
     write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary, known))
     return summary
+
+
+def moving_scene(run_folder: Path, case: Case) -> Scene | None:
+    """Return the first scene of a run's report that moves: the drop, else the solder; None where nothing moves yet."""
+    scenes = _context(run_folder, case, *_concluded(run_folder, case))["scenes"]
+    found = (scenes[name] for name in ("view", "body") if name in scenes)
+    return next((scene for scene in found if len(scene.frames) > 1), None)
+
+
+def _concluded(run_folder: Path, case: Case) -> tuple[dict, Discretisation]:
+    """Return the summary of a run with its conclusion, and the errors of its figures."""
+    summary, known = collect_summary(run_folder, case), discretisation(run_folder, case)
+    kind_of(case).conclude(run_folder, case, summary, known)
+    return summary, known
 
 
 def _context(run_folder: Path, case: Case, summary: dict, known: Discretisation) -> dict:

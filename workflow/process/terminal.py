@@ -5,10 +5,11 @@ A title, a folder or a message may hold anything: brackets are shown as they are
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
+import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -91,6 +92,16 @@ def print_error(text: str) -> None:
         errors.print(rest, soft_wrap=True)
 
 
+@contextmanager
+def interruptible(what: str) -> Iterator[None]:
+    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        print_error(f"interrupted; {what}")
+        raise typer.Exit(1) from error
+
+
 def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
     """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit.
 
@@ -162,6 +173,18 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
             tell(share, text)
 
         yield show
+
+
+def text_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], remarks: bool = False) -> Table:
+    """Lay out rows of text; heads are broken into words, values are not: names and remarks in the last column are."""
+    shown = Table(title=title or None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    for place, name in enumerate(head):
+        last = remarks and place == len(head) - 1
+        justify: Literal["left", "right"] = "left" if last or place == 0 else "right"
+        shown.add_column(name.replace(" ", "\n"), no_wrap=not last and place > 0, justify=justify, overflow="fold")
+    for row in rows:
+        shown.add_row(*row)
+    return shown
 
 
 def new_table(title: str, *columns: str) -> Table:

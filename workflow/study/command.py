@@ -5,14 +5,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from rich.table import Table
-
 from reflowshock.names import nearest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
-from reflowshock.workflow.process.terminal import console, new_table, print_error, progress_bar
+from reflowshock.workflow.process.terminal import console, new_table, print_error, progress_bar, text_table
 from reflowshock.workflow.store.folders import locked
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
@@ -189,21 +187,13 @@ def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
     ranking = tables.ranking(study, rows)
     if ranking["rows"]:
         count = min(SHOWN, len(ranking["rows"]))
-        console.print(_printed(f"{count} of {len(rows)} points by {study.about.rank_by}", ranking, count))
-        console.print(_printed("\nMain effects", tables.effect_table(tables.effects(study, rows))))
+        title = f"{count} of {len(rows)} points by {study.about.rank_by}"
+        console.print(text_table(title, ranking["head"], ranking["rows"][:count]))
+        effects = tables.effect_table(tables.effects(study, rows))
+        console.print(text_table("\nMain effects", effects["head"], effects["rows"]))
         if remark := tables.imbalance(rows):
             console.print(remark, soft_wrap=True)
     for row in rows:
         if row.verdict != HEALTHY:
             print_error(f"point {row.number} {row.key} {row.verdict}: {row.message}")
     console.print(f"results: {folder}/study.html, results.csv, results.parquet, main_effects.png")
-
-
-def _printed(title: str, table: dict, count: int | None = None) -> Table:
-    shown = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
-    for place, head in enumerate(table["head"]):
-        lines = head.replace(" ", "\n")  # values are not to be broken
-        shown.add_column(lines, justify="right" if place else "left", no_wrap=True, overflow="fold")
-    for row in table["rows"][:count]:
-        shown.add_row(*row)
-    return shown

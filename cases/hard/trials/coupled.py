@@ -47,7 +47,8 @@ def surveyed(
     """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
     whole = joined(mesh)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
-    return whole, survey(whole.mesh, materials, Treatment()), Rules(coupling, coarse, fraction, 0.0, DURATION, 1)
+    rules = Rules(coupling, coarse, fraction, 0.0, DURATION, 1, pushed=False)
+    return whole, survey(whole.mesh, materials, Treatment()), rules
 
 
 def checked(whole: Whole, found: Survey, rules: Rules) -> Division:

@@ -130,7 +130,8 @@ def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) 
     points, cells = grid(np.arange(count + 1) * 1e-3, [0, 1e-3], [0, 1e-3])
     points[-1, 0] += 1e-4
     mesh = mesh_of(points, cells, np.where(np.arange(count) < count // 4, "copper", "board"), {})
-    return ModelWork(mesh, np.where(np.arange(count) < count // 4, level, 0).astype(np.int32), ratios, steps, KIND)
+    levels = np.where(np.arange(count) < count // 4, level, 0).astype(np.int32)
+    return ModelWork(mesh, levels, steps * np.cumprod([1, *ratios]), steps, KIND)
 
 
 def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float = 1.0) -> Measured:

@@ -45,7 +45,7 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
     tables = structure_tables(whole, request)
     meso = (whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 2] > 3e-3) & whole.mesh.in_parts("layer_2".__ne__)
     plan = WindowPlan(1e-7, 2, 200, 1)
-    division = Division("held_velocity", ~meso, meso, np.zeros(len(meso), np.int32), (), plan)
+    division = Division("held_velocity", ~meso, meso, meso.astype(np.int32), (2,), plan)
     inputs = [item.tables for item in split(whole, tables, division).values()]
     (area,) = tables.areas.values()
     assert sum(item.areas["x_max"][1].sum(axis=0) for item in inputs) == pytest.approx(area[1].sum(axis=0))

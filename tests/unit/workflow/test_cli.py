@@ -10,9 +10,11 @@ import pytest
 
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.fields import display_values
+from reflowshock.workflow.examples import EXAMPLES
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.store.folders import locked
+from tests.support.command_parser import commands, parse
 from tests.support.workflow_command import command_line
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
@@ -182,3 +184,22 @@ def test_the_schema_accepts_cases_and_refuses_bare_numbers(call):
 def test_the_version(call):
     code, output, _ = call("--version")
     assert (code, output.startswith("reflowshock ")) == (0, True)
+
+
+@pytest.mark.parametrize("command", commands())
+def test_help_ends_with_examples_that_the_command_takes(call, command):
+    code, output, _ = call(command, "--help")
+    assert (code, "Examples:" in output) == (0, True)
+    assert 1 <= len(EXAMPLES[command]) <= 3
+    for line in EXAMPLES[command]:
+        parse(line)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"), [("drop.mp4", "is not the name of a GIF"), ("a.gif", "exists and is not a GIF")]
+)
+def test_a_movie_is_written_over_nothing_else(call, tmp_path, name, why):
+    (tmp_path / "a.gif").write_text("mine")
+    code, _, errors = call("report", str(CASE), "--movie", name)
+    assert (code, why in errors) == (2, True)
+    assert (tmp_path / "a.gif").read_text() == "mine"

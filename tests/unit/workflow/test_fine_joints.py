@@ -91,7 +91,7 @@ def test_joints_that_yield_rank_by_their_plastic_work(tmp_path):
     fine = most_stressed(tmp_path / "history.npz", 1)
     assert fine.names == ("A2",)
     assert "by plastic work density of the layer" in fine.why
-    assert "A2 5 kJ/m^3; the next is A1" in fine.why
+    assert "A2 5 kJ/m³; the next is A1" in fine.why
 
 
 @pytest.mark.parametrize("names", ["all", ("A3", "B4")])

@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection, expected_duration
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.convergence.packages import package_study
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
+CASES = Path(__file__).parents[3] / "cases"
 PULSE = 'peak_acceleration = "1500 G"\npulse_duration = "0.02 ms"\n'
 
 
@@ -138,6 +139,16 @@ def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
         _ = case.shock.decided_duration
     given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
     assert longest_duration(given) == given.shock.decided_duration == 2e-4
+
+
+@pytest.mark.parametrize(("kinematics", "measured"), [("corotational", 2.05e-3), ("small", 3.05e-3)])
+def test_expected_duration_is_that_of_the_default_case(kinematics, measured):
+    """Where its run ended, as cases/jedec_bga/README.md tells."""
+    case = read_case(CASES / "jedec_bga" / "case.toml", [f"shock.numerics.kinematics={kinematics}"])
+    assert expected_duration(case) == pytest.approx(measured, rel=0.1)
+    assert expected_duration(case) < longest_duration(case)
+    given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
+    assert expected_duration(given) == 2e-4
 
 
 def test_what_is_fitted_to_the_board_makes_it_slower():

@@ -1,0 +1,104 @@
+"""Step levels along a path: no window grows, momentum is kept to round-off, solder flows as in one step for all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from reflowshock.cases.hard.trials.bodies import SOLDER
+from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
+from reflowshock.fem.division.tables import prepare
+from reflowshock.fem.dynamics.central_difference import ExplicitMotion
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.mesh.tie import net_load
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.parallel.portable import values
+from tests.stability.test_fem_window_grid import GROWTH
+from tests.support.fem_levels import joint_on_board
+from tests.support.fem_tangent import flowing_pair
+
+NESTED = {
+    "thin": Pair(12, 3.0, 2, height=3, thinnest=0.2),
+    "high": Pair(6, 1.0, 2, height=6, thinnest=0.1),
+    "stiff": Pair(3, 10.0, 2, height=6, thinnest=0.1, columns=4),
+}
+LAYERS = 2  # of elements that could take the larger step
+PACE = 4
+FRACTION = 0.9
+
+
+@pytest.mark.parametrize("name", NESTED)
+def test_window_with_levels_does_not_grow(name):
+    pair, held = NESTED[name], SCHEMES["held_velocity"]
+    assert len(pair.divided(held).division.ratios) > 1
+    assert pair.coupled(held).spectral_radius() <= 1.0 + GROWTH
+
+
+@pytest.mark.parametrize("name", NESTED)
+def test_window_with_levels_does_not_grow_where_it_has_turned_and_flows(name):
+    coupled = flowing_pair(NESTED[name], SCHEMES["held_velocity"])
+    assert len(coupled.meso.motion.body.schedule) > 1
+    assert coupled.spectral_radius() <= 1.0 + GROWTH
+
+
+def free_joint(pace: int) -> ExplicitMotion:
+    """Return the motion of a free joint on a piece of board whose elements act once in some steps where they can."""
+    mesh = joint_on_board(held=False)
+    item = prepare(mesh, "dns")["dns"]
+    materials = Materials(solder=SOLDER)
+    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, "one_point")
+    step = FRACTION * pieces.steps.min()
+    steps = np.empty(len(pieces.steps))
+    steps[pieces.local.cell_numbers] = pieces.steps
+    fine = FRACTION * steps < pace * step
+    for _ in range(LAYERS):
+        nodes = np.zeros(len(item.mesh.points), dtype=bool)
+        nodes[item.mesh.cells[fine]] = True
+        nodes[item.tables.tie.master[nodes[item.tables.tie.slave]]] = True
+        fine = nodes[item.mesh.cells].any(axis=1)
+    tables = replace(item.tables, every=np.where(fine, 1, pace).astype(np.int32))
+    response = ForceOptions("corotational", step)
+    body = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), response)
+    return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
+
+
+def thrown(pace: int, speed: float) -> ExplicitMotion:
+    """Return the same with a velocity that turns and strains it."""
+    motion = free_joint(pace)
+    points = motion.body.local.points
+    centred = points - points.mean(axis=0)
+    motion.velocity[:] = speed * np.column_stack([3 * centred[:, 2], centred[:, 0], -2 * centred[:, 0]]) / 1e-3
+    return motion
+
+
+def momentum(motion: ExplicitMotion) -> np.ndarray:
+    """Return linear and angular momentum (6,) about the origin in the present configuration."""
+    place = motion.body.local.points + motion.displacement
+    return net_load(place, motion.body.mass[:, None] * motion.present_velocity())
+
+
+def test_free_joint_that_flows_keeps_momentum_and_energy_and_flows_as_in_one_step_for_all():
+    ends, steps = {}, 1000
+    for pace in (1, PACE):
+        motion = thrown(pace, 30.0)
+        start, first = momentum(motion), motion.kinetic_energy()
+        motion.take_steps(steps)
+        held = motion.internal_energy()
+        assert np.abs(momentum(motion) - start)[:3].max() <= 1e-12 * np.abs(start).max() + 1e-15
+        assert motion.kinetic_energy() + held.total == pytest.approx(first, rel=1e-4)
+        ends[pace] = held.plastic / first
+    assert ends[1] > 5e-3
+    assert ends[PACE] == pytest.approx(ends[1], rel=0.01)
+
+
+def test_restart_goes_on_with_the_same_bits():
+    first, second = thrown(PACE, 3.0), free_joint(PACE)
+    for _ in range(5):
+        first.take_steps(PACE)
+    second.restore(values(first.state()))
+    for motion in (first, second):
+        motion.take_steps(3 * PACE)
+    assert np.array_equal(first.displacement, second.displacement)
+    assert np.array_equal(first.velocity, second.velocity)

@@ -1,0 +1,24 @@
+"""Command lines as the program's own parser reads them, without running them."""
+
+import shlex
+from collections.abc import Mapping
+from itertools import takewhile
+from typing import Any
+
+import typer
+
+from reflowshock.workflow import cli
+
+
+def commands() -> Mapping[str, Any]:
+    """Return the commands that a user sees, by name."""
+    group = typer.main.get_command(cli.app)
+    return {name: found for name, found in group.commands.items() if not found.hidden}
+
+
+def parse(line: str) -> tuple[str, dict]:
+    """Return command and parameters of a line "reflowshock COMMAND ..."; a line that cannot be parsed raises."""
+    program, command, *arguments = takewhile(lambda word: word not in ">|", shlex.split(line, comments=True))
+    assert program.rpartition("/")[2] == "reflowshock", line
+    context = commands()[command].make_context(command, arguments)
+    return command, context.params

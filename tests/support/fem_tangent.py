@@ -1,0 +1,84 @@
+"""Pairs of models that have turned and flow: linear force terms with the tangent stiffness of the program's elements.
+
+Each element has gone along its path into a state, with the steps of its level; its stiffness is that of a further step
+along the same path. The window around this state has an amplification matrix, as a linear one has.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse
+from mpi4py import MPI
+from scipy.spatial.transform import Rotation
+
+from reflowshock.cases.hard.trials.coupled import Coupled, models_of
+from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
+from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.forces.force import ForceTerm
+from reflowshock.fem.forces.force_assembled import AssembledElements
+from reflowshock.fem.materials.parameters import JohnsonCook
+from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.body import Body
+from reflowshock.fem.model.step_levels import upper_blocks
+from reflowshock.fem.problem.shock import Coupling
+
+YIELD, HARDENING = 1e-3, 0.05  # yield stress and hardening modulus over Young's modulus
+AXIS, ANGLE = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5]), 0.7  # [rad]
+STRAIN = 3e-3 * np.array([[1.0, 0.6, 0.3], [0.6, -0.4, 0.5], [0.3, 0.5, -0.6]])  # at the end of the path
+STEPS = 20  # of the path
+SHIFT = 1e-7  # of a node, over the size of the mesh
+
+
+def yielding(pair: Pair) -> Materials:
+    """Return the materials of a pair whose block yields."""
+    materials = pair.materials()
+    modulus = materials.solder.young_modulus
+    law = JohnsonCook(A=YIELD * modulus, B=HARDENING * modulus)
+    return materials.model_copy(update={"solder": materials.solder.model_copy(update={"plasticity": law})})
+
+
+def on_path(points: np.ndarray, share: float) -> np.ndarray:
+    """Return displacements (n, 3) [m] a share of the way along the path: turned and strained alike everywhere."""
+    rotation = Rotation.from_rotvec(share * ANGLE * AXIS).as_matrix()
+    return points @ (rotation @ (np.eye(3) + share * STRAIN)).T - points
+
+
+def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
+    """Return a term with the stiffness that another one has in a step along the path; that one is then at its end."""
+    for step in range(1, STEPS + 1):
+        term.add(on_path(points, step / STEPS), np.zeros_like(points))
+    kept = {name: values.copy() for name, values in term.history.items()}
+    place, shift = on_path(points, 1.0 + 1.0 / STEPS), SHIFT * np.ptp(points)
+    matrix = np.empty((points.size, points.size))
+    for column in range(points.size):
+        forces = []
+        for sign in (1.0, -1.0):
+            for name, values in kept.items():
+                term.history[name][...] = values
+            moved, force = place.copy(), np.zeros_like(points)
+            moved.reshape(-1)[column] += sign * shift
+            term.add(moved, force)
+            forces.append(force.ravel())
+        matrix[:, column] = (forces[1] - forces[0]) / (2.0 * shift)
+    blocks = scipy.sparse.csr_matrix(0.5 * (matrix + matrix.T)).tobsr((3, 3))
+    blocks.sort_indices()
+    return upper_blocks(blocks, len(points))
+
+
+def flowing(body: Body) -> Body:
+    """Return a body whose terms have their tangents."""
+    return replace(body, terms=[tangent(term, body.local.points) for term in body.terms])
+
+
+def flowing_pair(pair: Pair, coupling: Coupling, fraction: float = FRACTION, formulation: str = "one_point") -> Coupled:
+    """Return both models of a pair in finite rotation, at the steps that the program chooses; the block flows."""
+    materials = yielding(pair)
+    models = models_of(pair.mesh(), materials, coupling, fraction)
+    response = ForceOptions("corotational", models.division.meso_step)
+    bodies = {}
+    for role, (pieces, tables) in models.parts.items():
+        own = make_pieces(pieces.local, tables, materials, formulation)
+        body = make_body(MPI.COMM_SELF, own, tables, np.ones(len(own.steps)), response)
+        bodies[role] = flowing(body)
+    return Coupled(bodies, models.division.plan, scheme_of(models.division.scheme))

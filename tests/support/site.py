@@ -1,0 +1,34 @@
+"""Commands that the site shows: those of its pages, and those of READMEs, which are pages of it as they are."""
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.support.command_parser import commands
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+FENCE = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INDENTED = re.compile(r"^    (\S.*)$", re.MULTILINE)
+OURS = re.compile(rf"^(\S*/)?reflowshock ({'|'.join(commands())}|--)")
+
+
+def pages() -> list[Path]:
+    """Return the pages that are written by hand."""
+    return sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "generated")
+
+
+def shown(page: Path) -> list[str]:
+    """Return the command lines of a page, in their order."""
+    lines = "".join(FENCE.findall(page.read_text())).splitlines()
+    return [line.partition("  #")[0].rstrip() for line in lines]
+
+
+def in_readmes() -> Iterator[tuple[Path, str]]:
+    """Yield the program's commands in all READMEs and other pages at the top."""
+    listed = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    for path in (ROOT / name for name in listed.splitlines() if not name.startswith("docs/")):
+        for line in INDENTED.findall(path.read_text()):
+            if OURS.match(line):
+                yield path, line.partition("  #")[0].rstrip()

@@ -1,0 +1,45 @@
+"""Recipes that install the program without `make setup` know what it needs, and name files that exist."""
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+INSTALL = ROOT / "docs/install"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+ON_CONDA = {"gmsh": "python-gmsh", "matplotlib": "matplotlib-base"}  # named otherwise there
+FROM_DEBIAN = {"fenics-dolfinx", "petsc4py", "slepc4py", "mpi4py", "openmpi", "h5py"}
+
+
+def test_the_conda_environment_has_all_that_the_program_needs():
+    listed = yaml.safe_load((INSTALL / "environment.yml").read_text())["dependencies"]
+    flat = [one for entry in listed for one in (entry["pip"] if isinstance(entry, dict) else [entry])]
+    found = {re.split(r"[<>=]", one)[0]: one for one in flat}
+    for wanted in PROJECT["dependencies"]:
+        name, _, least = re.match(r"([\w-]+)(>=([\d.]+))?", wanted).groups()
+        assert ON_CONDA.get(name, name) in found, wanted
+        if least and name != "numpy":
+            assert f">={least}" in found[ON_CONDA.get(name, name)], wanted
+    assert found.keys() >= FROM_DEBIAN
+
+
+def test_the_containers_take_the_script_of_make_setup(tmp_path):
+    assert (ROOT / ".ci/setup").exists()
+    recipe = (INSTALL / "apptainer.def").read_text()
+    post = re.search(r"%post\n(.*?)\n\n%", recipe, re.DOTALL)[1]
+    commands = re.search(r"^RUN (.*?[^\\])$", (INSTALL / "Dockerfile").read_text(), re.MULTILINE | re.DOTALL)[1]
+    for text in (post, commands):
+        assert "/opt/reflowshock/.ci/setup" in text
+        subprocess.run(["sh", "-n"], input=text, text=True, check=True)
+
+
+def test_the_citation_is_that_of_this_version():
+    from reflowshock import __version__
+
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["cff-version"] == "1.2.0"
+    assert {"title", "authors", "message", "version"} <= cited.keys()
+    assert str(cited["version"]) == __version__
