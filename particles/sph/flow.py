@@ -146,7 +146,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         diffusion=numerics.density_diffusion * length * scene.sound,
         artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
         viscosity=scene.viscosity if decide_flow(scene)["viscosity"]["on"] else 0.0,
-        central=int(has_surface),
+        has_surface=int(has_surface),
         no_slip=int(not has_surface),
         spacing=spacing,
         shifting=0.0 if has_surface else 1.0,

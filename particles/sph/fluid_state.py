@@ -22,7 +22,8 @@ class Law(NamedTuple):
         diffusion: delta h c0 [m^2/s].
         artificial: alpha h c0 rho_0 [Pa s].
         viscosity: mu [Pa s].
-        central: 1 where viscosity acts along the line of two particles, 0 where it acts along their velocities.
+        has_surface: 1 where the liquid has a free one. Then viscosity acts along the line of two particles, elsewhere
+            along their velocities; and walls do not pull.
         no_slip: whether walls hold the liquid by its viscosity; 1 or 0.
         spacing: of the particles at the start [m].
         shifting: share of the shift of particles by Sun et al. (2017); 0 is none.
@@ -39,7 +40,7 @@ class Law(NamedTuple):
     diffusion: float
     artificial: float
     viscosity: float
-    central: int
+    has_surface: int
     no_slip: int
     spacing: float
     shifting: float

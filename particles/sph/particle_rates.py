@@ -65,12 +65,13 @@ def rates_of(i, fluids, neighbours, fields, law):
             k = j - fluids
             closing = (u - fields.wall_u[k]) * dx + (v - fields.wall_v[k]) * dy + (w - fields.wall_w[k]) * dz
         rate += pair_terms.continuity(closing, steep, volume, density)
-        push = pair_terms.pressure(pressure, fields.pressure[j], steep, volume, density)
+        own = max(pressure, 0.0) if law.has_surface and not liquid else pressure  # walls do not pull
+        push = pair_terms.pressure(own, fields.pressure[j], steep, volume, density)
         if law.artificial > 0.0 and liquid:
             push += law.artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
         if law.viscosity > 0.0 and (liquid or law.no_slip):
             softened2, double = distance2 + softening, 2.0 * law.viscosity / density
-            if law.central:
+            if law.has_surface:
                 factor = double * (law.dimension + 2)
                 push += pair_terms.central_viscosity(approach, softened2, steep, volume, factor)
             else:
@@ -134,8 +135,8 @@ def solved(moments, sums, dimension):
 def wall_values(i, fluids, neighbours, fields, law):
     """Return pressure and velocity (3) of a particle of a wall, from the liquid beside it (Adami et al. 2012).
 
-    The pressure is that of the liquid, with its weight; a wall does not pull at liquid that leaves it. The velocity is
-    the wall's less that of the liquid against it: at the wall's face it is the wall's.
+    The pressure is that of the liquid, with its weight; where the liquid has a free surface a wall does not pull at
+    what leaves it. The velocity is the wall's less that of the liquid against it: at the wall's face it is the wall's.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1
@@ -158,4 +159,5 @@ def wall_values(i, fluids, neighbours, fields, law):
     if total <= 0.0:
         return 0.0, fields.wall_u[k], fields.wall_v[k], fields.wall_w[k]
     u, v, w = 2.0 * fields.wall_u[k] - u / total, 2.0 * fields.wall_v[k] - v / total, 2.0 * fields.wall_w[k] - w / total
-    return max(pressure / total, 0.0), u, v, w
+    pressure /= total
+    return max(pressure, 0.0) if law.has_surface else pressure, u, v, w

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.reference.dam_break import measured_pressure
 from reflowshock.particles.reference.viscous_flows import starting_channel
 from reflowshock.workflow.case.text import percent, quantity
 from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase
@@ -56,8 +57,12 @@ def dam_curves(case: DamBreakCase, history: Mapping[str, Floats]) -> list[Chart]
         Series("kinetic", time, history["kinetic_energy"] / start, ORANGE),
         Series("potential", time, history["potential_energy"] / start),
     ]
+    sensor = [Series("particles", time, pressure)]
+    measured = measured_pressure(*(one / dam.height for one in (dam.width, dam.tank_length, dam.sensor_height)))
+    if measured is not None:
+        sensor.append(Series("measured (Buchner 2002)", measured[0], measured[1], RED, line="none", marks=True))
     return [
-        Chart(axis, Axis("pressure at the sensor [rho g H]"), [Series("sensor", time, pressure)]),
+        Chart(axis, Axis("pressure at the sensor [rho g H]"), sensor),
         Chart(axis, Axis("front [H]"), [Series("front", time, history["front"] / dam.height)]),
         Chart(axis, Axis("energy over that at the start"), energies),
     ]
