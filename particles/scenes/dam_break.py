@@ -93,16 +93,31 @@ def _metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
     pressure = history["sensor_pressure"] / (scene.density * scene.gravity * scene.height)
     reached = pressure > REACHED
     plateau = (time >= PLATEAU[0]) & (time <= PLATEAU[1])
-    later = (time >= SECOND[0]) & (time <= SECOND[1])
-    window = max(1, round(WINDOW / float(np.diff(time).mean())))
-    smooth = np.convolve(pressure, np.full(window, 1.0 / window), mode="same")
     total = history["kinetic_energy"] + history["potential_energy"] + history["elastic_energy"]
     nothing = float("nan")
     return {
         "impact_onset": (float(time[np.argmax(reached)]) if reached.any() else nothing, "sqrt(H/g)"),
         "plateau_mean": (float(pressure[plateau].mean()) if time[-1] >= PLATEAU[1] else nothing, "rho g H"),
-        "second_rise": (
-            float(time[later][np.argmax(smooth[later])]) if time[-1] >= SECOND[1] else nothing, "sqrt(H/g)",
-        ),
+        "second_rise": (second_rise(time, pressure), "sqrt(H/g)"),
         "energy_rise": (float((np.maximum.accumulate(total[::-1])[::-1] - total).max() / total[0]), ""),
     }  # fmt: skip
+
+
+def second_rise(time: Floats, pressure: Floats) -> float:
+    """Return when the pressure rises again: midway from the plateau to the largest mean of a window after it.
+
+    Args:
+        time: `(n,)` in sqrt(H / g).
+        pressure: `(n,)` over rho g H.
+
+    Returns:
+        nan where the history ends before.
+    """
+    if time[-1] < SECOND[1]:
+        return float("nan")
+    width = max(1, round(WINDOW / float(np.diff(time).mean())))
+    smooth = np.convolve(pressure, np.full(width, 1.0 / width), mode="same")
+    plateau = pressure[(time >= PLATEAU[0]) & (time <= PLATEAU[1])].mean()
+    later = (time >= SECOND[0]) & (time <= SECOND[1])
+    middle = 0.5 * (plateau + smooth[later].max())
+    return float(time[later][np.argmax(smooth[later] >= middle)])

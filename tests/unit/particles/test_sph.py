@@ -10,7 +10,8 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
-from reflowshock.particles.scenes.dam_break import dam, solve_dam_break
+from reflowshock.particles.reference.dam_break import MEASURED, measured_pressure
+from reflowshock.particles.scenes.dam_break import dam, second_rise, solve_dam_break
 from reflowshock.particles.scenes.flow_products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.particle_rates import rates_of, solved
@@ -191,3 +192,13 @@ def test_viscosity_acts_where_its_layer_is_thick_and_the_artificial_one_elsewher
     assert decide_flow(syrup)["viscosity"]["on"]
     assert artificial_viscosity(syrup) == 0.0
     assert decide_flow(small_dam(effects={"viscosity": "on"}))["viscosity"]["on"]
+
+
+def test_the_second_rise_of_what_was_measured_is_found():
+    measured = measured_pressure(2.0, 5.366, 0.2)
+    assert measured is not None and len(measured[0]) == len(MEASURED)
+    assert measured_pressure(1.0, 5.366, 0.2) is None
+    time = np.linspace(0.0, 7.3, 2000)
+    pressure = np.interp(time, *measured)
+    assert second_rise(time, pressure) == pytest.approx(5.7, abs=0.1)
+    assert np.isnan(second_rise(time[:1500], pressure[:1500]))
