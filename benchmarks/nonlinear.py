@@ -69,7 +69,7 @@ SIDES: dict[str, tuple[dict, dict]] = {
 FINE = {"three_joints": CRITICAL, "one_joint": CRITICAL[:1]}
 MATERIAL = "materials.solder='SAC405'"
 PEAK, DURATION = 4000 * STANDARD_GRAVITY, 1.2e-4  # [m/s^2], [s], of errors: solder flows
-ALONG_PATHS = ("held_velocity", "impulse", "gravouil_combescure")
+ALONG_PATHS = ("held_velocity, levels auto", "impulse", "gravouil_combescure")
 WINDOWS, SAMPLES = 100_000, 200
 ROUNDS = 5
 NOT_MEASURED = {
@@ -244,7 +244,7 @@ def growth(every: int = 1) -> tuple[Bars, dict]:
         for name, values in found.items():
             coupled = flowing_pair(pair, SCHEMES[name], fraction)
             values[repr(pair)] = coupled.spectral_radius() - 1.0
-            if name == "held_velocity":
+            if name == ALONG_PATHS[0]:
                 levels[repr(pair)] = len(coupled.meso.motion.body.schedule)
     grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
     bars = {

@@ -22,8 +22,6 @@ from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
 
 # Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
 REACHES = (2.6, 3.4, 4.4)
-# Of a particle's volume: the least that its coefficient carries.
-SMALLEST_CARRIED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +30,16 @@ class Galerkin:
 
     Attributes:
         volumes: `(n,)` of the particles as points of integration [m^3].
-        carried: `(n,)` that the coefficients carry: row sums of the mass matrix, over the density [m^3].
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
+        shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
     """
 
     volumes: Floats
-    carried: Floats
     starts: NDArray[np.int64]
     columns: NDArray[np.int32]
     weights: Floats
+    shape: sparse.csr_matrix
     ghosts: Ghosts
 
     @classmethod
@@ -67,19 +65,20 @@ class Galerkin:
         shares = np.concatenate((shares, shares[ghosts.source]))
         columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
         _check(body, density > 0.0, "has all its neighbours in a plane")
-        shape = sparse.csr_matrix((weights[:, 0], columns, starts), shape=(count, len(points)))
-        origin = np.concatenate((np.arange(count), ghosts.source))
-        volumes = nodal_volumes(body, density)
-        carried = np.bincount(origin, shape.T @ volumes).astype(float)
-        # Where a surface is stretched, weights of MLS are negative; a row sum that is no mass gives way to a small one.
-        carried = np.maximum(carried, SMALLEST_CARRIED * volumes)
-        return cls(volumes, carried * (volumes.sum() / carried.sum()), starts, columns, weights, ghosts)
+        shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
+        return cls(nodal_volumes(body, density), starts, columns, weights, shape, ghosts)
 
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
-        count, origin = len(self.volumes), np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))
-        shape = sparse.csr_matrix((self.weights[:, 0], self.columns, self.starts), shape=(count, len(origin)))
-        return shape @ coefficients[origin]
+        return self.shape @ coefficients[np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))]
+
+    def velocity(self, field: Floats) -> Floats:
+        """Velocity `(n, 3)` [m/s] of coefficients."""
+        return self.shape @ self._with_images(field)
+
+    def load_forces(self, force: Floats) -> Floats:
+        """The transposed of `velocity`: forces `(n, 3)` [N] on coefficients of forces on the particles."""
+        return self._folded(self.shape.T @ force)
 
     def values(self, field: Floats) -> tuple[Floats, Floats]:
         """Velocity `(n, 3)` [m/s] and its gradient `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, of coefficients."""

@@ -3,9 +3,14 @@
     (M/dt + V + S + dt N^T K N) v* = M v_n/dt + N^T f + B^T p
     dt B M^-1 B^T phi = g - B v*,     v = v* + dt M^-1 B^T phi,     p_new = p + phi - mu div v*
 
-M is the lumped mass, row sums of N^T m N; V is viscosity (2 mu D : D), K implicit surface tension, S the smoothing. The
-rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface. They
-add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
+M = N^T m N + (1 - N)^T m (1 - N): a velocity that N reproduces has the momentum and energy of the particles, and one
+that N does not show has mass as well, so that M is positive definite. (Row sums of N^T m N are exact for uniform
+velocities only and, where a surface is stretched, negative.) In the projection a polynomial of M stands for M^-1, to a
+percent, with the masses m of the particles as preconditioner. V is viscosity (2 mu D : D), K implicit surface tension,
+S the smoothing.
+
+The rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface.
+They add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces N^T f
 of an energy of particles that move with N v, no mode of the linearised scheme grows. The gradient that is collocated,
 as printed, has modes that do.
@@ -22,6 +27,8 @@ from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
+# M is half of m at least; the bound above is that of some power steps with a margin.
+LIGHTEST, HEAVIER, POWER_STEPS, CHEBYSHEV_STEPS = 0.5, 1.2, 6, 4
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
 
 
@@ -72,8 +79,18 @@ class GalerkinEquations:
 
     @property
     def masses(self) -> Floats:
-        """Of the coefficients, `(n,)` [kg]."""
-        return self.fluid.density * self.space.carried
+        """Of the particles, `(n,)` [kg]."""
+        return self.fluid.density * self.space.volumes
+
+    def momentum(self, field: Floats) -> Floats:
+        """M v, `(n, 3)` [kg m/s]."""
+        velocity, masses = self.space.velocity(field), self.masses[:, None]
+        rough = masses * (field - velocity)
+        return rough + self.space.load_forces(masses * velocity - rough)
+
+    def kinetic(self, field: Floats) -> float:
+        """Kinetic energy of coefficients [J]."""
+        return 0.5 * float((field * self.momentum(field)).sum())
 
     def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
         """Coefficients v* [m/s] under the last pressure.
@@ -86,9 +103,10 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, basis, impulse = self.space, self.basis, (self.masses / self.time_step)[:, None]
-        load = impulse * velocity + self.push(pressure) + space.load(force, np.zeros((len(force), 3, 3)))
-        mean = NEGLIGIBLE * self.spacing * float(impulse.mean()) / self.time_step
+        space, basis = self.space, self.basis
+        load = self.momentum(velocity) / self.time_step + self.push(pressure)
+        load += space.load_forces(force)
+        mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inverse = self.time_step * self._inverse_masses()
         solution, _ = conjugate_gradients(
             lambda free: basis.T @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
@@ -111,15 +129,14 @@ class GalerkinEquations:
             SolveFailed: the linear solve failed.
         """
         space, basis = self.space, self.basis
-        inverse = self.time_step * self._inverse_masses()
-        divergence = self.constraint(start)
+        heaviest, divergence = self._heaviest(), self.constraint(start)
 
         def accelerated(pressure: Floats) -> Floats:
-            return (basis @ (inverse * (basis.T @ self.push(pressure).ravel()))).reshape(-1, 3)
+            return self.time_step * self._accelerated(self.push(pressure), heaviest)
 
         def matrix() -> sparse.csr_matrix:
             rows = (sparse.diags(space.volumes) @ space.divergence_rows() @ basis).tocsr()
-            return (rows @ sparse.diags(inverse) @ rows.T).tocsr()
+            return (rows @ sparse.diags(self.time_step * self._inverse_masses()) @ rows.T).tocsr()
 
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
@@ -132,17 +149,41 @@ class GalerkinEquations:
         change = potential - self.fluid.viscosity * divergence / space.volumes
         return start + accelerated(potential), change
 
+    def _heaviest(self) -> float:
+        """Bound on the eigenvalues of M over those of m, by power iteration."""
+        inverse = self._inverse_masses()
+        field, largest = np.random.default_rng(0).normal(size=self.basis.shape[1]), 1.0
+        for _ in range(POWER_STEPS):
+            field /= np.linalg.norm(field)
+            field = inverse * (self.basis.T @ self.momentum((self.basis @ field).reshape(-1, 3)).ravel())
+            largest = float(np.linalg.norm(field))
+        return HEAVIER * largest
+
+    def _accelerated(self, force: Floats, heaviest: float) -> Floats:
+        """M^-1 of forces on the coefficients `(n, 3)` [N], nearly: a Chebyshev polynomial of M/m in [1/2, heaviest]."""
+        basis, inverse = self.basis, self._inverse_masses()
+        middle, half = 0.5 * (heaviest + LIGHTEST), 0.5 * (heaviest - LIGHTEST)
+        left = basis.T @ force.ravel()
+        change = inverse * left / middle
+        found, ratio = change, half / middle
+        for _ in range(CHEBYSHEV_STEPS):
+            left = left - basis.T @ self.momentum((basis @ change).reshape(-1, 3)).ravel()
+            before, ratio = ratio, 1.0 / (2.0 * middle / half - ratio)
+            change = ratio * before * change + 2.0 * ratio / half * inverse * left
+            found = found + change
+        return (basis @ found).reshape(-1, 3)
+
     def _inverse_masses(self) -> Floats:
-        """Of the admissible coefficients, `(d,)` [1/kg]: each is one particle's."""
+        """One over the mass of the particle of each admissible coefficient, `(d,)` [1/kg]."""
         return np.asarray(self.basis.multiply(self.basis).T @ np.repeat(1.0 / self.masses, 3)).ravel()
 
     def operator(self, field: Floats) -> Floats:
         """M/dt + V + S + dt N^T K N of coefficients, [N]."""
         velocity, gradient = self.space.values(field)
-        friction = self._friction(field - velocity)
-        inertia = (self.masses / self.time_step)[:, None] * field
+        inertia, rough = (self.masses / self.time_step)[:, None], field - velocity
+        unseen = inertia * rough + self._friction(rough)
         tension = self.time_step * (self.stiffness @ velocity)
-        return inertia + friction + self.space.load(tension - friction, self._stress(gradient))
+        return unseen + self.space.load(inertia * velocity + tension - unseen, self._stress(gradient))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -154,13 +195,12 @@ class GalerkinEquations:
         parts = self.space.volumes * pressure
         return self.space.divergence_load(parts) + parts.sum() / self.space.volumes.sum() * self.unbalanced
 
-    def losses(self, field: Floats) -> LostPower:
-        """What coefficients lose."""
-        velocity, gradient = self.space.values(field)
-        rough = field - velocity
+    def losses(self, start: Floats, field: Floats) -> LostPower:
+        """What coefficients lose to forces that the prediction v* has set."""
+        (before, first), (velocity, gradient) = self.space.values(start), self.space.values(field)
         return LostPower(
-            viscous=float((self._stress(gradient) * gradient).sum()),
-            smoothing=float((self._friction(rough) * rough).sum()),
+            viscous=float((self._stress(first) * gradient).sum()),
+            smoothing=float((self._friction(start - before) * (field - velocity)).sum()),
         )
 
     def _stress(self, gradient: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, with BDF2 in time.
 
-A particle moves with the velocity N v that the shape functions show at it, and carries the momentum of its coefficient
-v; between steps nothing is interpolated. What evening out and the shift of particles below the surface displace takes
+A particle moves with the velocity N v that the shape functions show at it; the coefficients v are carried from step to
+step, so that nothing is interpolated. What evening out and the shift of particles below the surface displace takes
 the velocity there. The smoothing is part of the equations: a friction on v - N v, which vanishes for linear velocities,
 so that momentum and angular momentum stay; it acts at the rate at which the capillary waves of the grid swing, whatever
 the time step.
@@ -46,19 +46,21 @@ class LostEnergy:
     Attributes:
         viscous: to viscosity.
         smoothing: to the smoothing of velocities.
-        integration: to the time integration.
-        transfer: to the shift of particles, which take the velocity where they come.
+        integration: to the time integration: of the momentum, and of the way that the forces act along.
+        transfer: to the shift of particles, which take the velocity where they come, and to new shape functions.
+        evening: to what keeps triangles well shaped, at the volume.
     """
 
     viscous: float = 0.0
     smoothing: float = 0.0
     integration: float = 0.0
     transfer: float = 0.0
+    evening: float = 0.0
 
     @property
     def total(self) -> float:
         """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer
+        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class GalerkinPast:
         points: `(n, 3)` where it took the particles [m].
         coefficients: `(n, 3)` of the velocity [m/s].
         gradient: `(n, 3, 3)` of the velocity at the particles [1/s].
-        masses: `(n,)` of the coefficients [kg].
+        kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
         pressure: `(n,)` coefficients [Pa].
         momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s]; None before the first step.
         history: its displacement and change of the coefficients.
@@ -79,30 +81,24 @@ class GalerkinPast:
     points: Floats
     coefficients: Floats
     gradient: Floats
-    masses: Floats
+    kinetic: float | None
+    potential: float
     pressure: Floats
     momenta: Floats | None
     history: BackwardDifference
     losses: LostEnergy
 
     @classmethod
-    def start(cls, body: Body, losses: LostEnergy | None = None) -> "GalerkinPast":
-        """A body that starts with its velocity."""
-        count = len(body.points)
-        start = BackwardDifference.start(count)
-        slope, masses = np.zeros((count, 3, 3)), np.zeros(count)
-        return cls(body.points, body.velocity, slope, masses, body.pressure, None, start, losses or LostEnergy())
-
-    def kinetic_energy(self) -> float:
-        """Of the coefficients [J]."""
-        return 0.5 * float(self.masses @ (self.coefficients**2).sum(axis=1))
+    def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
+        """A body that starts with its velocity, and an energy of the forces [J]."""
+        slope, start = np.zeros((len(body.points), 3, 3)), BackwardDifference.start(len(body.points))
+        losses = losses or LostEnergy()
+        return cls(body.points, body.velocity, slope, None, potential, body.pressure, None, start, losses)
 
     def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
         """The past of particles that are now elsewhere: they have the velocity there."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        moved = replace(self, points=body.points, coefficients=physics.admit(body, self.coefficients + change))
-        lost = self.kinetic_energy() - moved.kinetic_energy()
-        return replace(moved, losses=replace(self.losses, transfer=self.losses.transfer + lost))
+        return replace(self, points=body.points, coefficients=physics.admit(body, self.coefficients + change))
 
 
 @dataclass(slots=True)
@@ -147,10 +143,11 @@ class IspgStep:
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
         """Carry the velocity to where the particles are now; without inertia it is zero."""
         if self.past is None:
-            self.past, self.first_energy = GalerkinPast.start(body), physics.energy(body)
+            self.first_energy = physics.energy(body)
+            self.past = GalerkinPast.start(body, self.first_energy)
         elif not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
-            self.past = GalerkinPast.start(body, self.past.losses)
+            self.past = GalerkinPast.start(body, physics.energy(body), self.past.losses)
         else:
             self.past = self.past.carried_on(body, physics)
         return PreparedIspgStep(self, body, physics, self.past)
@@ -201,32 +198,37 @@ class PreparedIspgStep:
         predicted = replace(body, points=base.points + base.time_step * guess)
         enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
-        lost = self._lost_momentum(equations.masses)
+        lost = self._lost_momentum(equations)
         past, base = replace(past, coefficients=past.coefficients + lost), replace(base, velocity=base.velocity + lost)
         force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
-        pressure = past.pressure
-        start = equations.predict(base.velocity, force, pressure)
+        start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         coefficients, change = equations.project(start, rate, self.solver.factors)
-        pressure = pressure + change
+        pressure = past.pressure + change
         velocity, gradient = equations.space.values(coefficients)
         points = base.points + base.time_step * velocity
-        momenta = rigid_momenta(rigid_motions(points), equations.masses, coefficients)
         history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
-        losses = self._losses(equations, base, coefficients, time_step)
+        mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
+        pull = force - base.time_step * (equations.stiffness @ equations.space.velocity(start))
+        kinetic, potential = equations.kinetic(coefficients), self.physics.energy(replace(body, points=points))
+        momenta = rigid_momenta(rigid_motions(points), equations.masses, velocity)
+        losses = self._carried_losses(equations, past.coefficients)
+        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
+        losses = replace(losses, integration=losses.integration + self.physics.energy(body) - potential - work)
+        losses = _step_losses(losses, equations, base, (past.coefficients, start, coefficients), time_step)
         self.solver.past = GalerkinPast(
-            points, coefficients, gradient, equations.masses, pressure, momenta, history, losses
+            points, coefficients, gradient, kinetic, potential, pressure, momenta, history, losses
         )
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
             pressure=equations.space.averages(pressure),
-            surface_pressure=float(pressure @ equations.space.volumes / equations.space.volumes.sum()),
+            surface_pressure=mean_pressure,
             twists={},
             iterations=self.solver.factors.iterations,
         )
 
-    def _lost_momentum(self, masses: Floats) -> Floats:
+    def _lost_momentum(self, equations: GalerkinEquations) -> Floats:
         """Velocity `(n, 3)` [m/s] that gives back the momenta of the last step along rigid motions that walls admit.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
@@ -240,7 +242,8 @@ class PreparedIspgStep:
         if momenta is None or not any(admitted):
             return np.zeros_like(body.points)
         motions = motions[admitted]
-        missing = momenta[admitted] - rigid_momenta(motions, masses, self.past.coefficients)
+        masses, velocity = equations.masses, equations.space.values(self.past.coefficients)[0]
+        missing = momenta[admitted] - rigid_momenta(motions, masses, velocity)
         inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions])
         return np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
 
@@ -272,20 +275,38 @@ class PreparedIspgStep:
             time_step=time_step,
         )
 
-    def _losses(self, equations: GalerkinEquations, base: Base, coefficients: Floats, time_step: float) -> LostEnergy:
-        """Those of all steps, this one included.
+    def _carried_losses(self, equations: GalerkinEquations, coefficients: Floats) -> LostEnergy:
+        """Losses up to this step, which starts with new shape functions and coefficients `(n, 3)`."""
+        past, kinetic = self.past, equations.kinetic(coefficients)
+        transfer = 0.0 if past.kinetic is None else past.kinetic - kinetic
+        evening = past.potential - self.physics.energy(self.body)
+        losses = past.losses
+        return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
 
-        Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
-        """
-        before, last, now = self.past.losses, self.past.coefficients, equations.losses(coefficients)
-        change = time_step / base.time_step * (coefficients * (coefficients - base.velocity)).sum(axis=1)
-        kinetic = 0.5 * ((coefficients**2).sum(axis=1) - (last**2).sum(axis=1))
-        return replace(
-            before,
-            viscous=before.viscous + time_step * now.viscous,
-            smoothing=before.smoothing + time_step * now.smoothing,
-            integration=before.integration + float(equations.masses @ (change - kinetic)),
-        )
+
+def _step_losses(
+    losses: LostEnergy,
+    equations: GalerkinEquations,
+    base: Base,
+    coefficients: tuple[Floats, Floats, Floats],
+    time_step: float,
+) -> LostEnergy:
+    """Losses with those of a step [s], but for the way that the forces act along.
+
+    The coefficients `(n, 3)` are the last, predicted and new ones.
+
+    Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
+    """
+    last, start, now = coefficients
+    power = equations.losses(start, now)
+    change = time_step / base.time_step * float((now * equations.momentum(now - base.velocity)).sum())
+    gain = equations.kinetic(now) - equations.kinetic(last)
+    return replace(
+        losses,
+        viscous=losses.viscous + time_step * power.viscous,
+        smoothing=losses.smoothing + time_step * power.smoothing,
+        integration=losses.integration + change - gain,
+    )
 
 
 def rigid_motions(points: Floats) -> Floats:

@@ -27,16 +27,18 @@ class TimeStep:
     """The step size and what binds it.
 
     Attributes:
-        largest: upper bound, a multiple of the capillary limit [s].
+        largest: upper bound [s].
         spacing: particle spacing [m].
         size: current step [s].
-        binding: "capillary multiple", "growth", "displacement", "energy" or, for one made longer, "steady motion".
+        binding: that of the upper bound, "growth", "displacement", "energy" or, for one made longer, "steady motion".
+        bound: what the upper bound is.
     """
 
     largest: float
     spacing: float
     size: float
     binding: str = "capillary multiple"
+    bound: str = "capillary multiple"
 
     def accepts(self, speed: float) -> bool:
         """Whether a largest particle speed [m/s] moves no particle too far; else the step is cut.
@@ -84,4 +86,4 @@ class TimeStep:
         if self.size * speed > AIM * displacement:
             self.size, self.binding = AIM * displacement / speed, "displacement"
         if self.size >= self.largest:
-            self.size, self.binding = self.largest, "capillary multiple"
+            self.size, self.binding = self.largest, self.bound

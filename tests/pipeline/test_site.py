@@ -13,14 +13,15 @@ import pytest
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.study.command import read_points_of
 from tests.support import ecad_files
 from tests.support.command_parser import parse
 from tests.support.site import DOCS, OURS, ROOT, in_readmes, pages, shown
 
 PAGES = [page for page in pages() if any(OURS.match(line) for line in shown(page))]
 NAMES = [str(page.relative_to(DOCS)) for page in PAGES]
-DRY = {"run", "study"}  # which have --dry-run
-NEEDS_A_RUN = {"report", "compare", "accuracy"}  # nothing of these is cheap
+READS_A_CASE = {"run", "plan", "effects", "status", "accuracy", "report", "verify"}
+WRITES_A_CASE = {"new", "init", "import"}
 HOURS = 3600.0
 KNOWN = (
     "mkdir ", "cp -r ", ". .venv/bin/activate", "conda activate", "pip install --no-deps --editable .", "docker run",
@@ -49,7 +50,7 @@ def run_here(line: str, monkeypatch) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_commands_of_a_page_run(page, scratch, monkeypatch):
-    """In their order, as a plan where they would compute; those that read a run are parsed only."""
+    """In their order: what writes a case is run, what computes reads its case with all settings."""
     for line in shown(page):
         if not OURS.match(line):
             assert is_known(line), line
@@ -59,9 +60,12 @@ def test_commands_of_a_page_run(page, scratch, monkeypatch):
         if "gerbers" in line:
             pytest.importorskip("gerbonara")
         command, given = parse(line) if "--install-completion" not in line else ("", {})
-        if command and command not in NEEDS_A_RUN:
-            dry = command in DRY and not given["dry_run"]
-            run_here(line.replace(" --follow", "") + (" --dry-run" if dry else ""), monkeypatch)
+        if command in WRITES_A_CASE:
+            run_here(line, monkeypatch)
+        elif command in READS_A_CASE and given["case"] is not None:
+            read_case(Path(given["case"]), given["settings"] or [], True)
+        elif command == "study":
+            assert read_points_of(Path(given["study"]), True, False).possible
 
 
 def is_known(line: str) -> bool:
@@ -80,9 +84,9 @@ def is_known(line: str) -> bool:
 
 def test_commands_of_readmes_are_taken():
     """Each is parsed; where it names a case, the case takes its settings."""
-    lines = list(in_readmes())
+    lines = {line: path for path, line in in_readmes()}
     assert len(lines) > 30
-    for path, line in lines:
+    for line, path in lines.items():
         _, given = parse(line)
         case = given.get("case")
         if case is not None and str(case).startswith("cases/") and "/your/" not in line:

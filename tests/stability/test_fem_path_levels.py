@@ -31,14 +31,14 @@ FRACTION = 0.9
 
 @pytest.mark.parametrize("name", NESTED)
 def test_window_with_levels_does_not_grow(name):
-    pair, held = NESTED[name], SCHEMES["held_velocity"]
+    pair, held = NESTED[name], SCHEMES["held_velocity, levels auto"]
     assert len(pair.divided(held).division.ratios) > 1
     assert pair.coupled(held).spectral_radius() <= 1.0 + GROWTH
 
 
 @pytest.mark.parametrize("name", NESTED)
 def test_window_with_levels_does_not_grow_where_it_has_turned_and_flows(name):
-    coupled = flowing_pair(NESTED[name], SCHEMES["held_velocity"])
+    coupled = flowing_pair(NESTED[name], SCHEMES["held_velocity, levels auto"])
     assert len(coupled.meso.motion.body.schedule) > 1
     assert coupled.spectral_radius() <= 1.0 + GROWTH
 

@@ -3,21 +3,37 @@
 import numpy as np
 import pytest
 
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.physics.forces import SurfaceTension
+from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.scenes.free_drop import SECOND_MOMENT, fit_oscillation
+from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.relaxation import Relaxation
+from reflowshock.particles.steps.time_step import TimeStep
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
+STEPS_PER_PERIOD = 60
 
 
-@pytest.mark.parametrize("degrees", [60.0, pytest.param(120.0, marks=pytest.mark.long)])
-def test_a_cube_swings_and_comes_to_rest_as_a_cap(degrees):
-    """Values of the paper; its errors are 0.87 and 3.26 % in height and width at 60 degrees."""
+LONG = [pytest.param(*row, marks=pytest.mark.long) for row in ((6, 120.0), (11, 60.0), (11, 120.0))]
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(6, 60.0), *LONG])
+def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
+    """Values of the paper; its errors at 11 an edge: height 0.87, 2.84 %, width 3.26, 1.17 % at 60 and 120 degrees."""
     angle = float(np.radians(degrees))
-    numerics = SolderNumerics(scheme="ispg", spacing=0.2e-3, time_step_limit=20.0, max_steps=2000)
+    numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (count - 1), time_step_limit=20.0)
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
     solder = Solder(volume=1e-9, pad_contact_angle=angle, effects=effects, numerics=numerics, **PAPER)
-    drop = drop_to_rest(Drop(volume=1e-9, contact_angle=angle, particles_per_edge=6), solder)
+    drop = drop_to_rest(Drop(volume=1e-9, contact_angle=angle, particles_per_edge=count), solder)
     metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0
     assert 0.005 < metrics["time_at_rest"] < 0.1
@@ -25,6 +41,38 @@ def test_a_cube_swings_and_comes_to_rest_as_a_cap(degrees):
     assert abs(metrics["height_error"]) < 0.005
     assert abs(metrics["max_width_error"]) < 0.01
     assert abs(metrics["volume_drift"]) < 1e-12
-    assert abs(metrics["energy_imbalance"]) < 0.025
+    assert abs(metrics["energy_imbalance"]) < 0.002
     assert min(metrics["viscous_loss"], metrics["smoothing_loss"]) > 0.01
     assert np.ptp(drop.shape.history["height"]) > 0.5e-3
+
+
+def test_a_free_drop_swings_with_its_period():
+    """Radius, density and surface tension one, 309 particles; Reid's period and decay at the viscosity of real solder.
+
+    The decay is some three times too fast: the ledger says that evening out the triangles takes most.
+    """
+    viscosity, volume = 2e-3, 4.0 / 3.0 * np.pi
+    tension, friction = SurfaceTension(1.0), Viscosity(viscosity)
+    at_rest = Physics((tension,), (Mass(1.0), tension, friction), (), (), ())
+    ball = Body.at_rest(sphere_cloud(volume, 4))
+    settling = LiquidFlow(ball, at_rest, TimeStep(10.0, ball.cloud.spacing, 10.0), Relaxation(1.0))
+    for _ in range(30):
+        settling.step()
+    omega = rayleigh_frequency(2, 1.0, 1.0, 1.0)
+    ball.velocity = 0.05 * omega * SECOND_MOMENT * ball.points
+    size = 2.0 * np.pi / omega / STEPS_PER_PERIOD
+    swing = Physics(at_rest.forces, at_rest.operators, (Inertia(1.0),), (), ())
+    flow = LiquidFlow(ball, swing, TimeStep(size, ball.cloud.spacing, size), IspgStep())
+    times, amplitudes = [], []
+    for _ in range(2 * STEPS_PER_PERIOD):
+        flow.step()
+        times.append(flow.time)
+        amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(flow.body)[2])) / volume)
+    exact_decay, exact = viscous_oscillation(2, omega, viscosity)
+    decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
+    assert abs(exact / found - 1.0) < 0.015
+    assert 1.0 < decay / exact_decay < 3.5
+    past, first = flow.solver.past, flow.solver.first_energy
+    start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
+    gained = swing.energy(ball) - first + past.kinetic - start
+    assert abs(gained + past.losses.total) < 0.01 * start

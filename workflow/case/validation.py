@@ -1,6 +1,6 @@
 """Validation errors of pydantic, said in the words of a case file."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -43,9 +43,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     model, field = _field(root, names, table)
     if kind == "extra_forbidden":
         siblings = list(model.model_fields) if model else []
-        hint = nearest(names[-1], siblings)
-        prefix = "".join(name + "." for name in names[:-1])
-        return Problem(key, "unknown key", value, "one of " + ", ".join(siblings), hint and prefix + hint)
+        return Problem(key, "unknown key", value, "one of " + ", ".join(siblings), _meant(root, names, siblings))
     if field is None:
         return Problem(key, text, value)
     if kind in ("tuple_type", "too_short", "too_long") or (kind == "missing" and isinstance(record["loc"][-1], int)):
@@ -64,6 +62,24 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if kind == "string_pattern_mismatch":
         return wrong_name(key, value)
     return Problem(key, text[0].lower() + text[1:], value, fields.allowed(field))
+
+
+def _meant(root: type[BaseModel], names: list[str], siblings: list[str]) -> str:
+    """Return the key that is meant by one that does not exist, or nothing: one beside it, else one of another table."""
+    own = nearest(names[-1], siblings) or next((one for one in siblings if one.startswith(names[-1])), "")
+    beside = ".".join([*names[:-1], own]) if own else ""
+    elsewhere = min(_places(root, names[-1]), key=len, default="")
+    return elsewhere or beside if len(names) == 1 else beside or elsewhere
+
+
+def _places(model: type[BaseModel], name: str, prefix: str = "") -> Iterator[str]:
+    """Yield the dotted keys of a model that end with a name."""
+    for key, field in model.model_fields.items():
+        if key == name:
+            yield prefix + key
+        if not fields.holds_named_tables(field):
+            for inner in fields.models_of(field):
+                yield from _places(inner, name, f"{prefix}{key}.")
 
 
 def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:

@@ -34,7 +34,7 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.shock import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
-DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity")
+DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity", levels=1)
 DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
 
 

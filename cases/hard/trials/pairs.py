@@ -98,7 +98,8 @@ class Pair:
 
 
 SCHEMES = {
-    "held_velocity": Coupling(scheme="held_velocity"),
+    "held_velocity": Coupling(scheme="held_velocity", levels=1),
+    "held_velocity, levels auto": Coupling(scheme="held_velocity"),
     "impulse": Coupling(scheme="impulse"),
     "gravouil_combescure": Coupling(scheme="gravouil_combescure"),
     "local_steps": Coupling(scheme="local_steps", levels=1),

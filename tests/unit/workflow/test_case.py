@@ -18,6 +18,7 @@ BAD_VALUES = {
         "package.pich=1 mm",
         ["package.pich", '"1 mm"', "unknown key", "did you mean package.pitch?"],
     ),
+    "key of another table": ("pitch='1 mm'", ["pitch", "unknown key", "did you mean package.pitch?"]),
     "unknown table": ("pakage.rows=3", ["pakage", "unknown key", "did you mean package?"]),
     "unit missing": ("package.pitch=1.0", ["package.pitch = 1.0", 'such as "1 mm"', "allowed: > 0 mm"]),
     "unit missing in text": ('package.pitch="1.0"', ['package.pitch = "1.0"', "needs a unit"]),

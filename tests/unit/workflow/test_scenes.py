@@ -197,7 +197,7 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
     assert read_case(DROP, asked).molten.numerics.scheme == "gripc"
 
 
-ISPG = ("drop.particles_per_edge=7", "solder.numerics.time_step_limit=20")
+ISPG = ("drop.particles_per_edge=11",)
 
 
 @pytest.mark.parametrize(
@@ -208,8 +208,7 @@ ISPG = ("drop.particles_per_edge=7", "solder.numerics.time_step_limit=20")
         ("drop.contact_angle=148 deg", "contact angles outside 60 deg to 120 deg"),
         ("solder.wall=no-slip", "free slip only"),
         ("drop={volume='1 mm^3'}", "free drops"),
-        ("drop.particles_per_edge=11", "more than drop.particles_per_edge = 7"),
-        ("solder.numerics.time_step_limit=100", "time_step_limit above 20"),
+        ("drop.particles_per_edge=13", "more than drop.particles_per_edge = 11"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
 )
