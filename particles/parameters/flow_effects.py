@@ -4,7 +4,7 @@ from abc import abstractmethod
 from math import sqrt
 
 from reflowshock.effect import Decision, Effect, decided, decision
-from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, DamBreak, SphFlow
+from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, SphFlow
 
 # Thickness of a boundary layer, over the length of the flow: with less, viscosity is left out where walls are smooth.
 THIN_LAYER = 0.01
@@ -23,7 +23,7 @@ class FlowEffect(Effect[SphFlow]):
 class FlowViscosity(FlowEffect):
     """Newtonian viscosity."""
 
-    name = "viscosity"
+    name = "flow_viscosity"
     adds = "div(2 mu D(v)) / rho"
     number = "1 / sqrt(Re), Re = rho U L / mu: boundary layer over length"
     threshold = THIN_LAYER
@@ -64,21 +64,7 @@ class ArtificialViscosity(FlowEffect):
         return decision(not viscous, "viscosity acts" if viscous else f"no viscosity acts: {alpha:g}", influence)
 
 
-class FlowGravity(FlowEffect):
-    """Weight, which drives a dam break."""
-
-    name = "gravity"
-    adds = "g"
-    influence = "it drives a dam break"
-    place = "reflowshock.particles.sph.simulation.Simulation"
-
-    def decide(self, scene: SphFlow) -> Decision:
-        """Where the scene is a dam break."""
-        falls = isinstance(scene, DamBreak)
-        return decision(falls, "it drives the flow" if falls else "nothing rises or falls")
-
-
-FLOW_EFFECTS = (FlowGravity(), FlowViscosity(), ArtificialViscosity())
+FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity())
 
 
 def artificial_viscosity(scene: SphFlow) -> float:

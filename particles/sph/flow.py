@@ -145,7 +145,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         sound=scene.sound,
         diffusion=numerics.density_diffusion * length * scene.sound,
         artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
-        viscosity=scene.viscosity if decide_flow(scene)["viscosity"]["on"] else 0.0,
+        viscosity=scene.viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
         has_surface=int(has_surface),
         no_slip=int(not has_surface),
         spacing=spacing,

@@ -47,7 +47,7 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     """Predict effects, size, time step and cost of a flow."""
     scene: SphFlow = case.scene
     effects = decide_flow(scene)
-    step = time_step(scene, effects["viscosity"]["on"])
+    step = time_step(scene, effects["flow_viscosity"]["on"])
     steps = ceil(scene.until / step)
     seconds = SECONDS_TO_START + steps * (SECONDS_PER_STEP + SECONDS_PER_PARTICLE * scene.particles)
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})

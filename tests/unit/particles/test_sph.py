@@ -187,11 +187,11 @@ def test_a_flow_is_read_as_it_was_written(tmp_path):
 
 def test_viscosity_acts_where_its_layer_is_thick_and_the_artificial_one_elsewhere():
     water = decide_flow(small_dam())
-    assert (water["viscosity"]["on"], water["artificial_viscosity"]["on"]) == (False, True)
+    assert (water["flow_viscosity"]["on"], water["artificial_viscosity"]["on"]) == (False, True)
     syrup = small_dam(viscosity=10.0)
-    assert decide_flow(syrup)["viscosity"]["on"]
+    assert decide_flow(syrup)["flow_viscosity"]["on"]
     assert artificial_viscosity(syrup) == 0.0
-    assert decide_flow(small_dam(effects={"viscosity": "on"}))["viscosity"]["on"]
+    assert decide_flow(small_dam(effects={"viscosity": "on"}))["flow_viscosity"]["on"]
 
 
 def test_the_second_rise_of_what_was_measured_is_found():
