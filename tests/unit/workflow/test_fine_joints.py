@@ -46,8 +46,8 @@ def test_more_critical_joints_than_joints_are_refused():
 
 
 def test_levels_are_refused_where_the_scheme_has_none():
-    with pytest.raises(CaseError, match=r"levels = 2: does not go with scheme = held_velocity; allowed: auto"):
-        read_case(SMALL_CASE, ["shock.coupling.scheme=held_velocity", "shock.coupling.levels=2"])
+    with pytest.raises(CaseError, match=r"levels = 2: does not go with scheme = impulse; allowed: auto"):
+        read_case(SMALL_CASE, ["shock.coupling.scheme=impulse", "shock.coupling.levels=2"])
 
 
 def test_a_new_case_shows_what_the_keys_take():

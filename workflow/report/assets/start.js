@@ -1,7 +1,11 @@
 "use strict";
 // Draw everything, what comes first on the page first; then joints that are picked in a table are shown in 3D.
 
+// The browser has shown the texts and tables, which need no drawing.
+const painted = () => new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+
 async function start() {
+  await painted();
   for (const place of document.querySelectorAll("[data-figure], [data-scene]")) {
     await (place.dataset.figure === undefined ? drawScene(place) : drawFigure(place));
   }
