@@ -8,7 +8,7 @@ import numpy as np
 from reflowshock.arrays import Floats
 from reflowshock.particles.reference.dam_break import measured_pressure
 from reflowshock.particles.reference.viscous_flows import starting_channel
-from reflowshock.workflow.case.text import percent, quantity
+from reflowshock.workflow.case.text import number, percent, quantity
 from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
@@ -19,6 +19,7 @@ HEADLINE = (
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
     "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip
+UNITS = {"sqrt(H/g)": "√(H/g)", "rho g H": "ρgH"}
 CAPTIONS = {
     "dam_break": "Pressure at the sensor; front of the liquid; energies.",
     "poiseuille": "Speeds at the end, and the exact ones; largest speed in time.",
@@ -139,6 +140,8 @@ def _table(metrics: dict, health: dict) -> dict:
 
 
 def _text(name: str, metric: dict) -> str:
+    if metric["unit"] in UNITS:
+        return f"{number(metric['value'])} {UNITS[metric['unit']]}"
     if metric["unit"] == "" and ("error" in name or name.endswith(("_drift", "_rise"))):
         return percent(metric["value"])
     return quantity(metric)
