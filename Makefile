@@ -3,8 +3,9 @@ export OMP_NUM_THREADS = 1
 
 PYTHON := .venv/bin/python
 CASE := cases/jedec_bga/case.toml
-# A worker that dies ends the tests: replaced, xdist would wait for its files for ever.
-PARALLEL := --numprocesses=logical --maxprocesses=8 --dist=loadfile --no-loadscope-reorder --max-worker-restart=0
+# One worker more than cores: tests of schedulers and of the command line wait. A worker that dies ends the tests: replaced,
+# xdist would wait for its files for ever.
+PARALLEL := --numprocesses=$(shell expr $$(nproc) + 1) --maxprocesses=8 --dist=loadfile --no-loadscope-reorder --max-worker-restart=0
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16

@@ -12,6 +12,7 @@ from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
+from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -23,6 +24,10 @@ from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STA
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
+from reflowshock.workflow.fluid import case as fluid_case
+from reflowshock.workflow.fluid import stages as fluid_stages
+from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase, TaylorGreenCase
+from reflowshock.workflow.fluid.forecast import flow_size, flow_tables, forecast_flow
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
 from reflowshock.workflow.report.errors import Discretisation
@@ -136,6 +141,35 @@ def _solder_study(case: Case) -> ConvergenceStudy:
     return STUDIES[case.kind](case)
 
 
+def _flow_report(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
+    if (run_folder / "particles/flow.h5").exists():
+        from reflowshock.workflow.fluid.report import add_flow
+
+        add_flow(run_folder, case, context, summary)
+
+
+def _flow_study(case: FlowCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.fluid import flow_study
+
+    return flow_study(case)
+
+
+def _flow_kind(case: type[Case], problems: Callable[[Any], list[Problem]], flow: StageFunction) -> Kind:
+    """Return a kind of case of a liquid that flows."""
+    return Kind(
+        case=case,
+        problems=problems,
+        stages={"particles": flow},
+        forecast=forecast_flow,
+        size=flow_size,
+        plan=flow_tables,
+        acts="flow",
+        report=_flow_report,
+        study=_flow_study,
+        effects=FLOW_EFFECTS,
+    )
+
+
 def _solder_kind(case: type[Case], problems: Callable[[Any], list[Problem]], reflow_solder: StageFunction) -> Kind:
     """Return a kind of case of solder alone."""
     return Kind(
@@ -202,6 +236,9 @@ KINDS = (
     _solder_kind(DropsCase, solder_case.of_drops, solder_stages.reflow_drops),
     _solder_kind(OscillationCase, solder_case.of_oscillation, solder_stages.reflow_oscillation),
     STRUCTURE,
+    _flow_kind(DamBreakCase, fluid_case.of_dam_break, fluid_stages.flow_dam_break),
+    _flow_kind(PoiseuilleCase, fluid_case.of_viscous, fluid_stages.flow_poiseuille),
+    _flow_kind(TaylorGreenCase, fluid_case.of_viscous, fluid_stages.flow_taylor_green),
     PACKAGE,
 )
 NAMES = tuple(dict.fromkeys(kind.name for kind in KINDS))

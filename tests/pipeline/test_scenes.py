@@ -176,3 +176,22 @@ def test_a_drop_that_finds_no_rest_says_so(tmp_path):
     assert result.returncode == 1
     assert "stage reflow failed: no rest after 2 steps (solder.numerics.max_steps)" in result.stderr
     assert not (tmp_path / "reflow").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "metrics"),
+    [
+        ("dam_break", ("dam_break.duration=0.05 s",), {"particles_lost", "energy_rise"}),
+        ("poiseuille", ("poiseuille.duration=0.02",), {"profile_error_at_end", "reynolds"}),
+        ("taylor_green", ("taylor_green.duration=0.1",), {"decay_rate_error", "speed_error"}),
+    ],
+)
+def test_a_flow_goes_from_case_file_to_report(tmp_path, name, settings, metrics):
+    ended = run(name, tmp_path / "run", *settings, f"{name}.numerics.particles_across=10", "scale=full")
+    assert "report: " in ended.stdout, ended.stderr
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert metrics | {"volume_drift", "particles", "particle_steps_per_second"} <= summary["metrics"].keys()
+    assert summary["effects"].keys() == {"flow_viscosity", "artificial_viscosity"}
+    page = (tmp_path / "run/report.html").read_text()
+    assert "<h2>Flow</h2>" in page
+    assert (tmp_path / "run/particles/particles.vtu").exists()

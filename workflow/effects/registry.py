@@ -10,11 +10,13 @@ APART = "_in_the_shock"
 
 @cache
 def registry() -> dict[str, Effect]:
-    """Return the effects by name: those of reflows, of heating and of drops."""
+    """Return the effects by name: those of reflows, of heating, of drops and of flows."""
+    from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
     from reflowshock.workflow.kinds import BOARD_DROP
 
     stages = list(BOARD_DROP.stages)
-    return {effect.name: effect for effect in sorted(BOARD_DROP.effects, key=lambda effect: stages.index(effect.stage))}
+    of_drops = sorted(BOARD_DROP.effects, key=lambda effect: stages.index(effect.stage))
+    return {effect.name: effect for effect in (*of_drops, *FLOW_EFFECTS)}
 
 
 def effect_of(name: str, reflowed: bool) -> Effect | None:

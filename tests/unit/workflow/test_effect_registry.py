@@ -156,4 +156,4 @@ def test_the_command_prints_the_registry_and_a_scene():
 def test_entries_are_complete(effect):
     texts = (effect.adds, effect.number, effect.influence, effect.place, effect.switch, effect.source)
     assert all(texts)
-    assert effect.stage in ("reflow", "shock") and effect.acts in ("above", "below")
+    assert effect.stage in ("reflow", "shock", "particles") and effect.acts in ("above", "below")

@@ -1,0 +1,196 @@
+"""Flows of a liquid by delta-SPH, their parameters in SI floats: a dam break, a channel, vortices."""
+
+from math import sqrt
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from reflowshock.effect import Switch
+from reflowshock.parameters import Parameters
+from reflowshock.quantity import Quantity
+
+# Alpha of liquid without viscosity of its own: as in dam breaks of Marrone et al. 2011.
+ARTIFICIAL_VISCOSITY = 0.02
+
+
+class SphNumerics(Parameters):
+    """How a flow is computed.
+
+    Particles across stand along the length of the scene: the height of the dam, the width of the channel, the side of
+    the box of vortices. The smoothing length is over their spacing, the speed of sound over the largest speed expected;
+    density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
+    """
+
+    particles_across: int = Field(40, ge=8, le=1000)
+    kernel: Literal["cubic_spline", "wendland"] = "cubic_spline"
+    smoothing_length: float = Field(1.3, ge=1.0, le=2.5)
+    sound_speed: float = Field(10.0, ge=5, le=100)
+    density_diffusion: float = Field(0.1, ge=0, le=0.2)
+    artificial_viscosity: float | None = Field(None, ge=0, le=0.5)
+
+
+class SphEffects(Parameters):
+    """What acts besides pressure: decided from the Reynolds number (auto), or by the user."""
+
+    viscosity: Switch = "auto"
+
+
+class SphFlow(Parameters):
+    """What all flows have: a liquid, and how it is computed."""
+
+    density: Annotated[float, Quantity("kg/m^3")] = Field(1000.0, gt=0)
+    viscosity: Annotated[float, Quantity("Pa*s")] = Field(1.0e-3, gt=0)
+    effects: SphEffects = SphEffects()
+    numerics: SphNumerics = SphNumerics()
+
+    @property
+    def length(self) -> float:
+        """What the particles across stand along [m]."""
+        raise NotImplementedError
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed expected [m/s]."""
+        raise NotImplementedError
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid."""
+        raise NotImplementedError
+
+    @property
+    def until(self) -> float:
+        """How long it flows [s]."""
+        raise NotImplementedError
+
+    @property
+    def spacing(self) -> float:
+        """Of the particles at the start [m]."""
+        return self.length / self.numerics.particles_across
+
+    @property
+    def sound(self) -> float:
+        """Speed of sound [m/s]."""
+        return self.numerics.sound_speed * self.fastest
+
+    @property
+    def reynolds(self) -> float:
+        """Reynolds number of length and largest speed."""
+        return self.density * self.fastest * self.length / self.viscosity
+
+
+class DamBreak(SphFlow):
+    """A column of liquid in the corner of a tank is let go; a sensor in the opposite wall measures pressure.
+
+    Walls are smooth: liquid slides along them. Pressures are told over rho g H, times in sqrt(H / g), H being the
+    column's height.
+    """
+
+    height: Annotated[float, Quantity("m")] = Field(gt=0)
+    width: Annotated[float, Quantity("m")] = Field(gt=0)
+    tank_length: Annotated[float, Quantity("m")] = Field(gt=0)
+    sensor_height: Annotated[float, Quantity("m")] = Field(gt=0)
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, gt=0)
+    duration: Annotated[float, Quantity("s")] = Field(gt=0)
+
+    @property
+    def length(self) -> float:
+        """The column's height [m]."""
+        return self.height
+
+    @property
+    def fastest(self) -> float:
+        """Speed of a fall over the column's height, sqrt(2 g H) [m/s]."""
+        return sqrt(2.0 * self.gravity * self.height)
+
+    @property
+    def unit_of_time(self) -> float:
+        """sqrt(H / g) [s]."""
+        return sqrt(self.height / self.gravity)
+
+    @property
+    def columns(self) -> int:
+        """Particles along the column's width."""
+        return max(1, round(self.width / self.spacing))
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid."""
+        return self.columns * self.numerics.particles_across
+
+    @property
+    def until(self) -> float:
+        """How long it flows [s]."""
+        return self.duration
+
+
+class Poiseuille(SphFlow):
+    """Liquid at rest between two plates is set in motion by a force along them; along them it is periodic.
+
+    The speed is that of the middle at the end of all time; the duration is in w^2 / nu, in which the flow develops.
+    """
+
+    width: Annotated[float, Quantity("mm")] = Field(gt=0)
+    speed: Annotated[float, Quantity("m/s")] = Field(gt=0)
+    duration: float = Field(1.0, gt=0, le=10)
+
+    @property
+    def length(self) -> float:
+        """The channel's width [m]."""
+        return self.width
+
+    @property
+    def fastest(self) -> float:
+        """Speed of the middle [m/s]."""
+        return self.speed
+
+    @property
+    def force(self) -> float:
+        """Acceleration along the channel [m/s^2]."""
+        return 8.0 * self.viscosity * self.speed / (self.density * self.width**2)
+
+    @property
+    def columns(self) -> int:
+        """Particles along a period of the channel."""
+        return max(10, self.numerics.particles_across // 2)
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid."""
+        return self.columns * self.numerics.particles_across
+
+    @property
+    def until(self) -> float:
+        """How long it flows [s]."""
+        return self.duration * self.density * self.width**2 / self.viscosity
+
+
+class TaylorGreen(SphFlow):
+    """Four vortices in a periodic box, which viscosity slows down.
+
+    The duration is in side / speed, the speed the largest one at the start.
+    """
+
+    side: Annotated[float, Quantity("mm")] = Field(gt=0)
+    speed: Annotated[float, Quantity("m/s")] = Field(gt=0)
+    duration: float = Field(1.0, gt=0, le=20)
+
+    @property
+    def length(self) -> float:
+        """The box's side [m]."""
+        return self.side
+
+    @property
+    def fastest(self) -> float:
+        """The largest speed at the start [m/s]."""
+        return self.speed
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid."""
+        return self.numerics.particles_across**2
+
+    @property
+    def until(self) -> float:
+        """How long it flows [s]."""
+        return self.duration * self.side / self.speed

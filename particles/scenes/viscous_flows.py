@@ -1,0 +1,94 @@
+"""Flows with exact solutions: liquid between plates that a force sets in motion, vortices that die out."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.flows import Poiseuille, TaylorGreen
+from reflowshock.particles.reference import viscous_flows as exact
+from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.flow import FlowResult
+from reflowshock.particles.sph.simulation import Simulation
+
+Progress = Callable[[float], None]
+
+
+def solve_poiseuille(
+    scene: Poiseuille, progress: Progress | None = None, checkpoint: Checkpoint | None = None
+) -> FlowResult:
+    """Let a force set liquid between plates in motion; compare its speeds with the exact ones.
+
+    Raises:
+        FloatingPointError: a position is not finite.
+    """
+    simulation, kinematic = channel(scene), scene.viscosity / scene.density
+
+    def sample(now: Simulation) -> tuple[float, ...]:
+        liquid = slice(now.fluids)
+        height, speed = now.fields.z[liquid], now.fields.u[liquid]
+        error = speed - exact.starting_channel(height, now.time, scene.width, kinematic, scene.force)
+        spread = (np.sqrt((error**2).mean()), np.abs(error).max(), speed.max())
+        return now.time, *(float(value / scene.speed) for value in spread)
+
+    run = flow.run_flow(simulation, scene.until, sample, progress, checkpoint)
+    names = ("time", "profile_error", "largest_error", "largest_speed")
+    rows = np.array(run.rows)
+    metrics = {
+        "profile_error": (float(rows[:, 1].max()), ""),
+        "profile_error_at_end": (float(rows[-1, 1]), ""),
+        "largest_error_at_end": (float(rows[-1, 2]), ""),
+        "reynolds": (scene.reynolds, ""),
+    }
+    return flow.result_of(run, names, metrics)
+
+
+def channel(scene: Poiseuille) -> Simulation:
+    """Set up liquid at rest between two plates."""
+    across, layers = scene.numerics.particles_across, flow.wall_layers(scene)
+    law = flow.law_of(scene, (scene.columns * scene.spacing, 0.0, 0.0), (scene.force, 0.0, 0.0), has_surface=False)
+    columns, beside = np.arange(scene.columns), np.arange(layers)
+    liquid = flow.lattice(columns, np.arange(across), scene.spacing)
+    walls = flow.lattice(columns, np.concatenate((-1 - beside, across + beside)), scene.spacing)
+    fields = flow.liquid_and_walls(liquid, walls, np.zeros(liquid.shape[1]), law)
+    return Simulation(fields, liquid.shape[1], law)
+
+
+def solve_taylor_green(
+    scene: TaylorGreen, progress: Progress | None = None, checkpoint: Checkpoint | None = None
+) -> FlowResult:
+    """Let vortices die out; compare their speeds with the exact ones.
+
+    Raises:
+        FloatingPointError: a position is not finite.
+    """
+    simulation = vortices(scene)
+    rate = exact.taylor_green_decay(scene.side, scene.viscosity / scene.density)
+
+    def sample(now: Simulation) -> tuple[float, ...]:
+        squares = now.fields.u**2 + now.fields.w**2
+        energy = 0.5 * float(now.fields.mass @ squares)
+        return now.time, float(np.sqrt(squares.max())) / scene.speed, float(np.exp(-rate * now.time)), energy
+
+    run = flow.run_flow(simulation, scene.until, sample, progress, checkpoint)
+    names = ("time", "largest_speed", "exact_speed", "kinetic_energy")
+    time, largest, exact_speed, energy = np.array(run.rows).T
+    fitted = -0.5 * float(np.polyfit(time, np.log(energy), 1)[0])
+    metrics = {
+        "decay_rate": (fitted, "1/s"),
+        "decay_rate_error": (fitted / rate - 1.0, ""),
+        "speed_error": (float(np.abs(largest - exact_speed).max()), ""),
+        "reynolds": (scene.reynolds, ""),
+    }
+    return flow.result_of(run, names, metrics)
+
+
+def vortices(scene: TaylorGreen) -> Simulation:
+    """Set up the vortices in a periodic box."""
+    places = np.arange(scene.numerics.particles_across)
+    law = flow.law_of(scene, (scene.side, 0.0, scene.side), (0.0, 0.0, 0.0), has_surface=False)
+    liquid = flow.lattice(places, places, scene.spacing)
+    u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)
+    fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
+    fields.u[:], fields.w[:] = scene.speed * u, scene.speed * w
+    return Simulation(fields, liquid.shape[1], law)

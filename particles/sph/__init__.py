@@ -1,0 +1,6 @@
+"""Weakly compressible delta-SPH: fluids that splash, drip and flow through channels; start with `simulation.py`.
+
+Formula, loop, data and orchestration stand apart. `smoothing.py` and `pair_terms.py` are functions of one pair of
+particles; `particle_rates.py` sums them over the neighbours of one particle; `threads.py` has the loops over particles,
+`fluid_state.py` the arrays, `simulation.py` the steps with time, `flow.py` a run from scene to result.
+"""

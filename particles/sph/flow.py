@@ -1,0 +1,200 @@
+"""From scene to result: particles on a lattice, a run with samples and pictures, a checkpoint."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
+
+PICTURES = 24
+SAMPLES = 2000
+
+Sample = Callable[[Simulation], tuple[float, ...]]
+Vector = tuple[float, float, float]
+Metrics = dict[str, tuple[float, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Particles of the liquid at a time [s]: `(n, 3)` points [m] and velocities [m/s], `(n,)` pressures [Pa]."""
+
+    time: float
+    points: Floats
+    velocity: Floats
+    pressure: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class FlowResult:
+    """How a liquid flowed.
+
+    Attributes:
+        pictures: in time; the last is the end.
+        walls: `(m, 3)` particles of walls [m].
+        history: arrays of equal length, the first is time [s].
+        metrics: name to value and unit.
+    """
+
+    pictures: list[Picture]
+    walls: Floats
+    history: dict[str, Floats]
+    metrics: Metrics
+
+
+@dataclass(slots=True)
+class FlowRun:
+    """State of a run: the simulation, rows of the history, pictures, wall time [s]."""
+
+    simulation: Simulation
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        rows, pictures = np.array(self.rows), self.pictures
+        return {
+            "simulation": self.simulation.saved(), "rows": rows, "pictures": pictures, "seconds": self.seconds,
+        }  # fmt: skip
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.simulation.restore(saved["simulation"])
+        self.rows = [tuple(row) for row in saved["rows"].tolist()]
+        self.pictures, self.seconds = saved["pictures"], saved["seconds"]
+
+    def picture(self) -> None:
+        """Keep the present particles, those of a periodic flow within its period."""
+        simulation, liquid = self.simulation, slice(self.simulation.fluids)
+        points, velocity = (np.stack([one[liquid] for one in simulation.fields[k : k + 3]], axis=1) for k in (0, 3))
+        law = simulation.law
+        for axis, period in enumerate((law.period_x, law.period_y, law.period_z)):
+            if period > 0.0:
+                points[:, axis] %= period
+        self.pictures.append(Picture(simulation.time, points, velocity, simulation.fields.pressure[liquid].copy()))
+
+
+def run_flow(
+    simulation: Simulation,
+    until: float,
+    sample: Sample,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> FlowRun:
+    """Let a liquid flow up to a time [s]; sample it some 2000 times and keep 24 pictures.
+
+    Args:
+        simulation: the liquid at the start.
+        until: time of the end [s].
+        sample: returns a row of the history, the time first.
+        progress: called with the fraction done.
+        checkpoint: where the run continues from, to the last bit, and leaves its state.
+
+    Raises:
+        FloatingPointError: a position is not finite.
+    """
+    run = FlowRun(simulation)
+    saved = checkpoint.read((Picture,)) if checkpoint else None
+    if saved:
+        run.restore(saved)
+    else:
+        run.rows.append(sample(simulation))
+        run.picture()
+    while simulation.time < until:
+        start = perf_counter()
+        simulation.step(min(simulation.time_step(), until - simulation.time))
+        if simulation.time >= len(run.rows) * until / SAMPLES or simulation.time >= until:
+            run.rows.append(sample(simulation))
+        if simulation.time >= len(run.pictures) * until / PICTURES:
+            run.picture()
+        run.seconds += perf_counter() - start
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write(run.saved())
+        if progress is not None:
+            progress(min(1.0, simulation.time / until))
+    return run
+
+
+def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
+    """Return what acts between two particles of a flow in the plane of x and z.
+
+    Args:
+        scene: the flow.
+        periods: of a periodic flow [m]; 0 where it is not.
+        gravity: [m/s^2].
+        has_surface: whether the liquid has a free one, where particles cannot be shifted, and is free to turn.
+    """
+    numerics, spacing = scene.numerics, scene.spacing
+    length, kernel = numerics.smoothing_length * spacing, KERNELS[numerics.kernel]
+    return Law(
+        kernel=kernel,
+        dimension=2,
+        length=length,
+        norm=norm(kernel, 2, length),
+        rest_density=scene.density,
+        sound=scene.sound,
+        diffusion=numerics.density_diffusion * length * scene.sound,
+        artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
+        viscosity=scene.viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
+        has_surface=int(has_surface),
+        no_slip=int(not has_surface),
+        spacing=spacing,
+        shifting=0.0 if has_surface else 1.0,
+        period_x=periods[0],
+        period_y=periods[1],
+        period_z=periods[2],
+        gravity_x=gravity[0],
+        gravity_y=gravity[1],
+        gravity_z=gravity[2],
+    )
+
+
+def wall_layers(scene: SphFlow) -> int:
+    """Layers of particles that fill the support of liquid beside a wall."""
+    return int(np.ceil(SUPPORT * scene.numerics.smoothing_length))
+
+
+def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: float) -> Floats:
+    """Return the points `(3, n)` of a lattice in the plane of x and z [m]; columns and rows are counted in spacings."""
+    x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")
+    return spacing * np.stack((x.ravel(), np.zeros(x.size), z.ravel()))
+
+
+def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
+    """Return the fields of liquid `(3, n)` [m] at rest under a pressure `(n,)` [Pa], and of walls `(3, m)` [m]."""
+    points = np.concatenate((liquid, walls), axis=1)
+    count, fixed = points.shape[1], walls.shape[1]
+    density = np.full(count, law.rest_density)
+    density[: count - fixed] += pressure / law.sound**2
+    mass = density * law.spacing**law.dimension
+    places = {name: points[axis].copy() for axis, name in enumerate("xyz")}
+    still = {name: np.zeros(count) for name in ("u", "v", "w", "pressure", "slope_x", "slope_y", "slope_z")}
+    walls_at_rest = {name: np.zeros(fixed) for name in ("wall_u", "wall_v", "wall_w")}
+    return Fields(**places, **still, density=density, mass=mass, **walls_at_rest)
+
+
+def result_of(run: FlowRun, names: tuple[str, ...], metrics: Metrics) -> FlowResult:
+    """Return what a run found, with the metrics that all flows have."""
+    simulation = run.simulation
+    fluids, fields = simulation.fluids, simulation.fields
+    history = dict(zip(names, np.array(run.rows).T, strict=True))
+    volume = fields.mass[:fluids] / fields.density[:fluids]
+    shared = {
+        "volume_drift": (float(volume.sum() / (fluids * simulation.law.spacing**simulation.law.dimension) - 1.0), ""),
+        "particles": (float(fluids), ""),
+        "steps": (float(simulation.steps), ""),
+        "particle_steps_per_second": (simulation.steps * fluids / run.seconds, "1/s"),
+        "seconds": (run.seconds, "s"),
+    }
+    walls = np.stack([one[fluids:] for one in fields[:3]], axis=1)
+    return FlowResult(run.pictures, walls, history, metrics | shared)

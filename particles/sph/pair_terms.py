@@ -1,0 +1,59 @@
+"""What one particle j does to a particle i: a small function a term, of one pair.
+
+``d`` = r_i - r_j, ``slope`` such that grad_i W = slope d, ``volume`` = m_j / rho_j. A momentum term returns a factor of
+d in the acceleration [1/s^2]; a continuity term a rate of density [kg/(m^3 s)]. Times m_i terms of momentum are
+antisymmetric: momentum is kept to rounding, and by those along d angular momentum too.
+"""
+
+from numba import njit
+
+# Of h^2: keeps the term of viscosity finite where particles meet.
+SOFTENING = 0.01
+
+
+@njit(cache=True)
+def continuity(approach, slope, volume, density):
+    """Change of density as particles come near: rho_i (u_i - u_j) . grad W V_j; ``approach`` = (u_i - u_j) . d."""
+    return density * approach * slope * volume
+
+
+@njit(cache=True)
+def density_diffusion(jump, rise, slope, volume):
+    """Diffusion of density over delta h c0 (Antuono et al. 2010): none where density is linear.
+
+    ``jump`` = rho_j - rho_i, ``rise`` = (grad rho_i + grad rho_j) . (r_j - r_i) / 2 with renormalised gradients. With
+    psi = 2 (jump - rise) (r_j - r_i) / |d|^2 it is psi . grad_i W V_j, and (r_j - r_i) . d = -|d|^2.
+    """
+    return -2.0 * (jump - rise) * slope * volume
+
+
+@njit(cache=True)
+def pressure(pressure_i, pressure_j, slope, volume, density):
+    """Gradient of pressure: -(p_i + p_j) grad W V_j / rho_i."""
+    return -(pressure_i + pressure_j) * slope * volume / density
+
+
+@njit(cache=True)
+def artificial_viscosity(approach, distance2, slope, volume, density):
+    """Artificial viscosity over alpha h c0 rho_0: (u_ij . r_ij) / r_ij^2 grad W V_j / rho_i (Antuono et al. 2012)."""
+    return approach / distance2 * slope * volume / density
+
+
+@njit(cache=True)
+def central_viscosity(approach, softened2, slope, volume, factor):
+    """Newtonian viscosity along the line of the particles (Cleary 1998): a body that turns as a whole feels none.
+
+    ``softened2`` = r_ij^2 + 0.01 h^2, ``factor`` = 2 (d + 2) mu / rho_i in d dimensions (Monaghan 2005); Cleary's
+    4.96333 in place of d + 2 was fitted, in three. On a lattice it falls short by 6 to 20 % in shear along the axes;
+    disorder heals that.
+    """
+    return factor * approach / softened2 * slope * volume
+
+
+@njit(cache=True)
+def shear_viscosity(distance2, softened2, slope, volume, factor):
+    """Newtonian viscosity as a factor of u_i - u_j [1/s] (Morris et al. 1997): right on lattices too, within 4 %.
+
+    ``factor`` = 2 mu / rho_i. It keeps momentum, but not angular momentum at free surfaces.
+    """
+    return factor * distance2 / softened2 * slope * volume

@@ -1,0 +1,176 @@
+"""Steps with time: velocity Verlet, one loop over the pairs a step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.sph import threads
+from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.smoothing import SUPPORT
+
+# Of the smoothing length: how far beyond their support particles are listed.
+SKIN = 0.3
+RATES = 10
+
+
+@dataclass(slots=True)
+class Rows:
+    """Neighbours of every particle, found again when one has moved half the skin.
+
+    Attributes:
+        law: says support and periods.
+        built_at: `(3, n)` positions when they were found [m].
+        lists: offsets `(n + 1,)`, indices.
+        builds: how often they were found.
+    """
+
+    law: Law
+    built_at: Floats = field(default_factory=lambda: np.empty((3, 0)))
+    lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
+    builds: int = 0
+
+    def update(self, points: Floats) -> None:
+        """Make the lists valid for points `(3, n)` [m]."""
+        skin = SKIN * self.law.length
+        if points.shape == self.built_at.shape:
+            moved = ((points - self.built_at) ** 2).sum(axis=0).max()
+            if moved <= (0.5 * skin) ** 2:
+                return
+        reach = SUPPORT * self.law.length + skin
+        images, source = self._images(points, reach)
+        offsets, indices = find_neighbours(images.T, reach)
+        count = points.shape[1]
+        offsets = offsets[: count + 1]
+        self.lists = offsets, source[indices[: offsets[-1]]]
+        self.built_at = points.copy()
+        self.builds += 1
+
+    def _images(self, points: Floats, reach: float) -> tuple[Floats, Indices]:
+        """Points with their images beyond the periods `(3, n + g)`, and whose each is."""
+        source = np.arange(points.shape[1], dtype=np.int32)
+        for axis, period in enumerate((self.law.period_x, self.law.period_y, self.law.period_z)):
+            if not period:
+                continue
+            place = points[axis] - period * np.floor(points[axis] / period)
+            points = points.copy()
+            points[axis] = place
+            shift = np.zeros((3, 1))
+            shift[axis] = period
+            low, high = place < reach, place > period - reach
+            points = np.concatenate((points, points[:, low] + shift, points[:, high] - shift), axis=1)
+            source = np.concatenate((source, source[low], source[high]))
+        return points, source
+
+
+@dataclass(slots=True)
+class Simulation:
+    """A fluid between walls that moves.
+
+    Attributes:
+        fields: its quantities; positions, velocities and densities are those at `time`.
+        fluids: number of particles that are liquid.
+        law: what acts between two particles.
+        rows: neighbours.
+        rates: `(10, n)` of the last positions, as `rates_of` returns them.
+        time: [s].
+        steps: number of them.
+    """
+
+    fields: Fields
+    fluids: int
+    law: Law
+    rows: Rows = field(init=False)
+    rates: Floats = field(init=False)
+    time: float = 0.0
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.rows = Rows(self.law)
+        self.rates = np.zeros((RATES, self.fluids))
+        self._find_rates()
+
+    @property
+    def fastest(self) -> float:
+        """The largest speed of the liquid [m/s]."""
+        u, v, w = (speed[: self.fluids] for speed in (self.fields.u, self.fields.v, self.fields.w))
+        return float(np.sqrt((u * u + v * v + w * w).max()))
+
+    def saved(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return {
+            "fields": self.fields._asdict(), "rates": self.rates, "built_at": self.rows.built_at,
+            "builds": self.rows.builds, "time": self.time, "steps": self.steps,
+        }  # fmt: skip
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Continue from what `saved` returned."""
+        self.fields, self.rates = Fields(**saved["fields"]), saved["rates"]
+        self.time, self.steps = saved["time"], saved["steps"]
+        self.rows = Rows(self.law)
+        self.rows.update(saved["built_at"])
+        self.rows.builds = saved["builds"]
+
+    def time_step(self) -> float:
+        """The largest stable step [s] (Monaghan 1992)."""
+        law = self.law
+        step = 0.25 * law.length / (law.sound + self.fastest)
+        if law.viscosity > 0.0:
+            step = min(step, 0.125 * law.length**2 * law.rest_density / law.viscosity)
+        return step
+
+    def step(self, time_step: float) -> None:
+        """Go on by a time step [s].
+
+        Rates need velocities and densities of the new time, which depend on them: those that the last rates predict
+        stand in, which keeps the order.
+        """
+        liquid, half = slice(self.fluids), 0.5 * time_step
+        fields, rates = self.fields, self.rates
+        middle = []
+        for axis in range(3):
+            place, speed = fields[axis][liquid], fields[3 + axis][liquid]
+            middle.append(speed + half * rates[1 + axis])
+            place += time_step * middle[axis]
+            speed += time_step * rates[1 + axis]
+        density = fields.density[liquid] + half * rates[0]
+        fields.density[liquid] += time_step * rates[0]
+        self._find_rates()
+        for axis in range(3):
+            fields[3 + axis][liquid] = middle[axis] + half * rates[1 + axis]
+        fields.density[liquid] = density + half * rates[0]
+        self._shift(time_step)
+        self.time += time_step
+        self.steps += 1
+
+    def _find_rates(self) -> None:
+        """Find the rates of the present fields."""
+        threads.use_threads(len(self.fields.x))
+        fields, law, liquid = self.fields, self.law, slice(self.fluids)
+        self.rows.update(np.array(fields[:3]))
+        fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)
+        self._extend_to_walls()
+        threads.find_rates(self.fluids, self.rows.lists, fields, law, self.rates)
+        self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
+        for axis in range(3):
+            fields[9 + axis][liquid] = self.rates[4 + axis]
+
+    def _extend_to_walls(self) -> None:
+        """Give the particles of walls the pressure of the liquid beside them, and the velocity that viscosity sees."""
+        fields, law, walls = self.fields, self.law, slice(self.fluids, None)
+        found = np.empty((4, len(fields.x) - self.fluids))
+        threads.find_wall_values(self.fluids, self.rows.lists, fields, law, found)
+        fields.pressure[walls], fields.u[walls], fields.v[walls], fields.w[walls] = found
+        fields.density[walls] = law.rest_density + found[0] / law.sound**2
+
+    def _shift(self, time_step: float) -> None:
+        """Move particles to where there are fewer (Sun et al. 2017)."""
+        law = self.law
+        if not law.shifting:
+            return
+        factor = 4.0 * law.shifting * self.fastest * law.length * time_step
+        for axis in range(3):
+            self.fields[axis][: self.fluids] -= factor * self.rates[7 + axis]

@@ -1,0 +1,53 @@
+"""Smoothing kernels W of one pair, as functions of q = distance / h, in one, two and three dimensions.
+
+All have the support 2 h. Sources: cubic spline, Monaghan 1992; Wendland C2, Wendland 1995 and Dehnen & Aly 2012.
+"""
+
+from math import pi
+
+from numba import njit
+
+CUBIC_SPLINE, WENDLAND_C2 = 0, 1
+KERNELS = {"cubic_spline": CUBIC_SPLINE, "wendland": WENDLAND_C2}
+# Of the smoothing length h.
+SUPPORT = 2.0
+# Integral of the kernel's shape over the line, the plane and space, times 1 / h^d.
+NORMS = {
+    CUBIC_SPLINE: (2.0 / 3.0, 10.0 / (7.0 * pi), 1.0 / pi),
+    WENDLAND_C2: (5.0 / 8.0, 7.0 / (4.0 * pi), 21.0 / (16.0 * pi)),
+}
+
+
+def norm(kernel: int, dimension: int, length: float) -> float:
+    """Return sigma, the factor [1/m^d] that makes the integral of W one, for a smoothing length h [m]."""
+    return NORMS[kernel][dimension - 1] / length**dimension
+
+
+@njit(cache=True)
+def shape(kernel, line, q):
+    """Return W / sigma at q >= 0; ``line`` says that the flow has one dimension."""
+    if q >= 2.0:
+        return 0.0
+    if kernel == CUBIC_SPLINE:
+        if q < 1.0:
+            return 1.0 - 1.5 * q * q * (1.0 - 0.5 * q)
+        return 0.25 * (2.0 - q) ** 3
+    rest = 1.0 - 0.5 * q
+    if line:
+        return rest**3 * (1.5 * q + 1.0)
+    return rest**4 * (2.0 * q + 1.0)
+
+
+@njit(cache=True)
+def slope(kernel, line, q):
+    """Return (dW / dq) / (sigma q) at q >= 0: times sigma / h^2 and the vector between the points it is grad W."""
+    if q >= 2.0:
+        return 0.0
+    if kernel == CUBIC_SPLINE:
+        if q < 1.0:
+            return -3.0 + 2.25 * q
+        return -0.75 * (2.0 - q) ** 2 / q
+    rest = 1.0 - 0.5 * q
+    if line:
+        return -3.0 * rest**2
+    return -5.0 * rest**3

@@ -1,0 +1,36 @@
+"""The loops over particles, on threads.
+
+Results are written into arguments: Numba drops a parallel loop that writes into arrays of a tuple alone.
+"""
+
+from numba import config, njit, prange, set_num_threads
+
+from reflowshock.particles.sph.particle_rates import rates_of, wall_values
+
+# With fewer particles a thread more costs more than it brings.
+PARTICLES_PER_THREAD = 4000
+
+
+def use_threads(particles: int) -> None:
+    """Let the loops run on as many threads as pay for so many particles."""
+    set_num_threads(max(1, min(config.NUMBA_NUM_THREADS, particles // PARTICLES_PER_THREAD)))
+
+
+@njit(cache=True, parallel=True)
+def find_rates(fluids, lists, fields, law, rates):
+    """Write what `rates_of` returns of each particle of the liquid into rows of ``rates`` `(10, n)`."""
+    offsets, indices = lists
+    for i in prange(fluids):
+        found = rates_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        for k in range(10):
+            rates[k, i] = found[k]
+
+
+@njit(cache=True, parallel=True)
+def find_wall_values(fluids, lists, fields, law, found):
+    """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(4, m)`."""
+    offsets, indices = lists
+    for i in prange(fluids, fields.x.shape[0]):
+        values = wall_values(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        for k in range(4):
+            found[k, i - fluids] = values[k]

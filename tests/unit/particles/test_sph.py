@@ -1,0 +1,204 @@
+"""Delta-SPH: kernels, sums over neighbours, walls, conservation, restarts and threads."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.spatial import cKDTree
+
+from reflowshock.data_file import fields_of
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
+from reflowshock.particles.reference.dam_break import MEASURED, measured_pressure
+from reflowshock.particles.scenes.dam_break import dam, second_rise, solve_dam_break
+from reflowshock.particles.scenes.flow_products import read_flow, write_flow
+from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
+from reflowshock.particles.sph.particle_rates import rates_of, solved
+from reflowshock.particles.sph.simulation import Rows, Simulation
+from reflowshock.particles.sph.smoothing import KERNELS, norm, shape, slope
+
+AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.pi * q * q}
+
+
+def small_dam(**changes):
+    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.02}
+    return DamBreak(**given | changes, numerics=SphNumerics(particles_across=10))
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS.keys())
+def test_kernels_integrate_to_one_and_their_slope_is_their_derivative(kernel, dimension):
+    line = dimension == 1
+    sigma = norm(kernel, dimension, 1.0)
+    integral = sum(
+        quad(lambda q: sigma * shape(kernel, line, q) * AREAS[dimension](q), a, a + 1.0)[0] for a in (0.0, 1.0)
+    )
+    assert integral == pytest.approx(1.0, abs=1e-6)
+    for q in (0.3, 0.999999, 1.000001, 1.7):
+        difference = (shape(kernel, line, q + 1e-6) - shape(kernel, line, q - 1e-6)) / 2e-6
+        assert slope(kernel, line, q) * q == pytest.approx(difference, abs=1e-6)
+    assert shape(kernel, line, 2.0) == 0.0
+    assert shape(kernel, line, 1.0 - 1e-9) == pytest.approx(shape(kernel, line, 1.0 + 1e-9), abs=1e-8)
+
+
+def test_periodic_neighbours_are_those_of_a_tree_of_the_torus():
+    law = vortices(TaylorGreen(side=1.0, speed=1.0, viscosity=10.0, numerics=SphNumerics(particles_across=12))).law
+    points = np.random.default_rng(3).uniform(-1.0, 2.0, (3, 400)) * np.array([[1.0], [0.0], [1.0]])
+    rows = Rows(law)
+    rows.update(points)
+    offsets, indices = rows.lists
+    reach = 2.3 * law.length
+    wrapped = points[[0, 2]].T % 1.0
+    pairs = cKDTree(wrapped, boxsize=1.0).query_ball_point(wrapped, reach)
+    for i, near in enumerate(pairs):
+        assert sorted(set(near) - {i}) == sorted(indices[offsets[i] : offsets[i + 1]].tolist())
+
+
+def disturbed(simulation: Simulation) -> Simulation:
+    """The same with particles, velocities and densities pushed at random."""
+    random, fields = np.random.default_rng(7), simulation.fields
+    for axis in (fields.x, fields.z):
+        axis += random.uniform(-0.2, 0.2, axis.shape) * simulation.law.spacing
+    for speed in (fields.u, fields.w):
+        speed += random.normal(0.0, 0.1, speed.shape) * simulation.law.sound / 10.0
+    fields.density[:] *= 1.0 + random.normal(0.0, 0.01, fields.density.shape)
+    return Simulation(fields, simulation.fluids, simulation.law)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_without_walls_momentum_stays_to_rounding(kernel):
+    numerics = SphNumerics(particles_across=16, kernel=kernel, artificial_viscosity=0.1)
+    simulation = disturbed(vortices(TaylorGreen(side=1.0, speed=1.0, density=1.0, viscosity=0.01, numerics=numerics)))
+    fields, scale = simulation.fields, np.abs(simulation.rates[1:4]).max()
+    force = simulation.rates[1:4] @ fields.mass[: simulation.fluids]
+    assert np.abs(force).max() < 1e-12 * scale * fields.mass.sum()
+    before = np.array([fields.mass @ fields.u, fields.mass @ fields.w])
+    for _ in range(20):
+        simulation.step(simulation.time_step())
+    after = np.array([fields.mass @ fields.u, fields.mass @ fields.w])
+    assert np.abs(after - before).max() < 1e-12 * fields.mass.sum()
+
+
+def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
+    simulation = vortices(TaylorGreen(side=1.0, speed=1.0, density=1.0, viscosity=0.01))
+    law = simulation.law._replace(period_x=0.0, period_z=0.0, viscosity=0.0)
+    fields, random = simulation.fields, np.random.default_rng(1)
+    for axis in (fields.x, fields.z):
+        axis += random.uniform(-0.2, 0.2, axis.shape) * law.spacing
+    for quiet in (fields.u, fields.w):
+        quiet[:] = 0.0
+    fields.density[:] = 1.0 + 0.01 * fields.x - 0.02 * fields.z
+    fields.slope_x[:], fields.slope_z[:] = 0.01, -0.02
+    rows = Rows(law)
+    rows.update(np.array(fields[:3]))
+    offsets, indices = rows.lists
+    inner = np.flatnonzero((np.abs(fields.x - 0.5) < 0.3) & (np.abs(fields.z - 0.5) < 0.3))
+    for i in inner[::7]:
+        found = rates_of(i, simulation.fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        assert found[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
+        assert abs(found[0]) < 1e-12 * law.sound / law.length
+    assert solved((1e-3, 0.0, 1e-3, 0.0, 0.0, 0.0), (1.0, 0.0, 1.0), 2) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_moments_are_solved_in_the_directions_of_the_flow(dimension):
+    random = np.random.default_rng(dimension)
+    axes = {1: [0], 2: [0, 2], 3: [0, 1, 2]}[dimension]
+    matrix = np.zeros((3, 3))
+    half = random.normal(size=(dimension, dimension))
+    matrix[np.ix_(axes, axes)] = half @ half.T + np.eye(dimension)
+    gradient = np.zeros(3)
+    gradient[axes] = random.normal(size=dimension)
+    sums = matrix @ gradient
+    moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[1, 2], matrix[0, 2])
+    assert solved(moments, tuple(sums), dimension) == pytest.approx(tuple(gradient), abs=1e-12)
+
+
+def test_walls_carry_liquid_at_rest():
+    simulation = dam(small_dam(width=3.2))
+    fields, liquid = simulation.fields, slice(simulation.fluids)
+    depth = 0.6 - fields.z[liquid]
+    inner = (depth > 3 * simulation.law.spacing) & (np.abs(fields.x[liquid] - 1.6) < 1.0)
+    assert np.abs(simulation.rates[3][inner]).max() < 0.05 * 9.81  # the layer at the floor; 1 % farther up
+    below = fields.z[simulation.fluids :] < 0.0
+    assert fields.pressure[simulation.fluids :][below].max() > 0.9 * 1000.0 * 9.81 * 0.6
+
+
+def test_walls_do_not_slip_where_viscosity_acts():
+    simulation = channel(Poiseuille(width=1e-3, speed=0.01))
+    fields = simulation.fields
+    fields.u[: simulation.fluids] = 0.01 * fields.z[: simulation.fluids] / 1e-3
+    again = Simulation(fields, simulation.fluids, simulation.law)
+    lower = fields.z < 0.0
+    assert (again.fields.u[lower] <= 0.0).all()
+    assert again.fields.u[lower].min() < -1e-4
+    assert not fields.wall_u.any()
+
+
+def test_threads_change_nothing():
+    found = []
+    for threads in (1, numba.config.NUMBA_NUM_THREADS):
+        numba.set_num_threads(threads)
+        simulation = disturbed(dam(small_dam()))
+        for _ in range(5):
+            simulation.step(simulation.time_step())
+        found.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*found)
+
+
+def test_a_flow_continues_to_the_same_bits(tmp_path, monkeypatch):
+    scene = small_dam()
+    whole = solve_dam_break(scene)
+    steps = []
+
+    class Killed(Exception):
+        pass
+
+    def kill(done):
+        steps.append(done)
+        if len(steps) == 30:
+            raise Killed
+
+    checkpoint = Checkpoint(tmp_path / "flow", (scene,), interval=0.0)
+    with pytest.raises(Killed):
+        solve_dam_break(scene, kill, checkpoint)
+    again = Checkpoint(tmp_path / "flow", (scene,), interval=0.0)
+    continued = solve_dam_break(scene, None, again)
+    assert again.continued
+    assert all(np.array_equal(whole.history[name], continued.history[name]) for name in whole.history)
+    for one, other in zip(whole.pictures, continued.pictures, strict=True):
+        assert all(np.array_equal(value, fields_of(other)[name]) for name, value in fields_of(one).items())
+
+
+def test_a_flow_is_read_as_it_was_written(tmp_path):
+    result = solve_poiseuille(
+        Poiseuille(width=1e-3, speed=0.01, duration=0.01, numerics=SphNumerics(particles_across=8))
+    )
+    write_flow(tmp_path, result)
+    read = read_flow(tmp_path)
+    assert [one.time for one in read.pictures] == [one.time for one in result.pictures]
+    assert read.history.keys() == result.history.keys()
+    assert np.array_equal(read.walls, result.walls)
+    assert "seconds" not in read.metrics
+    points = np.concatenate([one.points for one in read.pictures])
+    assert points[:, 0].min() >= 0.0 and points[:, 0].max() <= 1.25e-3
+
+
+def test_viscosity_acts_where_its_layer_is_thick_and_the_artificial_one_elsewhere():
+    water = decide_flow(small_dam())
+    assert (water["flow_viscosity"]["on"], water["artificial_viscosity"]["on"]) == (False, True)
+    syrup = small_dam(viscosity=10.0)
+    assert decide_flow(syrup)["flow_viscosity"]["on"]
+    assert artificial_viscosity(syrup) == 0.0
+    assert decide_flow(small_dam(effects={"viscosity": "on"}))["flow_viscosity"]["on"]
+
+
+def test_the_second_rise_of_what_was_measured_is_found():
+    measured = measured_pressure(2.0, 5.366, 0.2)
+    assert measured is not None and len(measured[0]) == len(MEASURED)
+    assert measured_pressure(1.0, 5.366, 0.2) is None
+    time = np.linspace(0.0, 7.3, 2000)
+    pressure = np.interp(time, *measured)
+    assert second_rise(time, pressure) == pytest.approx(5.7, abs=0.1)
+    assert np.isnan(second_rise(time[:1500], pressure[:1500]))

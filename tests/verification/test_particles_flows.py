@@ -1,0 +1,126 @@
+"""Flows by delta-SPH against exact solutions and measurements: channel, vortices, a tank at rest, a dam break."""
+
+from math import log2, sqrt
+
+import numpy as np
+import pytest
+
+from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
+from reflowshock.particles.scenes.dam_break import dam, solve_dam_break
+from reflowshock.particles.scenes.viscous_flows import solve_poiseuille, solve_taylor_green
+from reflowshock.particles.sph.simulation import Simulation
+
+
+def value(result, name):
+    return result.metrics[name][0]
+
+
+def test_a_channel_starts_as_the_exact_one():
+    errors = []
+    for across in (10, 20):
+        scene = Poiseuille(width=1e-3, speed=0.01, duration=0.2, numerics=SphNumerics(particles_across=across))
+        errors.append(value(solve_poiseuille(scene), "profile_error"))
+    assert errors[1] < 0.01
+    assert log2(errors[0] / errors[1]) > 1.0
+
+
+def test_vortices_die_out_at_the_exact_rate():
+    errors = []
+    for across in (16, 32):
+        scene = TaylorGreen(side=1e-3, speed=0.1, numerics=SphNumerics(particles_across=across))
+        result = solve_taylor_green(scene)
+        errors.append(value(result, "speed_error"))
+    assert abs(value(result, "decay_rate_error")) < 0.05
+    assert log2(errors[0] / errors[1]) > 1.0
+
+
+def tank(diffusion, viscosity, across=16):
+    """What is wrong with the pressures of a tank at rest, over rho g H; the kinetic energy, over that of its weight."""
+    numerics = SphNumerics(particles_across=across, density_diffusion=diffusion, artificial_viscosity=viscosity)
+    scene = DamBreak(height=1.0, width=1.0, tank_length=1.0, sensor_height=0.2, duration=1.0, numerics=numerics)
+    simulation = dam(scene)
+    errors, energies = [], []
+    while simulation.time < 5.0 * scene.unit_of_time:
+        simulation.step(simulation.time_step())
+        liquid, fields = slice(simulation.fluids), simulation.fields
+        exact = 1.0 - fields.z[liquid]
+        errors.append(fields.pressure[liquid] / (scene.density * scene.gravity * scene.height) - exact)
+        energies.append(fields.mass[liquid] @ (fields.u[liquid] ** 2 + fields.w[liquid] ** 2))
+    late = np.array(errors[-len(errors) // 4 :])
+    return late, np.array(energies) / (scene.gravity * scene.height * simulation.fields.mass[liquid].sum())
+
+
+def test_a_tank_rests_under_its_weight():
+    errors, motion = tank(0.1, 0.02)
+    assert np.abs(errors.mean(axis=0)).mean() < 0.02
+    assert motion.max() < 1e-3
+
+
+def test_diffusion_of_density_takes_the_noise_of_pressure():
+    smooth, rough = (tank(diffusion, 0.0)[0].std() for diffusion in (0.1, 0.0))
+    assert smooth < rough / 5.0
+
+
+def dam_break(across, duration):
+    numerics = SphNumerics(particles_across=across)
+    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
+    return solve_dam_break(DamBreak(**given, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
+
+
+def test_a_dam_break_strikes_the_wall_as_measured():
+    """Coarse: the front is thinner than the smoothing length, and seen late."""
+    result = dam_break(20, 5.1)
+    assert value(result, "impact_onset") == pytest.approx(2.5, abs=0.15)
+    assert value(result, "plateau_mean") == pytest.approx(0.5, abs=0.1)
+    assert value(result, "particles_lost") == 0
+    assert value(result, "energy_rise") < 0.01
+
+
+@pytest.mark.long
+def test_a_finer_dam_break_strikes_when_and_as_hard_as_measured():
+    result = dam_break(60, 5.1)
+    assert value(result, "impact_onset") == pytest.approx(2.5, abs=0.1)
+    assert value(result, "plateau_mean") == pytest.approx(0.5, abs=0.1)
+    assert value(result, "particles_lost") == 0
+
+
+@pytest.mark.parametrize("term", ["viscosity", "artificial"])
+def test_a_term_that_is_off_is_not_computed(term):
+    """What stands in for it is no number: were it computed, no rate would be one."""
+    numerics = SphNumerics(particles_across=10)
+    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 1.0}
+    simulation = dam(DamBreak(**given, numerics=numerics))
+    laws = [simulation.law._replace(**{term: value}) for value in (0.0, float("nan"))]
+    rates = [Simulation(simulation.fields, simulation.fluids, law).rates for law in laws]
+    assert np.isfinite(rates[0]).all()
+    assert np.array_equal(rates[0], rates[1])  # "> 0" does not hold of nan: no branch is taken
+    acting = Simulation(simulation.fields, simulation.fluids, laws[0]._replace(**{term: 1e3}))
+    acting.fields.u[: simulation.fluids] = np.sin(40.0 * simulation.fields.z[: simulation.fluids])
+    with_term, without = (
+        Simulation(acting.fields, simulation.fluids, laws[0]._replace(**{term: value})).rates for value in (1e3, 0.0)
+    )
+    assert not np.array_equal(with_term, without)
+
+
+def test_viscosity_that_is_left_out_changes_nothing():
+    numerics = SphNumerics(particles_across=10, artificial_viscosity=0.02)
+    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.4}
+    fronts = []
+    for switch in ("off", "on"):
+        scene = DamBreak(**given, numerics=numerics, effects={"viscosity": switch})
+        fronts.append(solve_dam_break(scene).history["front"][-1])
+    told = decide_flow(scene.model_copy(update={"effects": scene.effects.model_copy(update={"viscosity": "auto"})}))
+    assert not told["flow_viscosity"]["on"]
+    assert fronts[1] == pytest.approx(fronts[0], rel=told["flow_viscosity"]["influence"])
+
+
+def test_little_artificial_viscosity_does_little():
+    rates = []
+    for alpha in (0.0, 1e-3):
+        numerics = SphNumerics(particles_across=16, artificial_viscosity=alpha)
+        scene = TaylorGreen(side=1e-3, speed=0.1, duration=0.5, numerics=numerics)
+        rates.append(value(solve_taylor_green(scene), "decay_rate"))
+    influence = decide_flow(scene)["artificial_viscosity"]["influence"]
+    assert 0.0 < influence < 1e-3
+    assert rates[1] == pytest.approx(rates[0], rel=0.01)

@@ -1,0 +1,147 @@
+"""Report of a flow: particles in time, histories against exact or measured ones, metrics with their limits."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.reference.dam_break import measured_pressure
+from reflowshock.particles.reference.viscous_flows import starting_channel
+from reflowshock.workflow.case.text import number, percent, quantity
+from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase
+from reflowshock.workflow.report.charts import Axis, Chart, Series
+from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
+from reflowshock.workflow.report.scene import Field, Group, Scene
+
+NO_FACES = np.zeros((0, 3), dtype=int)
+HEADLINE = (
+    "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
+    "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
+)  # fmt: skip
+UNITS = {"sqrt(H/g)": "√(H/g)", "rho g H": "ρgH"}
+CAPTIONS = {
+    "dam_break": "Pressure at the sensor; front of the liquid; energies.",
+    "poiseuille": "Speeds at the end, and the exact ones; largest speed in time.",
+    "taylor_green": "The largest speed in time, and the exact one; kinetic energy.",
+}
+
+
+def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
+    """Add the section on the flow."""
+    from reflowshock.particles.scenes.flow_products import read_flow
+
+    result = read_flow(run_folder / "particles")
+    metrics = summary["metrics"]
+    context["headline"] = [
+        {"label": name.replace("_", " "), "value": _text(name, metrics[name])} for name in HEADLINE if name in metrics
+    ]
+    context["tables"]["flow"] = _table(metrics, summary["health"])
+    context["flow_caption"] = CAPTIONS[case.kind]
+    if isinstance(case, DamBreakCase):
+        context["curves"]["flow"] = dam_curves(case, result.history)
+    elif isinstance(case, PoiseuilleCase):
+        end = result.pictures[-1]
+        context["curves"]["flow"] = channel_curves(case, end.time, end.points, end.velocity, result.history)
+    else:
+        context["curves"]["flow"] = vortex_curves(result.history)
+    context["scenes"]["flow"] = flow_scene(result)
+
+
+def dam_curves(case: DamBreakCase, history: Mapping[str, Floats]) -> list[Chart]:
+    """Return pressure at the sensor, front and energies in the units of the column."""
+    dam = case.dam_break
+    time, axis = history["time"] / dam.unit_of_time, Axis("time [sqrt(H / g)]")
+    pressure = history["sensor_pressure"] / (dam.density * dam.gravity * dam.height)
+    start = history["potential_energy"][0]
+    energies = [
+        Series("kinetic", time, history["kinetic_energy"] / start, ORANGE),
+        Series("potential", time, history["potential_energy"] / start),
+    ]
+    sensor = [Series("particles", time, pressure)]
+    measured = measured_pressure(*(one / dam.height for one in (dam.width, dam.tank_length, dam.sensor_height)))
+    if measured is not None:
+        sensor.append(Series("measured (Buchner 2002)", measured[0], measured[1], RED, line="none", marks=True))
+    return [
+        Chart(axis, Axis("pressure at the sensor [rho g H]"), sensor),
+        Chart(axis, Axis("front [H]"), [Series("front", time, history["front"] / dam.height)]),
+        Chart(axis, Axis("energy over that at the start"), energies),
+    ]
+
+
+def channel_curves(
+    case: PoiseuilleCase, time: float, points: Floats, velocity: Floats, history: Mapping[str, Floats]
+) -> list[Chart]:
+    """Return speeds across the channel at a time [s] beside the exact ones, and the largest speed in time."""
+    scene = case.poiseuille
+    order = np.argsort(points[:, 2])
+    height = points[order, 2]
+    exact = starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
+    speeds = [
+        Series("particles", height / scene.width, velocity[order, 0] / scene.speed, BLUE, line="none", marks=True),
+        Series("exact", height / scene.width, exact / scene.speed, RED),
+    ]
+    unit = scene.density * scene.width**2 / scene.viscosity
+    return [
+        Chart(Axis("height over width"), Axis("speed over that of the middle"), speeds),
+        Chart(
+            Axis("time [w² / nu]"),
+            Axis("largest speed"),
+            [Series("particles", history["time"] / unit, history["largest_speed"])],
+        ),
+    ]
+
+
+def vortex_curves(history: Mapping[str, Floats]) -> list[Chart]:
+    """Return the largest speed beside the exact one, and the kinetic energy."""
+    time = 1e3 * history["time"]
+    speeds = [
+        Series("particles", time, history["largest_speed"]),
+        Series("exact", time, history["exact_speed"], RED, line="dashed"),
+    ]
+    energy = [Series("kinetic energy", time, history["kinetic_energy"] / history["kinetic_energy"][0])]
+    axis = Axis("time [ms]")
+    return [
+        Chart(axis, Axis("largest speed over that at the start"), speeds),
+        Chart(axis, Axis("kinetic energy over that at the start"), energy),
+    ]
+
+
+def flow_scene(result) -> Scene:
+    """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
+    frames = [f"{1e3 * one.time:.4g} ms" for one in result.pictures]
+    speeds = [np.sqrt((one.velocity**2).sum(axis=1)) for one in result.pictures]
+    highest = max(float(np.quantile(one, 0.99)) for one in speeds)
+    pressures = np.concatenate([one.pressure for one in result.pictures])
+    low, high = (float(value) for value in np.quantile(pressures, (0.02, 0.98)))
+    points = result.pictures[0].points
+    size = 0.9 * float(np.sqrt(np.prod(np.ptp(points, axis=0)[[0, 2]]) / len(points)))
+    part = np.zeros(len(points), dtype=int)
+    groups = [
+        Group(
+            "liquid", one.points, NO_FACES, part, "#5f86ad", only=frame, size=size,
+            values={"speed": speed[None], "pressure": one.pressure[None]},
+        )
+        for frame, (one, speed) in enumerate(zip(result.pictures, speeds, strict=True))
+    ]  # fmt: skip
+    if len(result.walls):
+        groups.append(Group("walls", result.walls, NO_FACES, np.ones(len(result.walls), dtype=int), size=size))
+    fields = [Field("speed", "m/s", 0.0, highest), Field("pressure", "Pa", low, high)]
+    return Scene(groups, ["liquid", "wall"], fields, frames, start=len(frames) - 1, view=(0.0, -1.0, 0.0))
+
+
+def _table(metrics: dict, health: dict) -> dict:
+    """All metrics, those with a limit beside it."""
+    rows = []
+    for name, metric in metrics.items():
+        limit = _text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
+        rows.append([name.replace("_", " "), _text(name, metric), limit])
+    return {"head": ["metric", "value", "limit"], "rows": rows}
+
+
+def _text(name: str, metric: dict) -> str:
+    if metric["unit"] in UNITS:
+        return f"{number(metric['value'])} {UNITS[metric['unit']]}"
+    if metric["unit"] == "" and ("error" in name or name.endswith(("_drift", "_rise"))):
+        return percent(metric["value"])
+    return quantity(metric)
