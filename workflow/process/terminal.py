@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal, Protocol
 
-import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -99,7 +98,7 @@ def interruptible(what: str) -> Iterator[None]:
         yield
     except KeyboardInterrupt as error:
         print_error(f"interrupted; {what}")
-        raise typer.Exit(1) from error
+        raise SystemExit(1) from error
 
 
 def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
