@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import Pace, least_steps
-from reflowshock.fem.division.divide import cut_nodes, grown, seeds_of, touching
+from reflowshock.fem.division.divide import cut_nodes, grown
 from reflowshock.fem.division.division import BUFFERED, Division, Rules
-from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.division.whole import Survey, Whole, seeds_of, touching
 from reflowshock.fem.errors import CouplingError, PulseError
 from reflowshock.fem.estimates.estimate import damped_critical_step
 

@@ -11,7 +11,7 @@ from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
 from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
 from reflowshock.fem.division.path_levels import with_path_levels
-from reflowshock.fem.division.whole import Survey, Whole
+from reflowshock.fem.division.whole import Survey, Whole, nodes_of, seeds_of, touching
 from reflowshock.fem.errors import CouplingError, LevelError
 from reflowshock.fem.estimates.estimate import (
     BOARD_ADVANTAGE,
@@ -68,13 +68,6 @@ def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
     if linear and not light:
         return Choice(choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s leaves no local steps")
     return choice
-
-
-def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the nodes ``(n,)`` of fine cells ``(ne,)``, and those that they are tied to."""
-    nodes = nodes_of(whole.mesh.cells, fine, len(whole.mesh.points))
-    nodes[whole.tie.master[nodes[whole.tie.slave]]] = True
-    return nodes
 
 
 def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -189,18 +182,6 @@ def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
     counts = np.cumprod([1, *division.ratios])
     updates = float(cost @ counts[division.level]) + SUBSTEP_COST * float(counts[1:].sum())
     return (updates + WINDOW_COST) / division.plan.window
-
-
-def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which cells ``(ne,)`` have one of the nodes ``(n,)``."""
-    return nodes[cells].any(axis=1)
-
-
-def nodes_of(cells: NDArray[np.int32], chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` nodes belong to one of the chosen cells ``(ne,)``."""
-    found = np.zeros(count, dtype=bool)
-    found[cells[chosen]] = True
-    return found
 
 
 def grown(

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.choose_levels import ROUNDING, SUBSTEP_COST
 from reflowshock.fem.division.division import Division, Rules
-from reflowshock.fem.division.whole import Survey, Whole
-
-MOST = 3  # levels: kernels.levels.PACES
+from reflowshock.fem.division.whole import Survey, Whole, seeds_of, touching
+from reflowshock.fem.kernels.levels import PACES
 
 
 def with_path_levels(whole: Whole, survey: Survey, division: Division, rules: Rules) -> Division:
@@ -31,7 +30,7 @@ def with_path_levels(whole: Whole, survey: Survey, division: Division, rules: Ru
         level = found.level(ratios)
         return float(survey.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
 
-    ratios = min(candidates(plan.substeps, min(MOST, rules.coupling.most_levels)), key=cost)
+    ratios = min(candidates(plan.substeps, min(PACES, rules.coupling.most_levels)), key=cost)
     return replace(division, level=found.level(ratios), ratios=ratios, plan=replace(plan, substeps=math.prod(ratios)))
 
 
@@ -50,9 +49,9 @@ class FinerCells:
 
     def __init__(self, whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
         """Take a divided mesh."""
-        self._cells, self._tie, self._meso = whole.mesh.cells, whole.tie, division.meso
+        self._whole, self._meso = whole, division.meso
         self._steps, self._window = rules.fraction * survey.step, division.plan.window
-        self._layers, self._nodes = rules.coupling.buffer_layers, len(whole.mesh.points)
+        self._layers = rules.coupling.buffer_layers
         self._known: dict[int, NDArray[np.bool_]] = {}
 
     def than(self, count: int) -> NDArray[np.bool_]:
@@ -71,8 +70,6 @@ class FinerCells:
 
     def _around(self, taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the cells ``(ne,)`` that share a node with some, by a tie or without."""
-        nodes = np.zeros(self._nodes, dtype=bool)
-        nodes[self._cells[taken]] = True
-        nodes[self._tie.master[nodes[self._tie.slave]]] = True
-        nodes[self._tie.slave[nodes[self._tie.master].any(axis=1)]] = True
-        return nodes[self._cells].any(axis=1)
+        tie, nodes = self._whole.tie, seeds_of(self._whole, taken)
+        nodes[tie.slave[nodes[tie.master].any(axis=1)]] = True
+        return touching(self._whole.mesh.cells, nodes)

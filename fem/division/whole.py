@@ -141,3 +141,22 @@ def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment
     if not np.isfinite(target):
         raise StepError(f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} leaves no role to take the step from")
     return np.where(scaled, np.maximum(1.0, (target / step) ** 2), 1.0)
+
+
+def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which cells ``(ne,)`` have one of the nodes ``(n,)``."""
+    return nodes[cells].any(axis=1)
+
+
+def nodes_of(cells: NDArray[np.int32], chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+    """Return which of ``count`` nodes belong to one of the chosen cells ``(ne,)``."""
+    found = np.zeros(count, dtype=bool)
+    found[cells[chosen]] = True
+    return found
+
+
+def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the nodes ``(n,)`` of fine cells ``(ne,)``, and those that they are tied to."""
+    nodes = nodes_of(whole.mesh.cells, fine, len(whole.mesh.points))
+    nodes[whole.tie.master[nodes[whole.tie.slave]]] = True
+    return nodes

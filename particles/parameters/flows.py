@@ -11,6 +11,8 @@ from reflowshock.quantity import Quantity
 
 # Alpha of liquid without viscosity of its own: as in dam breaks of Marrone et al. 2011.
 ARTIFICIAL_VISCOSITY = 0.02
+# Of the time step: in which sound crosses a smoothing length, and in which velocity diffuses over one (Monaghan 1992).
+COURANT, DIFFUSIVE = 0.25, 0.125
 
 
 class SphNumerics(Parameters):
@@ -194,3 +196,16 @@ class TaylorGreen(SphFlow):
     def until(self) -> float:
         """How long it flows [s]."""
         return self.duration * self.side / self.speed
+
+
+def largest_time_step(length: float, speed: float, density: float, viscosity: float) -> float:
+    """Return the largest stable time step [s].
+
+    Args:
+        length: smoothing length [m].
+        speed: of sound, and the largest of the liquid added [m/s].
+        density: [kg/m^3].
+        viscosity: [Pa s]; 0 where none acts.
+    """
+    step = COURANT * length / speed
+    return min(step, DIFFUSIVE * length**2 * density / viscosity) if viscosity > 0.0 else step

@@ -15,6 +15,7 @@ from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
+from reflowshock.particles.sph.threads import threads_for
 
 PICTURES = 24
 SAMPLES = 2000
@@ -110,6 +111,19 @@ def run_flow(
     else:
         run.rows.append(sample(simulation))
         run.picture()
+    with threads_for(len(simulation.fields.x)):
+        _flow_until(run, until, sample, progress, checkpoint)
+    return run
+
+
+def _flow_until(
+    run: FlowRun,
+    until: float,
+    sample: Sample,
+    progress: Callable[[float], None] | None,
+    checkpoint: Checkpoint | None,
+) -> None:
+    simulation = run.simulation
     while simulation.time < until:
         start = perf_counter()
         simulation.step(min(simulation.time_step(), until - simulation.time))
@@ -122,7 +136,6 @@ def run_flow(
             checkpoint.write(run.saved())
         if progress is not None:
             progress(min(1.0, simulation.time / until))
-    return run
 
 
 def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:

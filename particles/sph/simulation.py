@@ -8,6 +8,7 @@ import numpy as np
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.parameters.flows import largest_time_step
 from reflowshock.particles.sph import threads
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
@@ -115,12 +116,9 @@ class Simulation:
         self.rows.builds = saved["builds"]
 
     def time_step(self) -> float:
-        """The largest stable step [s] (Monaghan 1992)."""
+        """The largest stable step [s]."""
         law = self.law
-        step = 0.25 * law.length / (law.sound + self.fastest)
-        if law.viscosity > 0.0:
-            step = min(step, 0.125 * law.length**2 * law.rest_density / law.viscosity)
-        return step
+        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, law.viscosity)
 
     def step(self, time_step: float) -> None:
         """Go on by a time step [s].
@@ -148,7 +146,6 @@ class Simulation:
 
     def _find_rates(self) -> None:
         """Find the rates of the present fields."""
-        threads.use_threads(len(self.fields.x))
         fields, law, liquid = self.fields, self.law, slice(self.fluids)
         self.rows.update(np.array(fields[:3]))
         fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)

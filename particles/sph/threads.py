@@ -3,7 +3,10 @@
 Results are written into arguments: Numba drops a parallel loop that writes into arrays of a tuple alone.
 """
 
-from numba import config, njit, prange, set_num_threads
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from numba import get_num_threads, njit, prange, set_num_threads
 
 from reflowshock.particles.sph.particle_rates import rates_of, wall_values
 
@@ -11,9 +14,15 @@ from reflowshock.particles.sph.particle_rates import rates_of, wall_values
 PARTICLES_PER_THREAD = 4000
 
 
-def use_threads(particles: int) -> None:
-    """Let the loops run on as many threads as pay for so many particles."""
-    set_num_threads(max(1, min(config.NUMBA_NUM_THREADS, particles // PARTICLES_PER_THREAD)))
+@contextmanager
+def threads_for(particles: int) -> Iterator[None]:
+    """Let loops run on as many threads as pay for so many particles, and afterwards on as many as before."""
+    before = get_num_threads()
+    set_num_threads(max(1, min(before, particles // PARTICLES_PER_THREAD)))
+    try:
+        yield
+    finally:
+        set_num_threads(before)
 
 
 @njit(cache=True, parallel=True)

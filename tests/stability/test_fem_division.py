@@ -9,7 +9,8 @@ from reflowshock.cases.hard.trials.layouts import board, copper_interface, corne
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.division.divide import cut_nodes, divide, held, touching
+from reflowshock.fem.division.divide import cut_nodes, divide, held
+from reflowshock.fem.division.whole import touching
 from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append

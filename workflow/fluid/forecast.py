@@ -8,18 +8,17 @@ from typing import Any
 from rich.console import RenderableType
 
 from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen
+from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen, largest_time_step
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.fluid.case import FlowCase
 from reflowshock.workflow.process.terminal import new_table
 
-# On one core of an AMD EPYC, in a plane: of a step, and of each of its particles; `benchmarks/bench_sph.py`.
+# On one core of an AMD EPYC, in a plane: of a step and of each of its particles; processor times of cases/dam_break.
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
-COURANT, DIFFUSIVE = 0.25, 0.125  # as `sph/simulation.py` has them
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +54,8 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:
     """Return the time step that a flow is expected to take [s]."""
-    length = scene.numerics.smoothing_length * scene.spacing
-    step = COURANT * length / (scene.sound + scene.fastest)
-    return min(step, DIFFUSIVE * length**2 * scene.density / scene.viscosity) if is_viscous else step
+    length, viscosity = scene.numerics.smoothing_length * scene.spacing, scene.viscosity if is_viscous else 0.0
+    return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity)
 
 
 def flow_size(case: FlowCase) -> Size:

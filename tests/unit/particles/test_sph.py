@@ -136,9 +136,16 @@ def test_walls_do_not_slip_where_viscosity_acts():
     assert not fields.wall_u.any()
 
 
-def test_threads_change_nothing():
+@pytest.fixture
+def every_thread():
+    """Afterwards loops run on all threads again."""
+    yield numba.config.NUMBA_NUM_THREADS
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+
+
+def test_threads_change_nothing(every_thread):
     found = []
-    for threads in (1, numba.config.NUMBA_NUM_THREADS):
+    for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation = disturbed(dam(small_dam()))
         for _ in range(5):
