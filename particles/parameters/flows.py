@@ -1,5 +1,6 @@
 """Flows of a liquid by delta-SPH, their parameters in SI floats: a dam break, a channel, vortices."""
 
+from abc import abstractmethod
 from math import sqrt
 from typing import Annotated, Literal
 
@@ -46,24 +47,24 @@ class SphFlow(Parameters):
     numerics: SphNumerics = SphNumerics()
 
     @property
+    @abstractmethod
     def length(self) -> float:
         """What the particles across stand along [m]."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def fastest(self) -> float:
         """Largest speed expected [m/s]."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def particles(self) -> int:
         """Particles of the liquid."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def until(self) -> float:
         """How long it flows [s]."""
-        raise NotImplementedError
 
     @property
     def spacing(self) -> float:

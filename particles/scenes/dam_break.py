@@ -34,10 +34,9 @@ def solve_dam_break(
     """
     simulation = dam(scene)
     run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
-    history = dict(zip(COLUMNS, np.array(run.rows).T, strict=True))
-    found = flow.result_of(run, COLUMNS, _metrics(scene, history))
-    found.metrics["particles_lost"] = (float(_lost(scene, simulation)), "")
-    return found
+    history = run.history(COLUMNS)
+    lost = {"particles_lost": (float(_lost(scene, simulation)), "")}
+    return flow.result_of(run, history, _metrics(scene, history) | lost)
 
 
 def dam(scene: DamBreak) -> Simulation:

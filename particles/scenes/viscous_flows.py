@@ -32,15 +32,14 @@ def solve_poiseuille(
         return now.time, *(float(value / scene.speed) for value in spread)
 
     run = flow.run_flow(simulation, scene.until, sample, progress, checkpoint)
-    names = ("time", "profile_error", "largest_error", "largest_speed")
-    rows = np.array(run.rows)
+    history = run.history(("time", "profile_error", "largest_error", "largest_speed"))
     metrics = {
-        "profile_error": (float(rows[:, 1].max()), ""),
-        "profile_error_at_end": (float(rows[-1, 1]), ""),
-        "largest_error_at_end": (float(rows[-1, 2]), ""),
+        "profile_error": (float(history["profile_error"].max()), ""),
+        "profile_error_at_end": (float(history["profile_error"][-1]), ""),
+        "largest_error_at_end": (float(history["largest_error"][-1]), ""),
         "reynolds": (scene.reynolds, ""),
     }
-    return flow.result_of(run, names, metrics)
+    return flow.result_of(run, history, metrics)
 
 
 def channel(scene: Poiseuille) -> Simulation:
@@ -71,8 +70,8 @@ def solve_taylor_green(
         return now.time, float(np.sqrt(squares.max())) / scene.speed, float(np.exp(-rate * now.time)), energy
 
     run = flow.run_flow(simulation, scene.until, sample, progress, checkpoint)
-    names = ("time", "largest_speed", "exact_speed", "kinetic_energy")
-    time, largest, exact_speed, energy = np.array(run.rows).T
+    history = run.history(("time", "largest_speed", "exact_speed", "kinetic_energy"))
+    time, largest, exact_speed, energy = history.values()
     fitted = -0.5 * float(np.polyfit(time, np.log(energy), 1)[0])
     metrics = {
         "decay_rate": (fitted, "1/s"),
@@ -80,7 +79,7 @@ def solve_taylor_green(
         "speed_error": (float(np.abs(largest - exact_speed).max()), ""),
         "reynolds": (scene.reynolds, ""),
     }
-    return flow.result_of(run, names, metrics)
+    return flow.result_of(run, history, metrics)
 
 
 def vortices(scene: TaylorGreen) -> Simulation:

@@ -74,6 +74,10 @@ class FlowRun:
         self.rows = [tuple(row) for row in saved["rows"].tolist()]
         self.pictures, self.seconds = saved["pictures"], saved["seconds"]
 
+    def history(self, names: tuple[str, ...]) -> dict[str, Floats]:
+        """Return the columns of its rows by name."""
+        return dict(zip(names, np.array(self.rows).T, strict=True))
+
     def picture(self) -> None:
         """Keep the present particles, those of a periodic flow within its period."""
         simulation, liquid = self.simulation, slice(self.simulation.fluids)
@@ -196,11 +200,10 @@ def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) 
     return Fields(**places, **still, density=density, mass=mass, **walls_at_rest)
 
 
-def result_of(run: FlowRun, names: tuple[str, ...], metrics: Metrics) -> FlowResult:
+def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> FlowResult:
     """Return what a run found, with the metrics that all flows have."""
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields
-    history = dict(zip(names, np.array(run.rows).T, strict=True))
     volume = fields.mass[:fluids] / fields.density[:fluids]
     shared = {
         "volume_drift": (float(volume.sum() / (fluids * simulation.law.spacing**simulation.law.dimension) - 1.0), ""),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCa
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.scene import Field, Group, Scene
+from reflowshock.workflow.report.tables import figures_of, limited_metrics
+
+if TYPE_CHECKING:
+    from reflowshock.particles.sph.flow import FlowResult
 
 NO_FACES = np.zeros((0, 3), dtype=int)
 HEADLINE = (
@@ -33,10 +38,8 @@ def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> 
 
     result = read_flow(run_folder / "particles")
     metrics = summary["metrics"]
-    context["headline"] = [
-        {"label": name.replace("_", " "), "value": _text(name, metrics[name])} for name in HEADLINE if name in metrics
-    ]
-    context["tables"]["flow"] = _table(metrics, summary["health"])
+    context["headline"] = figures_of(HEADLINE, metrics, _text)
+    context["tables"]["flow"] = limited_metrics(metrics, summary["health"], _text)
     context["flow_caption"] = CAPTIONS[case.kind]
     if isinstance(case, DamBreakCase):
         context["curves"]["flow"] = dam_curves(case, result.history)
@@ -107,7 +110,7 @@ def vortex_curves(history: Mapping[str, Floats]) -> list[Chart]:
     ]
 
 
-def flow_scene(result) -> Scene:
+def flow_scene(result: "FlowResult") -> Scene:
     """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
     frames = [f"{1e3 * one.time:.4g} ms" for one in result.pictures]
     speeds = [np.sqrt((one.velocity**2).sum(axis=1)) for one in result.pictures]
@@ -128,15 +131,6 @@ def flow_scene(result) -> Scene:
         groups.append(Group("walls", result.walls, NO_FACES, np.ones(len(result.walls), dtype=int), size=size))
     fields = [Field("speed", "m/s", 0.0, highest), Field("pressure", "Pa", low, high)]
     return Scene(groups, ["liquid", "wall"], fields, frames, start=len(frames) - 1, view=(0.0, -1.0, 0.0))
-
-
-def _table(metrics: dict, health: dict) -> dict:
-    """All metrics, those with a limit beside it."""
-    rows = []
-    for name, metric in metrics.items():
-        limit = _text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
-        rows.append([name.replace("_", " "), _text(name, metric), limit])
-    return {"head": ["metric", "value", "limit"], "rows": rows}
 
 
 def _text(name: str, metric: dict) -> str:

@@ -1,11 +1,13 @@
 """Tables of the report: products turned into rows of text with units."""
 
+from collections.abc import Callable, Sequence
 from importlib import metadata
 
 import numpy as np
 
 from reflowshock.workflow.case.text import against_limit, nano, number, percent, quantity
 
+Text = Callable[[str, dict], str]
 SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
     (SHAPE_EFFECT, "change of the peak peel stress due to the real joint shapes"),
@@ -62,6 +64,20 @@ MODEL_ROWS = (
 def headline(metrics: dict) -> list[dict]:
     """The figures below the first table: those of ``HEADLINE`` that the run has."""
     return [{"label": label, "value": named_quantity(metrics, name)} for name, label in HEADLINE if name in metrics]
+
+
+def figures_of(names: Sequence[str], metrics: dict, text: Text) -> list[dict]:
+    """The figures at the top of the page: those of some metrics that the run has."""
+    return [{"label": name.replace("_", " "), "value": text(name, metrics[name])} for name in names if name in metrics]
+
+
+def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
+    """All metrics, those with a limit beside it; ``text`` writes one by its name and record."""
+    rows = []
+    for name, metric in metrics.items():
+        limit = text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
+        rows.append([name.replace("_", " "), text(name, metric), limit])
+    return {"head": ["metric", "value", "limit"], "rows": rows}
 
 
 def health_rows(health: dict) -> list[dict]:

@@ -11,6 +11,7 @@ from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.curves import MICRO, MILLI, TIME
 from reflowshock.workflow.report.particles import particle_scene
+from reflowshock.workflow.report.tables import figures_of, limited_metrics
 
 DEGREE = np.pi / 180.0
 HEADLINE = (
@@ -27,8 +28,8 @@ def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> Non
     from reflowshock.particles.scenes.products import read_body
 
     shape, meridian = read_body(run_folder / "reflow")
-    context["headline"] = headline(summary["metrics"])
-    context["tables"]["body"] = metric_table(summary["metrics"], summary["health"])
+    context["headline"] = figures_of(HEADLINE, summary["metrics"], _text)
+    context["tables"]["body"] = limited_metrics(summary["metrics"], summary["health"], _text)
     if kind == "oscillation":
         context["curves"]["swing"] = swing_curve(shape.history, summary["metrics"])
     else:
@@ -40,25 +41,6 @@ def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> Non
     if path.exists():
         context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
     context["scenes"]["body"] = particle_scene(shape)
-
-
-def headline(metrics: dict) -> list[dict]:
-    """The figures at the top of the page."""
-    return [
-        {"label": name.replace("_", " "), "value": _text(name, metrics[name])} for name in HEADLINE if name in metrics
-    ]
-
-
-def metric_table(metrics: dict, health: dict) -> dict:
-    """All metrics, those with a limit beside it."""
-    rows = [
-        [name.replace("_", " "), _text(name, metric), _limit(name, metric, health)] for name, metric in metrics.items()
-    ]
-    return {"head": ["metric", "value", "limit"], "rows": rows}
-
-
-def _limit(name: str, metric: dict, health: dict) -> str:
-    return _text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
 
 
 def middle(points: np.ndarray) -> np.ndarray:
