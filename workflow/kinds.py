@@ -12,7 +12,7 @@ from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
-from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
+from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -26,7 +26,7 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.fluid import case as fluid_case
 from reflowshock.workflow.fluid import stages as fluid_stages
-from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase, TaylorGreenCase
+from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, TaylorGreenCase
 from reflowshock.workflow.fluid.forecast import flow_size, flow_tables, forecast_flow
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
@@ -239,6 +239,10 @@ KINDS = (
     _flow_kind(DamBreakCase, fluid_case.of_dam_break, fluid_stages.flow_dam_break),
     _flow_kind(PoiseuilleCase, fluid_case.of_viscous, fluid_stages.flow_poiseuille),
     _flow_kind(TaylorGreenCase, fluid_case.of_viscous, fluid_stages.flow_taylor_green),
+    replace(
+        _flow_kind(DropletCase, fluid_case.of_droplet, fluid_stages.flow_droplet),
+        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS),
+    ),
     PACKAGE,
 )
 NAMES = tuple(dict.fromkeys(kind.name for kind in KINDS))

@@ -32,6 +32,28 @@ def surface_area(points, triangles):
 
 
 @njit(cache=True)
+def area_gradient(points, triangles):
+    """Gradient of `surface_area` with respect to each point, `(n, 3)` [m]; triangles without area have none.
+
+    It is K x with the stiffness of `cotangent_laplacian`, of which nothing is kept.
+    """
+    result = np.zeros_like(points)
+    for t in range(triangles.shape[0]):
+        x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        size = np.sqrt(x * x + y * y + z * z)
+        if size == 0.0:
+            continue
+        x, y, z = 0.5 * x / size, 0.5 * y / size, 0.5 * z / size
+        for k in range(3):
+            i, j, m = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            ex, ey, ez = points[m, 0] - points[j, 0], points[m, 1] - points[j, 1], points[m, 2] - points[j, 2]
+            result[i, 0] += y * ez - z * ey
+            result[i, 1] += z * ex - x * ez
+            result[i, 2] += x * ey - y * ex
+    return result
+
+
+@njit(cache=True)
 def _volume_and_gradient(points, triangles, gradient):
     """Sum of the tetrahedra (origin, triangle); adds its gradient."""
     total = 0.0

@@ -4,10 +4,14 @@ from abc import abstractmethod
 from math import sqrt
 
 from reflowshock.effect import Decision, Effect, decided, decision
+from reflowshock.particles.parameters.droplets import Droplet
+from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, SphFlow
 
 # Thickness of a boundary layer, over the length of the flow: with less, viscosity is left out where walls are smooth.
 THIN_LAYER = 0.01
+# 1 / sqrt(We): with less, surface tension changes the spread of an impact by less than that.
+LITTLE_TENSION = 0.01
 
 
 class FlowEffect(Effect[SphFlow]):
@@ -34,8 +38,8 @@ class FlowViscosity(FlowEffect):
 
     def decide(self, scene: SphFlow) -> Decision:
         """By the boundary layer, or as the user says."""
-        layer = 1.0 / sqrt(scene.reynolds)
-        why = f"Reynolds number {scene.reynolds:.3g}: layers of {100.0 * layer:.2g} % of the length"
+        layer = 1.0 / sqrt(scene.reynolds_number)
+        why = f"Reynolds number {scene.reynolds_number:.3g}: layers of {100.0 * layer:.2g} % of the length"
         switch = scene.effects.viscosity
         if switch != "auto":
             return decision(switch == "on", f"set to {switch} by the user ({why})", min(layer, 1.0))
@@ -64,7 +68,55 @@ class ArtificialViscosity(FlowEffect):
         return decision(not viscous, "viscosity acts" if viscous else f"no viscosity acts: {alpha:g}", influence)
 
 
+class DropletTension(Effect[Droplet]):
+    """Surface tension of a droplet, and the wetting of its wall."""
+
+    name = "droplet_tension"
+    stage = "particles"
+    adds = "-d(gamma (A_free - cos(theta) A_wet))/dx, shared among the particles beside the surface"
+    number = "1 / sqrt(We), We = rho U^2 D / gamma: square root of surface energy over kinetic energy"
+    threshold = LITTLE_TENSION
+    influence = "the number, for the spread of an impact; without an impact nothing else acts"
+    place = "reflowshock.particles.sph.liquid_surface.LiquidSurface"
+    switch = "droplet.effects.surface_tension = auto, on, off"
+    source = "Pasandideh-Fard et al. 1996: D_max / D = sqrt((We + 12) / (3 (1 - cos theta) + 4 We / sqrt(Re)))"
+
+    def decide(self, scene: Droplet) -> Decision:
+        """By the Weber number, or as the user says."""
+        number = min(1.0 / sqrt(scene.weber_number), 1.0) if scene.weber_number else 1.0
+        why = f"Weber number {scene.weber_number:.3g}" if scene.impact_speed else "nothing else moves the drop"
+        switch = scene.effects.surface_tension
+        if switch != "auto":
+            return decision(switch == "on", f"set to {switch} by the user ({why})", number)
+        return decision(number > LITTLE_TENSION, why, number)
+
+
+class DropletGravity(Effect[Droplet]):
+    """Weight of a droplet on a wall."""
+
+    name = "droplet_gravity"
+    stage = "particles"
+    adds = "g"
+    number = "Bo = rho g D^2 / gamma"
+    threshold = NEGLIGIBLE_SHAPE_CHANGE / SHAPE_CHANGE_BY_BOND
+    influence = "0.2 Bo, of the height"
+    place = "reflowshock.particles.sph.flow.law_of"
+    switch = "droplet.effects.gravity = auto, on, off"
+    source = "Bashforth & Adams 1883, tables"
+
+    def decide(self, scene: Droplet) -> Decision:
+        """By the Bond number, or as the user says; a free drop would only fall."""
+        bond, switch = scene.bond, scene.effects.gravity
+        if not scene.has_wall:
+            return decision(False, "no wall: the drop would fall as a whole", 0.0)
+        influence, why = min(SHAPE_CHANGE_BY_BOND * bond, 1.0), f"Bond number {bond:.3g}"
+        if switch != "auto":
+            return decision(switch == "on", f"set to {switch} by the user ({why})", influence)
+        return decision(influence > NEGLIGIBLE_SHAPE_CHANGE, why, influence)
+
+
 FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity())
+DROPLET_EFFECTS = (DropletTension(), DropletGravity())
 
 
 def artificial_viscosity(scene: SphFlow) -> float:
@@ -77,4 +129,5 @@ def artificial_viscosity(scene: SphFlow) -> float:
 
 def decide_flow(scene: SphFlow) -> dict[str, Decision]:
     """Decide on all effects of a flow."""
-    return decided(FLOW_EFFECTS, scene)
+    found = decided(FLOW_EFFECTS, scene)
+    return found | decided(DROPLET_EFFECTS, scene) if isinstance(scene, Droplet) else found

@@ -1,7 +1,7 @@
 """Flows of a liquid by delta-SPH, their parameters in SI floats: a dam break, a channel, vortices."""
 
 from abc import abstractmethod
-from math import sqrt
+from math import pi, sqrt
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -12,24 +12,33 @@ from reflowshock.quantity import Quantity
 
 # Alpha of liquid without viscosity of its own: as in dam breaks of Marrone et al. 2011.
 ARTIFICIAL_VISCOSITY = 0.02
-# Of the time step: in which sound crosses a smoothing length, and in which velocity diffuses over one (Monaghan 1992).
-COURANT, DIFFUSIVE = 0.25, 0.125
+# Of the time step: in which sound crosses a smoothing length, velocity diffuses over one (Monaghan 1992), and the
+# shortest waves of surface tension pass (Brackbill et al. 1992).
+COURANT, DIFFUSIVE, CAPILLARY = 0.25, 0.125, 0.25
 
 
-class SphNumerics(Parameters):
-    """How a flow is computed.
+class MethodNumerics(Parameters):
+    """How a flow is computed, whatever its particles stand along.
 
-    Particles across stand along the length of the scene: the height of the dam, the width of the channel, the side of
-    the box of vortices. The smoothing length is over their spacing, the speed of sound over the largest speed expected;
+    The smoothing length is over the spacing of the particles, the speed of sound over the largest speed expected;
     density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
     """
 
-    particles_across: int = Field(40, ge=8, le=1000)
     kernel: Literal["cubic_spline", "wendland"] = "cubic_spline"
     smoothing_length: float = Field(1.3, ge=1.0, le=2.5)
     sound_speed: float = Field(10.0, ge=5, le=100)
     density_diffusion: float = Field(0.1, ge=0, le=0.2)
     artificial_viscosity: float | None = Field(None, ge=0, le=0.5)
+
+
+class SphNumerics(MethodNumerics):
+    """How a flow is computed that its particles stand across.
+
+    They stand along the length of the scene: the height of the dam, the width of the channel, the side of the box of
+    vortices.
+    """
+
+    particles_across: int = Field(40, ge=8, le=1000)
 
 
 class SphEffects(Parameters):
@@ -44,7 +53,7 @@ class SphFlow(Parameters):
     density: Annotated[float, Quantity("kg/m^3")] = Field(1000.0, gt=0)
     viscosity: Annotated[float, Quantity("Pa*s")] = Field(1.0e-3, gt=0)
     effects: SphEffects = SphEffects()
-    numerics: SphNumerics = SphNumerics()
+    numerics: MethodNumerics = MethodNumerics()
 
     @property
     @abstractmethod
@@ -67,9 +76,9 @@ class SphFlow(Parameters):
         """How long it flows [s]."""
 
     @property
+    @abstractmethod
     def spacing(self) -> float:
         """Of the particles at the start [m]."""
-        return self.length / self.numerics.particles_across
 
     @property
     def sound(self) -> float:
@@ -77,12 +86,28 @@ class SphFlow(Parameters):
         return self.numerics.sound_speed * self.fastest
 
     @property
-    def reynolds(self) -> float:
+    def reynolds_number(self) -> float:
         """Reynolds number of length and largest speed."""
-        return self.density * self.fastest * self.length / self.viscosity
+        return self.density * self.fastest * self.length / self.liquid_viscosity
+
+    @property
+    def liquid_viscosity(self) -> float:
+        """Of the liquid, however the case says it [Pa s]."""
+        return self.viscosity
 
 
-class DamBreak(SphFlow):
+class PlaneFlow(SphFlow):
+    """A flow in a plane, that particles stand across."""
+
+    numerics: SphNumerics = SphNumerics()
+
+    @property
+    def spacing(self) -> float:
+        """Of the particles at the start [m]."""
+        return self.length / self.numerics.particles_across
+
+
+class DamBreak(PlaneFlow):
     """A column of liquid in the corner of a tank is let go; a sensor in the opposite wall measures pressure.
 
     Walls are smooth: liquid slides along them. Pressures are told over rho g H, times in sqrt(H / g), H being the
@@ -127,7 +152,7 @@ class DamBreak(SphFlow):
         return self.duration
 
 
-class Poiseuille(SphFlow):
+class Poiseuille(PlaneFlow):
     """Liquid at rest between two plates is set in motion by a force along them; along them it is periodic.
 
     The speed is that of the middle at the end of all time; the duration is in w^2 / nu, in which the flow develops.
@@ -168,7 +193,7 @@ class Poiseuille(SphFlow):
         return self.duration * self.density * self.width**2 / self.viscosity
 
 
-class TaylorGreen(SphFlow):
+class TaylorGreen(PlaneFlow):
     """Four vortices in a periodic box, which viscosity slows down.
 
     The duration is in side / speed, the speed the largest one at the start.
@@ -199,7 +224,7 @@ class TaylorGreen(SphFlow):
         return self.duration * self.side / self.speed
 
 
-def largest_time_step(length: float, speed: float, density: float, viscosity: float) -> float:
+def largest_time_step(length: float, speed: float, density: float, viscosity: float, tension: float = 0.0) -> float:
     """Return the largest stable time step [s].
 
     Args:
@@ -207,6 +232,11 @@ def largest_time_step(length: float, speed: float, density: float, viscosity: fl
         speed: of sound, and the largest of the liquid added [m/s].
         density: [kg/m^3].
         viscosity: [Pa s]; 0 where none acts.
+        tension: surface tension [N/m]; 0 where none acts.
     """
-    step = COURANT * length / speed
-    return min(step, DIFFUSIVE * length**2 * density / viscosity) if viscosity > 0.0 else step
+    steps = [COURANT * length / speed]
+    if viscosity > 0.0:
+        steps.append(DIFFUSIVE * length**2 * density / viscosity)
+    if tension > 0.0:
+        steps.append(CAPILLARY * sqrt(density * length**3 / (2.0 * pi * tension)))
+    return min(steps)

@@ -37,7 +37,7 @@ def solve_poiseuille(
         "profile_error": (float(history["profile_error"].max()), ""),
         "profile_error_at_end": (float(history["profile_error"][-1]), ""),
         "largest_error_at_end": (float(history["largest_error"][-1]), ""),
-        "reynolds": (scene.reynolds, ""),
+        "reynolds": (scene.reynolds_number, ""),
     }
     return flow.result_of(run, history, metrics)
 
@@ -77,7 +77,7 @@ def solve_taylor_green(
         "decay_rate": (fitted, "1/s"),
         "decay_rate_error": (fitted / rate - 1.0, ""),
         "speed_error": (float(np.abs(largest - exact_speed).max()), ""),
-        "reynolds": (scene.reynolds, ""),
+        "reynolds": (scene.reynolds_number, ""),
     }
     return flow.result_of(run, history, metrics)
 

@@ -162,9 +162,10 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         sound=scene.sound,
         diffusion=numerics.density_diffusion * length * scene.sound,
         artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
-        viscosity=scene.viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
+        viscosity=scene.liquid_viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
         has_surface=int(has_surface),
         no_slip=int(not has_surface),
+        mirror=0,
         spacing=spacing,
         shifting=0.0 if has_surface else 1.0,
         period_x=periods[0],
@@ -174,6 +175,15 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         gravity_y=gravity[1],
         gravity_z=gravity[2],
     )
+
+
+def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
+    """Return the law of a flow in space, of particles a spacing apart [m], above a mirror in z = 0 or not."""
+    length = law.length / law.spacing * spacing
+    return law._replace(
+        dimension=3, spacing=spacing, length=length, norm=norm(law.kernel, 3, length), mirror=int(mirror),
+        no_slip=int(no_slip),
+    )  # fmt: skip
 
 
 def wall_layers(scene: SphFlow) -> int:

@@ -25,6 +25,8 @@ class Law(NamedTuple):
         has_surface: 1 where the liquid has a free one. Then viscosity acts along the line of two particles, elsewhere
             along their velocities; and walls do not pull.
         no_slip: whether walls hold the liquid by its viscosity; 1 or 0.
+        mirror: 1 where the plane z = 0 is a wall below the liquid: its particles meet their images behind it, which
+            costs no particles and ends, with the liquid, at the contact line.
         spacing: of the particles at the start [m].
         shifting: share of the shift of particles by Sun et al. (2017); 0 is none.
         period_x, period_y, period_z: of a periodic flow [m]; 0 where it is not.
@@ -42,6 +44,7 @@ class Law(NamedTuple):
     viscosity: float
     has_surface: int
     no_slip: int
+    mirror: int
     spacing: float
     shifting: float
     period_x: float

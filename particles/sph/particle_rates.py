@@ -5,6 +5,7 @@ The order of the neighbours is the order of the sum, so that the number of threa
 
 from math import floor, sqrt
 
+import numpy as np
 from numba import njit
 
 from reflowshock.particles.sph import pair_terms
@@ -20,6 +21,15 @@ PAIRING, POWER = 0.2, 4
 def across(distance, period):
     """Return a component of a vector between particles [m] to the nearest image; a period of 0 is none."""
     return distance - period * floor(distance / period + 0.5) if period > 0.0 else distance
+
+
+@njit(cache=True)
+def seen(n, i, neighbours, mirror):
+    """Return the n-th that a particle sees, and -1 for an image, else 1: two of each at a mirror, and its own."""
+    row = n >> mirror
+    if row == len(neighbours):
+        return np.int64(i), -1.0
+    return np.int64(neighbours[row]), 1.0 - 2.0 * (n & mirror)
 
 
 @njit(cache=True)
@@ -47,10 +57,12 @@ def rates_of(i, fluids, neighbours, fields, law):
     level = shape(law.kernel, line, law.spacing * inverse)
     rate = ax = ay = az = cx = cy = cz = 0.0
     bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
-    for j in neighbours:
+    mirror = law.mirror if z < 2.0 * law.length else 0
+    for n in range((1 + mirror) * len(neighbours) + mirror):
+        j, side = seen(n, i, neighbours, mirror)
         dx = across(x - fields.x[j], law.period_x)
         dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - fields.z[j], law.period_z)
+        dz = across(z - side * fields.z[j], law.period_z)
         distance2 = dx * dx + dy * dy + dz * dz
         q = sqrt(distance2) * inverse
         if q >= 2.0:
@@ -59,14 +71,16 @@ def rates_of(i, fluids, neighbours, fields, law):
         beside = fields.density[j]
         volume = fields.mass[j] / beside
         liquid = j < fluids
-        approach = (u - fields.u[j]) * dx + (v - fields.v[j]) * dy + (w - fields.w[j]) * dz
-        closing = approach
+        hold = side if law.no_slip else 1.0  # an image moves on along the wall, or back
+        approach = (u - hold * fields.u[j]) * dx + (v - hold * fields.v[j]) * dy + (w - side * fields.w[j]) * dz
+        closing = approach + (hold - 1.0) * (fields.u[j] * dx + fields.v[j] * dy)
         if not liquid:
             k = j - fluids
             closing = (u - fields.wall_u[k]) * dx + (v - fields.wall_v[k]) * dy + (w - fields.wall_w[k]) * dz
         rate += pair_terms.continuity(closing, steep, volume, density)
         own = max(pressure, 0.0) if law.has_surface and not liquid else pressure  # walls do not pull
-        push = pair_terms.pressure(own, fields.pressure[j], steep, volume, density)
+        other = fields.pressure[j] + (side - 1.0) * law.gravity_z * fields.z[j] * beside  # an image has more weight
+        push = pair_terms.pressure(own, other, steep, volume, density)
         if law.artificial > 0.0 and liquid:
             push += law.artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
         if law.viscosity > 0.0 and (liquid or law.no_slip):
@@ -81,7 +95,7 @@ def rates_of(i, fluids, neighbours, fields, law):
                 az += drag * (w - fields.w[j])
         if law.diffusion > 0.0 and liquid:
             jump = beside - density
-            ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + fields.slope_z[j]
+            ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + side * fields.slope_z[j]
             rise = -0.5 * (ex * dx + ey * dy + ez * dz)
             rate += law.diffusion * pair_terms.density_diffusion(jump, rise, steep, volume)
             weight = steep * volume

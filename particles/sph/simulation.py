@@ -11,6 +11,7 @@ from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.parameters.flows import largest_time_step
 from reflowshock.particles.sph import threads
 from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.smoothing import SUPPORT
 
 # Of the smoothing length: how far beyond their support particles are listed.
@@ -75,6 +76,7 @@ class Simulation:
         fields: its quantities; positions, velocities and densities are those at `time`.
         fluids: number of particles that are liquid.
         law: what acts between two particles.
+        surface: with tension; None where none acts.
         rows: neighbours.
         rates: `(10, n)` of the last positions, as `rates_of` returns them.
         time: [s].
@@ -84,6 +86,7 @@ class Simulation:
     fields: Fields
     fluids: int
     law: Law
+    surface: LiquidSurface | None = None
     rows: Rows = field(init=False)
     rates: Floats = field(init=False)
     time: float = 0.0
@@ -105,6 +108,7 @@ class Simulation:
         return {
             "fields": self.fields._asdict(), "rates": self.rates, "built_at": self.rows.built_at,
             "builds": self.rows.builds, "time": self.time, "steps": self.steps,
+            "surface": self.surface.saved() if self.surface else None,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -114,11 +118,13 @@ class Simulation:
         self.rows = Rows(self.law)
         self.rows.update(saved["built_at"])
         self.rows.builds = saved["builds"]
+        if self.surface:
+            self.surface.restore(saved["surface"])
 
     def time_step(self) -> float:
         """The largest stable step [s]."""
-        law = self.law
-        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, law.viscosity)
+        law, tension = self.law, self.surface.tension if self.surface else 0.0
+        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, law.viscosity, tension)
 
     def step(self, time_step: float) -> None:
         """Go on by a time step [s].
@@ -134,6 +140,11 @@ class Simulation:
             middle.append(speed + half * rates[1 + axis])
             place += time_step * middle[axis]
             speed += time_step * rates[1 + axis]
+        if self.surface:
+            volume = float((fields.mass[liquid] / fields.density[liquid]).sum())
+            self.surface.move(np.array(middle), time_step, volume)
+        if self.law.mirror:
+            self._reflect(middle)
         density = fields.density[liquid] + half * rates[0]
         fields.density[liquid] += time_step * rates[0]
         self._find_rates()
@@ -144,6 +155,12 @@ class Simulation:
         self.time += time_step
         self.steps += 1
 
+    def _reflect(self, middle: list[Floats]) -> None:
+        """Let a particle that has passed through the mirror change places with its image, whose motion is its own."""
+        through = np.flatnonzero(self.fields.z[: self.fluids] < 0.0)
+        for across in (self.fields.z, self.fields.w, self.fields.slope_z, middle[2]):
+            across[through] *= -1.0
+
     def _find_rates(self) -> None:
         """Find the rates of the present fields."""
         fields, law, liquid = self.fields, self.law, slice(self.fluids)
@@ -152,6 +169,8 @@ class Simulation:
         self._extend_to_walls()
         threads.find_rates(self.fluids, self.rows.lists, fields, law, self.rates)
         self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
+        if self.surface:
+            self.surface.add_to(self.rates, fields, self.fluids)
         for axis in range(3):
             fields[9 + axis][liquid] = self.rates[4 + axis]
 

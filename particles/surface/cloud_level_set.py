@@ -30,7 +30,7 @@ def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate])
         walls: horizontal plates that the liquid stands on, hangs from, or both, the lower one first.
     """
     points, triangles = extract_surface(level)
-    points, triangles = _between(points, triangles, walls, 1e-6 * level.grid.spacing)
+    points, triangles = between(points, triangles, walls, 1e-6 * level.grid.spacing)
     contacts = [(ring, plate) for plate in walls for ring in _loops(points, triangles, plate)]
     rings, plates = tuple(ring for ring, _ in contacts), tuple(plate for _, plate in contacts)
     points, triangles = relax(level, points, triangles, rings)
@@ -45,7 +45,7 @@ def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate])
     return Cloud(everything, len(points), triangles, rings, plates, wall, level.grid.spacing)
 
 
-def _between(points: Floats, triangles: Indices, walls: Sequence[Plate], tolerance: float) -> tuple[Floats, Indices]:
+def between(points: Floats, triangles: Indices, walls: Sequence[Plate], tolerance: float) -> tuple[Floats, Indices]:
     """Keep the part of a symmetric surface on the liquid's side of each wall, its edges exactly in the wall."""
     inside = np.ones(len(points), bool)
     for plate in walls:

@@ -179,6 +179,24 @@ def test_a_drop_that_finds_no_rest_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("name", "metrics"),
+    [
+        ("young_laplace", {"mean_pressure", "roundness"}),
+        ("static_caps", {"base_over_diameter", "height_over_diameter"}),
+        ("drop_impact", {"spread_max", "time_of_spread_max"}),
+    ],
+)
+def test_a_droplet_goes_from_case_file_to_report(tmp_path, name, metrics):
+    short = ("droplet.duration=2 us", "droplet.numerics.particles_per_diameter=8", "scale=full")
+    ended = run(name, tmp_path / "run", *short)
+    assert "report: " in ended.stdout, ended.stderr
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert metrics | {"volume_drift", "particles", "particle_steps_per_second"} <= summary["metrics"].keys()
+    assert {"droplet_tension", "droplet_gravity"} <= summary["effects"].keys()
+    assert "<h2>Flow</h2>" in (tmp_path / "run/report.html").read_text()
+
+
+@pytest.mark.parametrize(
     ("name", "settings", "metrics"),
     [
         ("dam_break", ("dam_break.duration=0.05 s",), {"particles_lost", "energy_rise"}),

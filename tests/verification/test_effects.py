@@ -57,10 +57,14 @@ ELSEWHERE_OFF = {
     "identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path",
     "flow_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
     "artificial_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
+    "droplet_tension": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
+    "droplet_gravity": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
 }
 ELSEWHERE_ON = {
     "flow_viscosity": "tests/verification/test_particles_flows.py::test_viscosity_that_is_left_out_changes_nothing",
     "artificial_viscosity": "tests/verification/test_particles_flows.py::test_little_artificial_viscosity_does_little",
+    "droplet_tension": "tests/verification/test_particles_droplets.py::test_little_tension_does_little",
+    "droplet_gravity": "tests/verification/test_particles_droplets.py::test_little_weight_does_little",
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
     "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
     "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",

@@ -1,1 +1,1 @@
-"""Flows of a liquid by delta-SPH (`particles/sph`): a dam break, a channel, vortices. Start with `case.py`."""
+"""Flows of a liquid by delta-SPH (`particles/sph`): dam break, channel, vortices, droplets. Start with `case.py`."""

@@ -1,13 +1,16 @@
-"""Cases of a liquid that flows: a dam break, a channel, vortices; what does not fit together in them."""
+"""Cases of a liquid that flows: a dam break, a channel, vortices, droplets; what does not fit together in them."""
 
+from math import ceil
 from typing import Any
 
+from reflowshock.particles.parameters.droplets import LEAST_SOUND_SPEED, Droplet
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphFlow, TaylorGreen
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 
+FEWEST_ACROSS = 8.0  # particles across a droplet: fewer resolve no surface
 LARGEST_REYNOLDS = 1000.0  # of vortices and channels: beyond they are turbulent, and no exact solution holds
 
 
@@ -53,6 +56,47 @@ class TaylorGreenCase(FlowCase):
     taylor_green: TaylorGreen
 
 
+class DropletCase(FlowCase):
+    """A droplet: free, at rest on a wall, or striking it."""
+
+    kind = "droplet"
+    stages = _flow_of("droplet")
+
+    droplet: Droplet
+
+
+def of_droplet(case: DropletCase) -> list[Problem]:
+    """Find what is said twice or half, sound that is too slow for the impact, and particles that are too large."""
+    drop, found = case.droplet, []
+    numerics, given = drop.numerics, drop.model_fields_set
+    if drop.weber is not None and drop.speed is not None:
+        weber = drop.density * drop.speed**2 * drop.diameter / drop.surface_tension
+        allowed = f"speed or weber; this speed makes the Weber number {weber:.4g}"
+        found.append(Problem("droplet.weber", "the speed is given, too", drop.weber, allowed))
+    if drop.reynolds is not None and "viscosity" in given:
+        allowed = "viscosity or reynolds"
+        found.append(Problem("droplet.reynolds", "the viscosity is given, too", drop.reynolds, allowed))
+    if drop.reynolds is not None and not drop.impact_speed:
+        allowed = "together with droplet.speed or droplet.weber"
+        found.append(Problem("droplet.reynolds", "says nothing without an impact", drop.reynolds, allowed))
+    if numerics.spacing is not None and numerics.particles_per_diameter is not None:
+        allowed = "numerics.spacing or numerics.particles_per_diameter"
+        message = "the particles per diameter are given, too"
+        found.append(Problem("droplet.numerics.spacing", message, micrometres(numerics.spacing), allowed))
+    if drop.spacing > drop.diameter / FEWEST_ACROSS:
+        allowed = f"<= {micrometres(drop.diameter / FEWEST_ACROSS)}, {FEWEST_ACROSS:g} particles across the drop"
+        message = "is too large for this drop"
+        found.append(Problem("droplet.numerics.spacing", message, micrometres(drop.spacing), allowed))
+    if numerics.sound_speed < LEAST_SOUND_SPEED:
+        change, least = 100.0 / numerics.sound_speed**2, ceil(LEAST_SOUND_SPEED)
+        message = f"sound is too slow for {drop.fastest:.3g} m/s: densities would change by {change:.2g} %"
+        allowed = f">= {least}, {from_si(least * drop.fastest, 'm/s', digits=3)}"
+        found.append(Problem("droplet.numerics.sound_speed", message, numerics.sound_speed, allowed))
+    if drop.has_wall and drop.start != "sphere":
+        found.append(Problem("droplet.start", "only a free drop starts as a cube", drop.start, "sphere"))
+    return found
+
+
 def of_dam_break(case: DamBreakCase) -> list[Problem]:
     """Find a column that does not fit in its tank, and a sensor that is not at its wall."""
     dam, found = case.dam_break, []
@@ -74,9 +118,9 @@ def of_viscous(case: FlowCase) -> list[Problem]:
     """Find a Reynolds number at which the exact solution is none that is seen, and viscosity that is left out."""
     scene: SphFlow = case.scene
     found = []
-    if scene.reynolds > LARGEST_REYNOLDS:
-        least = scene.viscosity * scene.reynolds / LARGEST_REYNOLDS
-        message = f"makes the Reynolds number {scene.reynolds:.3g}, at which the exact flow is not stable"
+    if scene.reynolds_number > LARGEST_REYNOLDS:
+        least = scene.viscosity * scene.reynolds_number / LARGEST_REYNOLDS
+        message = f"makes the Reynolds number {scene.reynolds_number:.3g}, at which the exact flow is not stable"
         found.append(
             Problem(
                 f"{case.kind}.viscosity",
@@ -94,3 +138,8 @@ def of_viscous(case: FlowCase) -> list[Problem]:
 def metres(length: float) -> str:
     """Write a length [m]."""
     return from_si(length, "m", digits=3)
+
+
+def micrometres(length: float) -> str:
+    """Write a small length [m]."""
+    return from_si(length, "um", digits=3)

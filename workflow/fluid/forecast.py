@@ -6,7 +6,9 @@ from math import ceil
 from typing import Any
 
 from rich.console import RenderableType
+from rich.table import Table
 
+from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen, largest_time_step
 from reflowshock.units import from_si
@@ -17,6 +19,8 @@ from reflowshock.workflow.process.terminal import new_table
 
 # On one core of an AMD EPYC, in a plane: of a step and of each of its particles; processor times of cases/dam_break.
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
+# In space, with a surface: of a step of each particle, and of each of its triangles, cases/drop_impact.
+SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.5e-3, 3.4e-6
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
 
@@ -48,14 +52,19 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     effects = decide_flow(scene)
     step = time_step(scene, effects["flow_viscosity"]["on"])
     steps = ceil(scene.until / step)
-    seconds = SECONDS_TO_START + steps * (SECONDS_PER_STEP + SECONDS_PER_PARTICLE * scene.particles)
+    in_space = isinstance(scene, Droplet)
+    each = SECONDS_PER_PARTICLE_IN_SPACE if in_space else SECONDS_PER_PARTICLE
+    seconds = SECONDS_TO_START + steps * (
+        (SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * scene.particles
+    )
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})
 
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:
     """Return the time step that a flow is expected to take [s]."""
-    length, viscosity = scene.numerics.smoothing_length * scene.spacing, scene.viscosity if is_viscous else 0.0
-    return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity)
+    length, viscosity = scene.numerics.smoothing_length * scene.spacing, scene.liquid_viscosity if is_viscous else 0.0
+    tension = scene.surface_tension if isinstance(scene, Droplet) else 0.0
+    return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity, tension)
 
 
 def flow_size(case: FlowCase) -> Size:
@@ -68,14 +77,32 @@ def flow_tables(case: FlowCase, outlook: FlowForecast) -> Iterator[RenderableTyp
     """Yield particles, speeds and time steps."""
     scene: SphFlow = case.scene
     table = new_table("\nFlow", "what", "value", "remark")
-    table.add_row("particles", f"{outlook.particles}", f"{1e3 * outlook.spacing:.3g} mm spacing at the start")
-    numbers = f"of {from_si(scene.length, 'mm', digits=3)} and {from_si(scene.fastest, 'm/s', digits=3)}"
-    table.add_row("Reynolds number", f"{scene.reynolds:.3g}", numbers)
+    unit = "um" if isinstance(scene, Droplet) else "mm"
+    spacing = f"{from_si(outlook.spacing, unit, digits=3)} spacing at the start"
+    table.add_row("particles", f"{outlook.particles}", spacing)
+    numbers = f"of {from_si(scene.length, unit, digits=3)} and {from_si(scene.fastest, 'm/s', digits=3)}"
+    table.add_row("Reynolds number", f"{scene.reynolds_number:.3g}", numbers)
     ratio = f"{scene.numerics.sound_speed:g} times the largest speed expected"
     table.add_row("speed of sound", from_si(scene.sound, "m/s", digits=3), ratio)
     table.add_row("time step", short(outlook.time_step), f"{outlook.steps} steps for {short(scene.until)}")
+    if isinstance(scene, Droplet):
+        _add_droplet(table, scene)
     if isinstance(scene, DamBreak):
         table.add_row("unit of time", short(scene.unit_of_time), "sqrt(H / g)")
     if isinstance(scene, TaylorGreen):
         table.add_row("exact solution", "Taylor & Green", "the largest speed dies out by exp(-8 pi² nu t / L²)")
     yield table
+
+
+def _add_droplet(table: Table, scene: Droplet) -> None:
+    """Add a droplet's numbers, and what is known of its end."""
+    table.add_row("Ohnesorge number", f"{scene.ohnesorge:.3g}", "viscosity over surface tension")
+    if scene.impact_speed:
+        table.add_row("Weber number", f"{scene.weber_number:.3g}", from_si(scene.impact_speed, "m/s", digits=3))
+    unit = "D / U" if scene.impact_speed else "sqrt(rho D^3 / gamma)"
+    table.add_row("unit of time", short(scene.unit_of_time), unit)
+    if scene.has_wall:
+        base, height = cap(scene.angle)
+        table.add_row("cap at rest", f"{base:.3f} x {height:.3f} D", "width on the wall and height, without weight")
+    else:
+        table.add_row("pressure at rest", from_si(scene.laplace_pressure, "Pa", digits=4), "4 gamma / D")

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.reference.dam_break import measured_pressure
 from reflowshock.particles.reference.viscous_flows import starting_channel
-from reflowshock.workflow.case.text import number, percent, quantity
-from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase
+from reflowshock.workflow.case.text import number, percent, quantity, short
+from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.scene import Field, Group, Scene
@@ -19,8 +20,11 @@ from reflowshock.workflow.report.tables import figures_of, limited_metrics
 if TYPE_CHECKING:
     from reflowshock.particles.sph.flow import FlowResult
 
+IN_PLANE, IN_SPACE = (0.0, -1.0, 0.0), (0.3, -1.0, 0.25)  # where the viewer looks from
 NO_FACES = np.zeros((0, 3), dtype=int)
 HEADLINE = (
+    "spread_max", "time_of_spread_max", "mean_pressure", "pressure_error", "roundness", "base_over_diameter",
+    "height_over_diameter", "capillary_number",
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
     "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip
@@ -28,6 +32,7 @@ UNITS = {"sqrt(H/g)": "√(H/g)", "rho g H": "ρgH"}
 CAPTIONS = {
     "dam_break": "Pressure at the sensor; front of the liquid; energies.",
     "poiseuille": "Speeds at the end, and the exact ones; largest speed in time.",
+    "droplet": "Shape of the drop; pressure in it; its largest speed and its energies, in time.",
     "taylor_green": "The largest speed in time, and the exact one; kinetic energy.",
 }
 
@@ -46,9 +51,11 @@ def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> 
     elif isinstance(case, PoiseuilleCase):
         end = result.pictures[-1]
         context["curves"]["flow"] = channel_curves(case, end.time, end.points, end.velocity, result.history)
+    elif isinstance(case, DropletCase):
+        context["curves"]["flow"] = droplet_curves(case, result.history)
     else:
         context["curves"]["flow"] = vortex_curves(result.history)
-    context["scenes"]["flow"] = flow_scene(result)
+    context["scenes"]["flow"] = flow_scene(result, case)
 
 
 def dam_curves(case: DamBreakCase, history: Mapping[str, Floats]) -> list[Chart]:
@@ -110,15 +117,45 @@ def vortex_curves(history: Mapping[str, Floats]) -> list[Chart]:
     ]
 
 
-def flow_scene(result: "FlowResult") -> Scene:
+def droplet_curves(case: DropletCase, history: Mapping[str, Floats]) -> list[Chart]:
+    """Return width, base and height beside those of the cap at rest, pressure, and speeds and energies."""
+    drop = case.droplet
+    unit = "D / U" if drop.impact_speed else "sqrt(rho D³ / gamma)"
+    time, axis = history["time"] / drop.unit_of_time, Axis(f"time [{unit}]")
+    shape = [Series("width", time, history["spread"]), Series("height", time, history["height"], ORANGE)]
+    if drop.has_wall:
+        base, height = cap(drop.angle)
+        ends = time[[0, -1]]
+        shape += [
+            Series("cap at rest, width on the wall", ends, np.array([base, base]), BLUE, line="dashed"),
+            Series("cap at rest, height", ends, np.array([height, height]), ORANGE, line="dashed"),
+        ]
+    surface = np.pi * drop.diameter**2 * drop.surface_tension
+    energies = [
+        Series("kinetic", time, history["kinetic_energy"] / surface, ORANGE),
+        Series("surface and wall", time, history["surface_energy"] / surface),
+    ]
+    return [
+        Chart(axis, Axis("over the diameter"), shape),
+        Chart(
+            axis,
+            Axis("mean pressure over 4 gamma / D"),
+            [Series("particles", time, history["mean_pressure"] / drop.laplace_pressure)],
+        ),
+        Chart(axis, Axis("energy over that of the sphere's surface"), energies),
+    ]
+
+
+def flow_scene(result: "FlowResult", case: FlowCase) -> Scene:
     """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
-    frames = [f"{1e3 * one.time:.4g} ms" for one in result.pictures]
+    in_space = isinstance(case, DropletCase)
+    frames = [short(one.time) if in_space else f"{1e3 * one.time:.4g} ms" for one in result.pictures]
     speeds = [np.sqrt((one.velocity**2).sum(axis=1)) for one in result.pictures]
     highest = max(float(np.quantile(one, 0.99)) for one in speeds)
     pressures = np.concatenate([one.pressure for one in result.pictures])
     low, high = (float(value) for value in np.quantile(pressures, (0.02, 0.98)))
     points = result.pictures[0].points
-    size = 0.9 * float(np.sqrt(np.prod(np.ptp(points, axis=0)[[0, 2]]) / len(points)))
+    size = 0.9 * case.scene.spacing
     part = np.zeros(len(points), dtype=int)
     groups = [
         Group(
@@ -130,7 +167,9 @@ def flow_scene(result: "FlowResult") -> Scene:
     if len(result.walls):
         groups.append(Group("walls", result.walls, NO_FACES, np.ones(len(result.walls), dtype=int), size=size))
     fields = [Field("speed", "m/s", 0.0, highest), Field("pressure", "Pa", low, high)]
-    return Scene(groups, ["liquid", "wall"], fields, frames, start=len(frames) - 1, view=(0.0, -1.0, 0.0))
+    return Scene(
+        groups, ["liquid", "wall"], fields, frames, start=len(frames) - 1, view=IN_SPACE if in_space else IN_PLANE
+    )
 
 
 def _text(name: str, metric: dict) -> str:

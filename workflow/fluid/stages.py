@@ -7,7 +7,7 @@ from typing import Any
 
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.workflow.case.run import Findings, Run, at_most, metric
-from reflowshock.workflow.fluid.case import DamBreakCase, FlowCase, PoiseuilleCase, TaylorGreenCase
+from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, TaylorGreenCase
 from reflowshock.workflow.process.terminal import progress_bar
 
 VOLUME_DRIFT = 0.02  # of the liquid, which is weakly compressible: densities stay within about 1 %
@@ -18,6 +18,19 @@ DECAY_ERROR = 0.05  # of the rate at which vortices die out
 DAM_LIMITS = {"volume_drift": VOLUME_DRIFT, "particles_lost": LOST, "energy_rise": ENERGY_RISE}
 CHANNEL_LIMITS = {"volume_drift": VOLUME_DRIFT, "profile_error_at_end": PROFILE_ERROR}
 VORTEX_LIMITS = {"volume_drift": VOLUME_DRIFT, "decay_rate_error": DECAY_ERROR}
+# Of a droplet: what its surface encloses, over the volume at the start; and where the exact shape at rest is known, its
+# pressure, roundness, width and height.
+DROPLET_LIMITS = {"volume_drift": VOLUME_DRIFT, "surface_volume_drift": 0.02}
+REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "height_error": 0.02}
+
+
+def flow_droplet(run: Run[DropletCase], folder: Path) -> Findings:
+    """Let a droplet move."""
+    from reflowshock.particles.scenes.droplet import rest_metrics, solve_droplet
+
+    known = rest_metrics(run.case.droplet)
+    limits = DROPLET_LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
+    return _flow(run, folder, solve_droplet, limits)
 
 
 def flow_dam_break(run: Run[DamBreakCase], folder: Path) -> Findings:

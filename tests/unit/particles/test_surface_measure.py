@@ -5,6 +5,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import (
+    area_gradient,
     cotangent_laplacian,
     enclosed_volume,
     ring_area,
@@ -106,3 +107,12 @@ def test_the_force_of_gravity_is_the_gradient_of_its_energy(cloud):
     expected = slope(energy, points, direction)
     body.points = points
     assert -float((gravity.force(body) * direction).sum()) == pytest.approx(expected, rel=1e-7)
+
+
+def test_the_gradient_of_the_area_is_that_of_the_stiffness():
+    random = np.random.default_rng(4)
+    points, triangles = random.normal(size=(8, 3)), np.array([[0, 1, 2], [2, 1, 3], [3, 4, 5], [5, 6, 7]], np.int32)
+    expected = cotangent_laplacian(points, triangles, 8) @ points
+    assert area_gradient(points, triangles) == pytest.approx(expected, abs=1e-12)
+    points[7] = points[6]
+    assert np.isfinite(area_gradient(points, triangles)).all()

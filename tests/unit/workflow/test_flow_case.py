@@ -11,6 +11,7 @@ from reflowshock.workflow.pipeline.reader import read_case
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 DAM, CHANNEL, VORTICES = (CASES / name / "case.toml" for name in ("dam_break", "poiseuille", "taylor_green"))
+FREE, CAP, IMPACT = (CASES / name / "case.toml" for name in ("young_laplace", "static_caps", "drop_impact"))
 BAD_VALUES = {
     "no room": (DAM, "dam_break.width=3.3 m", ["dam_break.tank_length", '"3.22 m"', "> dam_break.width = 3.3 m"]),
     "thin column": (DAM, "dam_break.width=1 mm", ["dam_break.width", "less than one particle", ">= 0.01 m"]),
@@ -30,6 +31,20 @@ BAD_VALUES = {
         ["poiseuille.viscosity", "Reynolds number 1e+04", ">= 0.01 Pa*s"],
     ),
     "without viscosity": (VORTICES, "taylor_green.effects.viscosity=off", ["effects.viscosity", "auto, on"]),
+    "a speed twice": (IMPACT, "droplet.weber=8", ["droplet.weber = 8", "the speed is given, too", "7.986"]),
+    "a viscosity twice": (IMPACT, "droplet.reynolds=8", ["droplet.reynolds = 8", "the viscosity is given, too"]),
+    "half a number": (CAP, "droplet.reynolds=8", ["says nothing without an impact", "droplet.speed or droplet.weber"]),
+    "two spacings": (FREE, "droplet.numerics.spacing=2 um", ["numerics.spacing", "particles_per_diameter"]),
+    "sound slower than the impact needs": (
+        IMPACT,
+        "droplet.numerics.sound_speed=5",
+        ["droplet.numerics.sound_speed = 5", "too slow for 5 m/s", "would change by 4 %", ">= 8, 40 m/s"],
+    ),
+    "a cube on a wall": (CAP, "droplet.start=cube", ["droplet.start", "only a free drop", "sphere"]),
+    "an angle too flat": (CAP, "droplet.contact_angle=10 deg", ["droplet.contact_angle", "30"]),
+    "a length for a tension": (FREE, "droplet.surface_tension=1 m", ["droplet.surface_tension", "N/m"]),
+    "a diametre": (FREE, "droplet.diametre=1 um", ["droplet.diametre", "unknown key", "diameter"]),
+    "a drop of few particles": (FREE, "droplet.numerics.particles_per_diameter=4", ["particles_per_diameter", ">= 8"]),
     "unknown key": (VORTICES, "taylor_green.sides=1 mm", ["taylor_green.sides", "unknown key", "side"]),
 }
 
@@ -41,7 +56,16 @@ def test_what_cannot_be_is_refused_in_words(path, setting, words):
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-@pytest.mark.parametrize("path", [DAM, CHANNEL, VORTICES], ids=["dam", "channel", "vortices"])
+def test_a_spacing_that_a_drop_does_not_resolve_is_refused(tmp_path):
+    text = FREE.read_text().replace("particles_per_diameter = 16", 'spacing = "20 um"').partition("[scales")[0]
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(CaseError, match=r"too large for this drop.*11.7 um"):
+        read_case(tmp_path / "case.toml", [], True)
+
+
+@pytest.mark.parametrize(
+    "path", [DAM, CHANNEL, VORTICES, FREE, CAP, IMPACT], ids=["dam", "channel", "vortices", "free", "cap", "impact"]
+)
 def test_plans_tell_particles_steps_and_cost(path):
     case = read_case(path, [], True)
     outlook = forecast_flow(case)

@@ -1,0 +1,140 @@
+"""Droplets by delta-SPH in space, their parameters in SI floats: free, at rest on a wall, or striking it."""
+
+from math import cos, pi, sin, sqrt
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from reflowshock.effect import Switch
+from reflowshock.particles.parameters.flows import MethodNumerics, SphEffects, SphFlow
+from reflowshock.quantity import Quantity
+
+RIGHT_ANGLE = 0.5 * pi
+PARTICLES_PER_DIAMETER = 16.0
+# Over the largest speed expected: less, and densities change by more than about 2 % as the drop strikes.
+LEAST_SOUND_SPEED = 8.0
+
+
+class DropletNumerics(MethodNumerics):
+    """How a droplet is computed: with particles a spacing apart at the start, or so many across the diameter."""
+
+    spacing: Annotated[float | None, Quantity("um")] = Field(None, gt=0)
+    particles_per_diameter: float | None = Field(None, ge=8, le=200)
+
+
+class DropletEffects(SphEffects):
+    """What acts besides pressure: decided from Reynolds, Weber and Bond number (auto), or by the user."""
+
+    surface_tension: Switch = "auto"
+    gravity: Switch = "auto"
+
+
+class Droplet(SphFlow):
+    """A droplet.
+
+    With a speed, or with Weber and Reynolds number, it strikes a wall, as a sphere that just touches it; then the
+    contact angle is 90 degrees where none is given. With a contact angle alone it starts as a half sphere on the wall
+    and comes to rest. With neither it is free, and starts as a sphere or a cube. Speed and viscosity may follow from
+    the Weber number rho U^2 D / gamma and the Reynolds number rho U D / mu.
+    """
+
+    diameter: Annotated[float, Quantity("um")] = Field(gt=0)
+    surface_tension: Annotated[float, Quantity("N/m")] = Field(gt=0)
+    speed: Annotated[float | None, Quantity("m/s")] = Field(None, gt=0)
+    weber: float | None = Field(None, gt=0)
+    reynolds: float | None = Field(None, gt=0)
+    contact_angle: Annotated[float | None, Quantity("deg")] = Field(None, ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
+    start: Literal["sphere", "cube"] = "sphere"
+    duration: Annotated[float, Quantity("us")] = Field(gt=0)
+    effects: DropletEffects = DropletEffects()
+    numerics: DropletNumerics = DropletNumerics()
+
+    @property
+    def impact_speed(self) -> float:
+        """With which it strikes [m/s]; 0 where it does not."""
+        if self.weber is not None:
+            return sqrt(self.weber * self.surface_tension / (self.density * self.diameter))
+        return self.speed or 0.0
+
+    @property
+    def liquid_viscosity(self) -> float:
+        """As given, or of the Reynolds number [Pa s]."""
+        if self.reynolds is None:
+            return self.viscosity
+        return self.density * self.impact_speed * self.diameter / self.reynolds
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether it meets one."""
+        return self.contact_angle is not None or self.impact_speed > 0.0
+
+    @property
+    def angle(self) -> float:
+        """The contact angle [rad]."""
+        return RIGHT_ANGLE if self.contact_angle is None else self.contact_angle
+
+    @property
+    def length(self) -> float:
+        """The diameter [m]."""
+        return self.diameter
+
+    @property
+    def volume(self) -> float:
+        """Of the droplet [m^3]."""
+        return pi * self.diameter**3 / 6.0
+
+    @property
+    def fastest(self) -> float:
+        """Of the impact, or that of waves of surface tension, sqrt(2 gamma / (rho R)) [m/s]."""
+        return max(self.impact_speed, sqrt(4.0 * self.surface_tension / (self.density * self.diameter)))
+
+    @property
+    def spacing(self) -> float:
+        """Of the particles at the start [m]."""
+        if self.numerics.spacing is not None:
+            return self.numerics.spacing
+        return self.diameter / (self.numerics.particles_per_diameter or PARTICLES_PER_DIAMETER)
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid, nearly."""
+        return max(1, round(self.volume / self.spacing**3))
+
+    @property
+    def until(self) -> float:
+        """How long it is followed [s]."""
+        return self.duration
+
+    @property
+    def unit_of_time(self) -> float:
+        """D / U of an impact, else sqrt(rho D^3 / gamma) [s]."""
+        if self.impact_speed:
+            return self.diameter / self.impact_speed
+        return sqrt(self.density * self.diameter**3 / self.surface_tension)
+
+    @property
+    def laplace_pressure(self) -> float:
+        """Of the sphere, 4 gamma / D [Pa]."""
+        return 4.0 * self.surface_tension / self.diameter
+
+    @property
+    def weber_number(self) -> float:
+        """Weber number of the impact."""
+        return self.density * self.impact_speed**2 * self.diameter / self.surface_tension
+
+    @property
+    def bond(self) -> float:
+        """Bond number rho g D^2 / gamma."""
+        return self.density * self.gravity * self.diameter**2 / self.surface_tension
+
+    @property
+    def ohnesorge(self) -> float:
+        """Ohnesorge number mu / sqrt(rho gamma D)."""
+        return self.liquid_viscosity / sqrt(self.density * self.surface_tension * self.diameter)
+
+
+def cap(angle: float) -> tuple[float, float]:
+    """Return base and height of a spherical cap over the diameter of the sphere of its volume."""
+    radius = 0.5 * (4.0 / ((2.0 + cos(angle)) * (1.0 - cos(angle)) ** 2)) ** (1.0 / 3.0)
+    return 2.0 * radius * sin(angle), radius * (1.0 - cos(angle))

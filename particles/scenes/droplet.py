@@ -1,0 +1,191 @@
+"""A droplet in space by delta-SPH: free, at rest on a wall, or striking it."""
+
+from collections.abc import Callable
+from functools import partial
+from math import cos, pi, sqrt
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.droplets import Droplet, cap
+from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.flow import FlowResult, Metrics
+from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
+from reflowshock.particles.sph.simulation import Simulation
+
+COLUMNS = (
+    "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
+    "surface_energy", "surface_volume",
+)  # fmt: skip
+# Share of the radius within which the pressure of a free drop is averaged: the surface is far.
+CORE = 0.5
+# Directions over which the width of the drop is averaged.
+DIRECTIONS = 36
+# In spacings, and over the height: where the profile of a drop on a wall is read. Next to the wall it is rounded.
+FOOT, SHOULDER = 1.5, 0.7
+FEWEST = 12
+# Newton steps until the surface encloses the volume.
+ENCLOSURES = 3
+
+
+def solve_droplet(
+    scene: Droplet, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None
+) -> FlowResult:
+    """Let a droplet move.
+
+    Raises:
+        FloatingPointError: a position is not finite.
+        SurfaceLost: the drop breaks into parts that are too small for its particles.
+    """
+    simulation = droplet(scene)
+    run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
+    history = run.history(COLUMNS)
+    return flow.result_of(run, history, _metrics(scene, history))
+
+
+def droplet(scene: Droplet) -> Simulation:
+    """Set up the particles under the pressure of surface tension, and the surface about them."""
+    points, triangles, spacing = _start(scene)
+    effects = decide_flow(scene)
+    weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
+    law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
+    law = flow.in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
+    tension = scene.surface_tension if effects["droplet_tension"]["on"] else 0.0
+    pressure = np.full(points.shape[1], scene.laplace_pressure if tension else 0.0)
+    fields = flow.liquid_and_walls(points, np.empty((3, 0)), pressure, law)
+    fields.w[:] = -scene.impact_speed
+    surface = LiquidSurface(*triangles, tension, cos(scene.angle), law)
+    for _ in range(ENCLOSURES):
+        surface.enclose(scene.volume)
+    return Simulation(fields, points.shape[1], law, surface)
+
+
+def _start(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:
+    """Points `(3, n)` of a cubic lattice, surface about them, and the spacing at which they have the volume [m]."""
+    radius, edge = 0.5 * scene.diameter, scene.volume ** (1.0 / 3.0)
+    across = int(np.ceil(2.0 * scene.diameter / scene.spacing)) + 1
+    places = np.arange(-across, across) + 0.5
+    if scene.start == "cube" and not scene.has_wall:
+        count = round(edge / scene.spacing)
+        places = np.arange(count) + 0.5 - 0.5 * count
+    lattice = scene.spacing * np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1)
+    points, triangles = _sphere(radius, EDGE * scene.spacing)
+    inside = np.ones(lattice.shape[1], dtype=bool)
+    if scene.start == "cube" and not scene.has_wall:
+        points *= 0.5 * edge / np.abs(points).max(axis=1)[:, None]
+    elif scene.impact_speed or not scene.has_wall:
+        inside = (lattice**2).sum(axis=0) < radius**2
+    else:
+        inside = ((lattice**2).sum(axis=0) < 2.0 ** (2.0 / 3.0) * radius**2) & (lattice[2] > 0.0)
+        points, triangles = _half(*_sphere(2.0 ** (1.0 / 3.0) * radius, EDGE * scene.spacing), EDGE * scene.spacing)
+    spacing = float(np.cbrt(scene.volume / inside.sum()))
+    liquid = lattice[:, inside] * (spacing / scene.spacing)
+    if scene.impact_speed:
+        lift = radius + 0.5 * EDGE * scene.spacing
+        liquid[2] += lift
+        points[:, 2] += lift
+    return liquid, (points, triangles), spacing
+
+
+def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
+    """Triangles of about an edge [m] on a sphere, of the volume of the sphere: points on a spiral, and their hull."""
+    count = int(4.0 * pi * radius**2 / (0.5 * sqrt(3.0) * edge**2))
+    turn, height = pi * (1.0 + sqrt(5.0)) * (np.arange(count) + 0.5), 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+    across = np.sqrt(1.0 - height**2)
+    points = np.stack((across * np.cos(turn), across * np.sin(turn), height), axis=1)
+    hull = ConvexHull(points)
+    triangles = hull.simplices.astype(np.int32)
+    corner = points[triangles]
+    inward = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return points * radius * float(np.cbrt(4.0 * pi / 3.0 / hull.volume)), triangles
+
+
+def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indices]:
+    """The upper half of a sphere, its edge on the wall."""
+    radius = float(np.linalg.norm(points, axis=1).mean())
+    low = np.abs(points[:, 2]) < 0.4 * edge
+    points[low, 2] = 0.0
+    points[low] *= radius / np.linalg.norm(points[low], axis=1)[:, None]
+    kept = triangles[(points[triangles, 2] >= 0.0).all(axis=1)]
+    used, numbers = np.unique(kept, return_inverse=True)
+    return points[used], numbers.reshape(-1, 3).astype(np.int32)
+
+
+def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
+    """One row of the history; lengths in diameters."""
+    fields, surface = simulation.fields, simulation.surface
+    assert surface is not None
+    points = np.array(fields[:3])
+    centre = points.mean(axis=1)
+    radius = np.linalg.norm(points.T - centre, axis=1)
+    core = radius < CORE * 0.5 * scene.diameter
+    distance = np.linalg.norm(surface.points - centre, axis=1)
+    squares = fields.u**2 + fields.v**2 + fields.w**2
+    pressure = float((fields.pressure[core] if core.any() else fields.pressure).mean())
+    return (
+        simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
+        base_width(surface.points, simulation.law.spacing) / scene.diameter,
+        float(surface.points[:, 2].max()) / scene.diameter, float(np.sqrt(squares.max())),
+        0.5 * float(fields.mass @ squares), surface.energy, surface.volume / scene.volume,
+    )  # fmt: skip
+
+
+def width(points: Floats) -> float:
+    """Horizontal width of a surface `(m, 3)` [m], the mean over directions."""
+    angles = pi * np.arange(DIRECTIONS) / DIRECTIONS
+    along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
+    return float(np.ptp(along, axis=0).mean())
+
+
+def base_width(points: Floats, spacing: float) -> float:
+    """Width on the wall of a drop [m]: the square of its radius, a parabola in height for a cap, continued to the wall.
+
+    nan where there is too little of a profile.
+    """
+    height = points[:, 2]
+    read = (height > FOOT * spacing) & (height < SHOULDER * height.max())
+    if read.sum() < FEWEST:
+        return float("nan")
+    offset = points[:, :2] - points[:, :2].mean(axis=0)
+    at_wall = float(np.polynomial.Polynomial.fit(height[read], (offset[read] ** 2).sum(axis=1), 2)(0.0))
+    return 2.0 * sqrt(max(at_wall, 0.0))
+
+
+def rest_metrics(scene: Droplet) -> tuple[str, ...]:
+    """Return the metrics whose exact values at rest are known: of a free sphere, of a cap without weight."""
+    if not scene.has_wall:
+        return ("pressure_error", "roundness")
+    weighs = decide_flow(scene)["droplet_gravity"]["on"]
+    return () if weighs or scene.impact_speed else ("base_error", "height_error")
+
+
+def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
+    """What the drop became: means over the last tenth of the time, in which it is to be at rest."""
+    late = history["time"] >= 0.9 * history["time"][-1]
+    mean = {name: float(column[late].mean()) for name, column in history.items()}
+    fastest = float(history["largest_speed"][late].max())
+    found: Metrics = {
+        "capillary_number": (fastest * scene.liquid_viscosity / scene.surface_tension, ""),
+        "surface_volume_drift": (float(history["surface_volume"][-1] / history["surface_volume"][0] - 1.0), ""),
+        "ohnesorge": (scene.ohnesorge, ""),
+    }
+    if not scene.has_wall:
+        found["mean_pressure"] = (mean["mean_pressure"], "Pa")
+        found["pressure_error"] = (mean["mean_pressure"] / scene.laplace_pressure - 1.0, "")
+        found["roundness"] = (mean["roundness"], "")
+        return found
+    base, height = cap(scene.angle)
+    found["base_over_diameter"], found["height_over_diameter"] = (mean["base"], ""), (mean["height"], "")
+    if rest_metrics(scene):
+        found["base_error"] = (mean["base"] / base - 1.0, "")
+        found["height_error"] = (mean["height"] / height - 1.0, "")
+    if scene.impact_speed:
+        widest = int(np.argmax(history["spread"]))
+        found["weber"], found["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
+        found["spread_max"] = (float(history["spread"][widest]), "")
+        found["time_of_spread_max"] = (float(history["time"][widest]), "s")
+    return found

@@ -1,0 +1,209 @@
+"""Droplets by delta-SPH in space: mirror, surface and its forces, start, restart, bad input to the surface."""
+
+import numba
+import numpy as np
+import pytest
+
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
+from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.scenes.droplet import base_width, droplet, solve_droplet, width
+from reflowshock.particles.scenes.flow_products import read_flow, write_flow
+from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
+from reflowshock.particles.sph.simulation import Simulation
+
+INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
+COARSE = DropletNumerics(particles_per_diameter=8)
+
+
+def drop(**changes):
+    return Droplet(**INK | {"numerics": COARSE} | changes)
+
+
+def test_a_drop_has_its_volume_and_its_surface_encloses_it():
+    for scene in (drop(), drop(start="cube"), drop(contact_angle=1.0), drop(speed=3.0)):
+        simulation = droplet(scene)
+        volume = (simulation.fields.mass / simulation.fields.density).sum()
+        assert volume == pytest.approx(scene.volume, rel=1e-12)
+        assert simulation.surface.volume == pytest.approx(scene.volume, rel=1e-4)
+        assert simulation.fields.z.min() > 0.0 or not scene.has_wall
+
+
+def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy():
+    surface = droplet(drop(contact_angle=1.0)).surface
+    surface.law = surface.law._replace(spacing=0.0)  # tension is not lessened
+    forces, random = surface.forces(), np.random.default_rng(5)
+    direction = random.normal(size=surface.points.shape)
+    for ring in surface.rings:
+        direction[ring, 2] = 0.0
+    step, start = 1e-6, surface.points.copy()
+    energies = []
+    for sign in (1.0, -1.0):
+        surface.points = start + sign * step * direction
+        energies.append(surface.energy)
+    surface.points = start
+    work = -(energies[0] - energies[1]) / (2.0 * step)
+    assert work == pytest.approx((forces * direction).sum(), rel=1e-6)
+    free = droplet(drop()).surface
+    free.law = free.law._replace(spacing=0.0)
+    assert np.abs(free.forces().sum(axis=0)).max() < 1e-12
+
+
+def test_forces_that_particles_share_keep_momentum_and_work():
+    simulation = droplet(drop())
+    surface, fields = simulation.surface, simulation.fields
+    rates = np.zeros((10, simulation.fluids))
+    surface.add_to(rates, fields, simulation.fluids)
+    total = rates[1:4] @ fields.mass
+    assert np.abs(total).max() < 1e-12 * np.abs(surface.forces()).sum()
+    velocity = np.random.default_rng(2).normal(size=(3, simulation.fluids))
+    before = surface.points.copy()
+    surface.move(velocity, 1e-3, scene_volume := surface.volume)
+    moved = (surface.points - before) / 1e-3
+    simulation.surface.points = before
+    work = (surface.forces() * moved).sum()
+    assert work == pytest.approx((rates[1:4] * velocity * fields.mass).sum(), rel=1e-9)
+    assert scene_volume > 0.0
+
+
+def test_a_mirror_does_what_images_would():
+    """Half of a body of liquid above a mirror has the rates of the whole body."""
+    spacing = 0.1
+    places = np.arange(-5, 5) + 0.5
+    points = spacing * np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1)
+    upper = points[2] > 0.0
+    random = np.random.default_rng(8)
+    shift, speed = random.uniform(-0.02, 0.02, (3, upper.sum())), random.normal(0.0, 1.0, (3, upper.sum()))
+    density = random.uniform(0.99, 1.01, upper.sum())
+    above = points[:, upper] + shift
+    law = flow.law_of(drop(), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), has_surface=True)
+    flip = np.array([[1.0], [1.0], [-1.0]])
+
+    def rates(liquid, velocities, densities, mirror):
+        chosen = flow.in_space(law, spacing, mirror=mirror, no_slip=False)
+        fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), np.zeros(liquid.shape[1]), chosen)
+        fields.u[:], fields.v[:], fields.w[:] = velocities
+        fields.density[:] = densities
+        simulation = Simulation(fields, liquid.shape[1], chosen)
+        return Simulation(simulation.fields, liquid.shape[1], chosen).rates  # slopes of the first are in the second
+
+    half = rates(above, speed, density, True)
+    whole = rates(
+        np.concatenate((above, flip * above), axis=1),
+        np.concatenate((speed, flip * speed), axis=1), np.tile(density, 2), False,
+    )  # fmt: skip
+    assert np.abs(half - whole[:, : upper.sum()]).max() < 1e-10 * np.abs(whole).max()
+
+
+def test_a_tank_in_space_rests_under_its_weight():
+    """A periodic layer on a mirror: pressure as deep as it lies, 2 %."""
+    spacing, deep = 0.1, 12
+    places, heights = np.arange(8) + 0.5, np.arange(deep) + 0.5
+    points = spacing * np.stack(np.meshgrid(places, places, heights, indexing="ij")).reshape(3, -1)
+    scene = drop(viscosity=0.02)
+    law = flow.law_of(scene, (0.8, 0.8, 0.0), (0.0, 0.0, -1.0), has_surface=True)
+    law = flow.in_space(law, spacing, mirror=True, no_slip=False)._replace(sound=15.0)
+    depth = spacing * deep - points[2]
+    simulation = Simulation(flow.liquid_and_walls(points, np.empty((3, 0)), depth, law), points.shape[1], law)
+    errors = []
+    while simulation.time < 1.0:
+        simulation.step(simulation.time_step())
+        errors.append(simulation.fields.pressure - (spacing * deep - simulation.fields.z))
+    late = np.mean(errors[len(errors) // 2 :], axis=0) / (spacing * deep)
+    assert np.abs(late).mean() < 0.02
+    assert simulation.fastest < 0.05
+
+
+def test_widths_of_a_cap_are_found():
+    for degrees in (45.0, 90.0, 130.0):
+        angle = np.radians(degrees)
+        base, height = cap(angle)
+        radius = base / (2.0 * np.sin(angle))
+        z = np.random.default_rng(1).uniform(0.0, height, 4000)
+        across = np.sqrt(radius**2 - (z - height + radius) ** 2)
+        turn = np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 4000)
+        points = np.stack((across * np.cos(turn), across * np.sin(turn), z), axis=1)
+        assert base_width(points, 0.05) == pytest.approx(base, rel=0.01)
+        assert width(points) == pytest.approx(2.0 * radius * (np.sin(angle) if angle < np.pi / 2 else 1.0), rel=0.01)
+    assert np.isnan(base_width(points[:3], 0.05))
+
+
+def test_liquid_that_left_its_surface_is_refused():
+    simulation = droplet(drop())
+    surface = simulation.surface
+    lost = LiquidSurface(surface.points + 5.0, surface.triangles, 1.0, 0.0, surface.law)
+    with pytest.raises(SurfaceLost, match="left its surface"):
+        lost.add_to(simulation.rates, simulation.fields, simulation.fluids)
+
+
+def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
+    simulation = droplet(drop(speed=3.0))
+    surface = simulation.surface
+    assert not surface.rings
+    while simulation.time < 0.15:
+        simulation.step(simulation.time_step())
+    assert len(surface.rings) == 1
+    area, volume = surface.wetted_area, surface.volume
+    assert area > 0.1
+    surface._make_anew()
+    assert surface.rebuilds == 1
+    assert surface.wetted_area == pytest.approx(area, rel=0.2)  # a foot of a spacing is closed, of 8 across
+    assert surface.volume == pytest.approx(volume, rel=0.03)
+    simulation.step(simulation.time_step())
+    assert simulation.fields.z.min() >= 0.0
+
+
+@pytest.fixture
+def every_thread():
+    """Afterwards loops run on all threads again."""
+    yield numba.config.NUMBA_NUM_THREADS
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+
+
+def test_threads_change_no_droplet(every_thread):
+    found = []
+    for threads in (1, every_thread):
+        numba.set_num_threads(threads)
+        simulation = droplet(drop(speed=3.0))
+        for _ in range(15):
+            simulation.step(simulation.time_step())
+        found.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*found)
+
+
+def test_a_droplet_continues_to_the_same_bits(tmp_path):
+    scene, steps = drop(speed=3.0, duration=0.08), []
+
+    class Killed(Exception):
+        pass
+
+    def kill(done):
+        steps.append(done)
+        if len(steps) == 25:
+            raise Killed
+
+    whole = solve_droplet(scene)
+    with pytest.raises(Killed):
+        solve_droplet(scene, kill, Checkpoint(tmp_path / "drop", (scene,), interval=0.0))
+    again = Checkpoint(tmp_path / "drop", (scene,), interval=0.0)
+    continued = solve_droplet(scene, None, again)
+    assert again.continued
+    for name, column in whole.history.items():
+        assert np.array_equal(column, continued.history[name], equal_nan=True), name
+    write_flow(tmp_path, whole)
+    assert read_flow(tmp_path).metrics["spread_max"] == whole.metrics["spread_max"]
+
+
+def test_effects_of_a_droplet_follow_from_its_numbers():
+    small = drop(diameter=1e-4, density=1e3, surface_tension=0.07, viscosity=1e-3, contact_angle=1.0)
+    told = decide_flow(small)
+    assert not told["droplet_gravity"]["on"] and told["droplet_tension"]["on"]
+    large = small.model_copy(update={"diameter": 2e-3})
+    assert decide_flow(large)["droplet_gravity"]["on"]
+    assert not decide_flow(large.model_copy(update={"contact_angle": None}))["droplet_gravity"]["on"]
+    fast = drop(weber=2e4, reynolds=100.0)
+    assert not decide_flow(fast)["droplet_tension"]["on"]
+    assert droplet(fast).surface.tension == 0.0
+    assert fast.impact_speed == pytest.approx(np.sqrt(2e4))
+    assert fast.reynolds_number == pytest.approx(100.0)
