@@ -33,9 +33,9 @@ class PlannedStage:
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
     """Return what a run would do with each stage, in order."""
-    seconds = corrected(point.case, stage_seconds(point.case))
+    costs = predicted_costs(store, point.case, stage_seconds(point.case))
     return {
-        name: PlannedStage(state.stale, reason(state, point.case), seconds.get(name))
+        name: PlannedStage(state.stale, reason(state, point.case), costs[name].seconds)
         for name, state in examine(store, point).items()
     }
 
@@ -96,38 +96,43 @@ def reason(state: StageState, case: Case) -> str:
 
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
-    """Predict the wall time [s] of all that has to be made up to a stage, corrected by what accuracy measured here."""
-    states, seconds = examine(store, point), corrected(point.case, stage_seconds(point.case))
-    return sum(seconds[stage.name] for stage in point.case.pipeline.upstream(until) if states[stage.name].stale)
+    """Predict the wall time [s] of all that has to be made up to a stage."""
+    states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
+    return sum(costs[stage.name].seconds for stage in point.case.pipeline.upstream(until) if states[stage.name].stale)
 
 
-def corrected(case: Case, seconds: Mapping[str, float]) -> dict[str, float]:
-    """Correct predicted wall times [s] of stages by what the command accuracy measured here."""
-    from reflowshock.workflow.convergence.calibration import calibration_of
+@dataclass(frozen=True, slots=True)
+class PredictedCost:
+    """Wall time [s] of a stage, and by what it was corrected, in words; empty where by nothing."""
 
-    known = calibration_of(case)
-    return dict(seconds) if known is None else {stage: known.seconds(stage, own) for stage, own in seconds.items()}
+    seconds: float
+    source: str = ""
+
+    def __str__(self) -> str:
+        return f"about {duration(self.seconds)}{self.source and f' ({self.source})'}"
 
 
-def predicted_costs(case: Case, seconds: Mapping[str, float]) -> dict[str, str]:
-    """Write the predicted wall time of stages, and which of them the command accuracy has measured here."""
-    from reflowshock.workflow.convergence.calibration import calibration_of
+def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> dict[str, PredictedCost]:
+    """Correct predicted wall times [s] of stages by what accuracy measured of the case here, or else by former runs."""
+    from reflowshock.workflow.convergence.calibration import Calibration, calibration_in, calibration_of
 
-    known, texts = calibration_of(case), {}
-    for stage, cost in corrected(case, seconds).items():
-        measured = known is not None and known.knows(stage)
-        source = f" (measured: accuracy, {known.points} points)" if known is not None and measured else ""
-        texts[stage] = f"about {duration(cost)}{source}"
-    return texts
+    study, former = calibration_of(case) or Calibration({}, 0), calibration_in(store, seconds)
+    costs = {}
+    for stage, forecast in seconds.items():
+        known, source = former, "as former runs here"
+        if study.knows(stage):
+            known, source = study, f"measured: accuracy, {study.points} points"
+        costs[stage] = PredictedCost(known.seconds(stage, forecast), source if known.knows(stage) else "")
+    return costs
 
 
 def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
-    costs, total, left = predicted_costs(point.case, seconds), corrected(point.case, seconds), 0.0
+    costs, left = predicted_costs(store, point.case, seconds), 0.0
     for name, state in examine(store, point).items():
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
-        left += total[name] if state.stale else 0.0
-        table.add_row(name, mark, costs[name] if state.stale else "", reason(state, point.case))
+        left += costs[name].seconds if state.stale else 0.0
+        table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
     table.add_row("all", "", f"about {duration(left)}" if left else "nothing to do", _about_time(left), style="bold")
     return table
 

@@ -1,4 +1,7 @@
-"""What stages really took over what was predicted, on this machine: by that, forecasts of any size are corrected."""
+"""What stages really took over what was predicted, on this machine: by that, forecasts of any size are corrected.
+
+Such stages are those of a convergence study of the case, or of former runs in the same folder.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,6 +10,7 @@ from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.convergence.measured import FILE, StageCost, read_accuracy, this_host
+from reflowshock.workflow.store.store import Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +64,14 @@ def calibration_of(case: Case) -> Calibration | None:
     if found is None or found.machine != this_host():
         return None
     return calibration(one.stages for one in found.measurements)
+
+
+def calibration_in(store: Store, stages: Iterable[str]) -> Calibration:
+    """Return what stages of former runs in a store took on this machine, those that were not broken off."""
+    machine = str(this_host())
+    return calibration(
+        {stage: StageCost(record["seconds"], record["core_seconds"], record.get("forecast"))}
+        for stage in stages
+        for record in store.records(stage)
+        if record.get("machine") == machine and not record.get("continued")
+    )

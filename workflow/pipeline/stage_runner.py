@@ -7,6 +7,8 @@ from pathlib import Path
 
 from reflowshock.workflow.case.run import Run, StageError, StageFunction
 from reflowshock.workflow.case.stage import Stage
+from reflowshock.workflow.convergence.measured import this_host
+from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.process.last_word import in_words, is_interrupt
 from reflowshock.workflow.process.terminal import console, health_line
 from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
@@ -24,7 +26,8 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         product: the folder that its product becomes; one that is there is replaced.
 
     Returns:
-        The record: seconds, core_seconds, metrics, health, effects, continued, key, inputs, reads, files.
+        The record: seconds, core_seconds, forecast, machine, metrics, health, effects, continued, key, inputs, reads,
+        files.
 
     Raises:
         StageError: a file that the case names has changed since the command began, or a product was not written.
@@ -40,6 +43,8 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     record = {
         "seconds": round(time.perf_counter() - start, 3),
         "core_seconds": round(core_seconds() - used, 3),
+        "forecast": stage_seconds(run.case).get(name),
+        "machine": str(this_host()),
         "metrics": findings.metrics,
         "health": findings.health,
         "effects": findings.effects,

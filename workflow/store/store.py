@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,6 +62,13 @@ class Store:
     def record(self, point: Point, stage: str) -> dict | None:
         """Return what a stage said of itself; None where its product is missing or its record is damaged."""
         return read_record(self.product(point, stage))
+
+    def records(self, stage: str) -> Iterator[dict]:
+        """Yield what every product of a stage says of itself, those of earlier settings too."""
+        for product in sorted((self.home / "products").glob(f"{stage}-*")):
+            record = read_record(product)
+            if record is not None:
+                yield record
 
     def is_complete(self, point: Point, until: str) -> bool:
         """Whether the products of all stages up to one are there; their files are not looked at."""

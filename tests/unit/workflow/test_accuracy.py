@@ -10,13 +10,13 @@ from reflowshock.workflow.accuracy.command import AccuracyRequest, keeps_promise
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
 from reflowshock.workflow.convergence.calibration import calibration, calibration_of, default_folder
-from reflowshock.workflow.convergence.measured import StageCost, read_accuracy
+from reflowshock.workflow.convergence.measured import StageCost, read_accuracy, this_host
 from reflowshock.workflow.convergence.page import section, section_for, write_pages
 from reflowshock.workflow.convergence.tables import as_lines, as_options, legend, on_front, runs
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import predicted_costs
-from reflowshock.workflow.store.store import AGAIN, MESSAGE
+from reflowshock.workflow.store.store import AGAIN, MESSAGE, Store
 from reflowshock.workflow.store.view import show
 from tests.support.products import record_of
 
@@ -184,13 +184,26 @@ def test_forecasts_are_corrected_by_the_nearest_measured_run():
 def test_the_plan_says_that_a_cost_was_measured(done, monkeypatch):
     case = read_case(CASE)
     monkeypatch.chdir(done[3].parents[1])
-    assert predicted_costs(case, {"reflow": 3.0}) == {"reflow": "about 3 s"}
+    nowhere = Store(Path("nowhere"), one_run=True)
+    assert str(predicted_costs(nowhere, case, {"reflow": 3.0})["reflow"]) == "about 3 s"
     default_folder(case).parent.mkdir(exist_ok=True)
     default_folder(case).symlink_to(done[3])
     known = calibration_of(case)
     expected = known.seconds("reflow", 3.0)
     assert expected != 3.0
-    assert predicted_costs(case, {"reflow": 3.0})["reflow"].endswith(f"s (measured: accuracy, {known.points} points)")
+    cost = str(predicted_costs(nowhere, case, {"reflow": 3.0})["reflow"])
+    assert cost.endswith(f"s (measured: accuracy, {known.points} points)")
+
+
+def test_the_plan_is_corrected_by_former_runs_in_its_folder(tmp_path):
+    store, case = Store(tmp_path, one_run=True), read_case(CASE)
+    here = {"machine": str(this_host()), "forecast": 2.0, "seconds": 5.0}
+    record_of(tmp_path / ".store/products/reflow-1", **here)
+    record_of(tmp_path / ".store/products/reflow-2", **here | {"continued": "from 50 %", "seconds": 1.0})
+    record_of(tmp_path / ".store/products/reflow-3", **here | {"machine": "another", "seconds": 1.0})
+    costs = predicted_costs(store, case, {"reflow": 4.0, "surface": 1.0})
+    assert str(costs["reflow"]) == "about 10 s (as former runs here)"
+    assert str(costs["surface"]) == "about 1 s"
 
 
 def test_a_recommendation_that_was_not_run_is_told(done):
