@@ -13,8 +13,9 @@ from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.flow import FlowResult, Metrics
-from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
+from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
@@ -41,7 +42,14 @@ def solve_droplet(
         SurfaceLost: the drop breaks into parts that are too small for its particles.
     """
     simulation = droplet(scene)
-    run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
+    try:
+        run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
+    except SurfaceLost as error:
+        raise SurfaceLost(
+            f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
+            f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
+            "films thinner than two spacings are not followed: take more particles per diameter"
+        ) from error
     history = run.history(COLUMNS)
     return flow.result_of(run, history, _metrics(scene, history))
 
@@ -75,7 +83,7 @@ def _start(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:
     points, triangles = _sphere(radius, EDGE * scene.spacing)
     inside = np.ones(lattice.shape[1], dtype=bool)
     if scene.start == "cube" and not scene.has_wall:
-        points *= 0.5 * edge / np.abs(points).max(axis=1)[:, None]
+        points, triangles = _cube(edge, EDGE * scene.spacing)
     elif scene.impact_speed or not scene.has_wall:
         inside = (lattice**2).sum(axis=0) < radius**2
     else:
@@ -102,6 +110,14 @@ def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
     inward = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0.0
     triangles[inward] = triangles[inward][:, ::-1]
     return points * radius * float(np.cbrt(4.0 * pi / 3.0 / hull.volume)), triangles
+
+
+def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
+    """Triangles of about an edge [m] on a cube of a width [m], whose edges they round."""
+    grid = Grid.around(width * np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), edge)
+    x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
+    level = LevelSet(grid, np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z)) - 0.5 * width)
+    return relax(level, *extract_surface(level), ())
 
 
 def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indices]:

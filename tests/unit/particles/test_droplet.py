@@ -137,6 +137,16 @@ def test_liquid_that_left_its_surface_is_refused():
         lost.add_to(simulation.rates, simulation.fields, simulation.fluids)
 
 
+def test_a_film_too_thin_for_its_particles_ends_the_run_in_words(monkeypatch):
+    def tear(self, time_step):
+        self.steps = 7
+        raise SurfaceLost("torn")
+
+    monkeypatch.setattr(Simulation, "step", tear)
+    with pytest.raises(SurfaceLost, match=r"step 7, .* units of time: torn; .*more particles per diameter"):
+        solve_droplet(drop(speed=3.0))
+
+
 def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     simulation = droplet(drop(speed=3.0))
     surface = simulation.surface
