@@ -20,6 +20,7 @@ from reflowshock.fem.kernels.levels import (
     take_steps,
 )
 from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
+from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -41,6 +42,11 @@ NOTHING = ForceArrays(
     one_point=OnePointBlocks(
         *(CELLS, NODES, NODES, NODES, none_of(0, 9), none_of(0, 6), none_of(0, 120 * LANES), none_of(0, 1, LANES)),
         *(none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, none_of(0, 12 * LANES), none_of(0)),
+    ),
+    hexahedron=HexahedronBlocks(
+        *(CELLS, NODES, NODES, NODES, none_of(0, 9), none_of(0, 6), none_of(0, 21 * LANES), none_of(0, 9 * LANES)),
+        *(none_of(0, 8, LANES), none_of(0, 8, LANES), none_of(0, 32 * LANES), none_of(0, 6 * LANES)),
+        *(none_of(0, 8, 7 * LANES), none_of(0, 21 * LANES), BY_LANE, BY_LANE),
     ),
     path=Path(False, np.inf),
 )

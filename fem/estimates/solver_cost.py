@@ -27,7 +27,7 @@ LINEAR_RATE = {
     "tetrahedron_quadratic": 9.0e6,
 }
 NONLINEAR_RATE = {
-    "incompatible_modes": 7.5e5,
+    "incompatible_modes": 3.5e6,
     "one_point": 1.0e7,
     "tetrahedron": 1.3e7,
     "tetrahedron_quadratic": 4.5e6,

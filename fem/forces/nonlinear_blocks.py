@@ -9,11 +9,11 @@ from reflowshock.fem.elements.element import Elements, classes, element_geometry
 from reflowshock.fem.elements.one_point import hourglass_control
 from reflowshock.fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
 from reflowshock.fem.forces.force_congruent import SIGNS
-from reflowshock.fem.kernels.hexahedron import CENTRE_DERIVATIVES, GAUSS, GAUSS_DERIVATIVES
+from reflowshock.fem.kernels.hexahedron import GAUSS, GAUSS_DERIVATIVES
 from reflowshock.fem.kernels.lanes import LANES
 from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, STRETCH
 from reflowshock.fem.kernels.nonlinear_gradient import Blocks
-from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
+from reflowshock.fem.kernels.nonlinear_hexahedron import POINT, HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
@@ -25,6 +25,7 @@ SYMMETRIC = (np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2]))  # rows
 ORTHOTROPIC = (np.append(SYMMETRIC[0], [3, 4, 5]), np.append(SYMMETRIC[1], [3, 4, 5]))
 # Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
 HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
+LINEAR = [0, 1, 3]  # places of the modes x, y, z among the parities from 1 on
 MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
@@ -143,28 +144,38 @@ def in_modes(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sqrt(8.0) * ordered.reshape(amplitudes.shape)
 
 
-def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> HexahedronBlocks:
+def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> HexahedronBlocks:
     """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
-    jacobian = np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True)
-    weight = np.linalg.det(jacobian)
-    centre = np.einsum("eai,ad->eid", corners, CENTRE_DERIVATIVES, optimize=True)
-    factor = -2.0 * np.linalg.det(centre)[:, None, None]
+    weight = np.linalg.det(np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True))
     coupling = np.einsum("gk,gl,eg->ekl", GAUSS, GAUSS, 1.0 / weight)[:, SYMMETRIC[0], SYMMETRIC[1]]
+    transformed = np.einsum("pa,eai->epi", SIGNS[1:], corners - corners[:, :1])
+    inverse = np.linalg.inv(transformed[:, LINEAR].transpose(0, 2, 1))
+    at_rest = lanes.spread(transformed.reshape(count, 1, -1))[:, 0]
     return HexahedronBlocks(
         **common_arrays(elements, lanes, plastic),
-        inverse=lanes.spread(np.linalg.inv(jacobian).reshape(count, 8, 9)),
-        weight=lanes.spread(weight[:, None])[:, 0],
+        corners=at_rest,
+        inverse=lanes.spread(inverse.reshape(count, 1, -1))[:, 0],
+        weight=lanes.spread(weight[:, :, None]),
+        reciprocal=lanes.spread(1.0 / weight[:, :, None]),
         basis=lanes.spread(orthonormal_basis(weight).reshape(count, 1, -1))[:, 0],
-        normal=lanes.spread((factor * np.linalg.inv(centre)).reshape(count, 1, -1))[:, 0],
         coupling=lanes.spread(coupling[:, None])[:, 0],
-        state=initial_state(len(lanes.filled), 8, finite),
-        modes=written_zeros(len(lanes.filled), 9 * LANES),
+        state=written_zeros(len(lanes.filled), 8, POINT),
+        place=at_rest[lanes.pattern],
         plastic_work=np.zeros(lanes.element.shape),
-        residual=written_zeros(len(lanes.filled), 9 * LANES),
         hourglass_energy=np.zeros(lanes.element.shape),
     )
+
+
+def gauss_volumes(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the volumes at the Gauss points ``(k, 8)`` of hexahedra, but for a factor.
+
+    Args:
+        place: ``(k, 7, 3)`` transformed positions, see ``kernels.nonlinear_hexahedron``.
+    """
+    corners = np.einsum("pa,kpi->kai", SIGNS[1:], place)
+    return np.linalg.det(np.einsum("kai,gad->kgid", corners, GAUSS_DERIVATIVES, optimize=True))
 
 
 def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:

@@ -59,6 +59,26 @@ def put_six(values, at, m):
 
 
 @njit(**LANE_OPTIONS)
+def six_of(values, g, at):
+    """Return six entries of a lane, from ``at`` on, in a row of values."""
+    return (
+        values[g, at],
+        values[g, at + LANES],
+        values[g, at + 2 * LANES],
+        values[g, at + 3 * LANES],
+        values[g, at + 4 * LANES],
+        values[g, at + 5 * LANES],
+    )
+
+
+@njit(**LANE_OPTIONS)
+def put_six_of(values, g, at, m):
+    """Write six entries of a lane, from ``at`` on, in a row of values."""
+    values[g, at], values[g, at + LANES], values[g, at + 2 * LANES] = m[0], m[1], m[2]
+    values[g, at + 3 * LANES], values[g, at + 4 * LANES], values[g, at + 5 * LANES] = m[3], m[4], m[5]
+
+
+@njit(**LANE_OPTIONS)
 def three(values, at):
     """Return three entries of a lane, from ``at`` on."""
     return values[at], values[at + LANES], values[at + 2 * LANES]
@@ -68,6 +88,12 @@ def three(values, at):
 def put_three(values, at, v):
     """Write three entries of a lane, from ``at`` on."""
     values[at], values[at + LANES], values[at + 2 * LANES] = v[0], v[1], v[2]
+
+
+@njit(**LANE_OPTIONS)
+def cross(a, b):
+    """Return the cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(**LANE_OPTIONS)

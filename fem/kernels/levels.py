@@ -15,12 +15,13 @@ from reflowshock.fem.kernels.box_rows import add_row_forces, read_lines, subtrac
 from reflowshock.fem.kernels.force import add_block_force
 from reflowshock.fem.kernels.motion import add_impulse, advance, gather_from_slaves, spread_to_slaves
 from reflowshock.fem.kernels.nonlinear import Path
+from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces
 
 ALL_FINE = -1  # no element is turned inside out
 PACES = 3  # at which force terms may act
-NAMES = ("congruent", "assembled", "turning_rows", "turning_boxes", "turning", "one_point")
+NAMES = ("congruent", "assembled", "turning_rows", "turning_boxes", "turning", "one_point", "hexahedron")
 
 
 class ForceArrays(NamedTuple):
@@ -32,7 +33,7 @@ class ForceArrays(NamedTuple):
         turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
         turning_boxes: Cells, filled and constants of ``box_rotation.add_turned_block_forces``.
         turning: The same of ``turned_hexahedron.add_turned_forces``.
-        one_point: See ``nonlinear_one_point``.
+        one_point, hexahedron: See ``nonlinear_one_point``, ``nonlinear_hexahedron``.
         path: Of these.
     """
 
@@ -42,6 +43,7 @@ class ForceArrays(NamedTuple):
     turning_boxes: tuple[NDArray, ...]
     turning: tuple[NDArray, ...]
     one_point: OnePointBlocks
+    hexahedron: HexahedronBlocks
     path: Path
 
 
@@ -133,6 +135,9 @@ def add_forces(arrays, displacement, force):
     block = add_one_point_force(arrays.one_point, arrays.path, displacement, force)
     if block >= 0:
         return 5, block
+    block = add_hexahedron_force(arrays.hexahedron, arrays.path, displacement, force)
+    if block >= 0:
+        return 6, block
     return ALL_FINE, 0
 
 

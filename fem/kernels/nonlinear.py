@@ -29,10 +29,9 @@ from reflowshock.fem.kernels.lanes import (
     six,
     times,
 )
-from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment
 
 DEFORMATION, ROTATION, INCREMENT, MISES, NOMINAL, WORK_SLOTS = (LANES * k for k in (0, 9, 18, 24, 25, 34))
-STRESS, STRETCH, PLASTIC, STATE_SLOTS = (LANES * k for k in (0, 6, 12, 13))
+STRESS, PLASTIC, STRETCH, STATE_SLOTS = (LANES * k for k in (0, 6, 7, 13))
 POLAR_ITERATIONS = 40  # stretches of 1e6 need 25
 POLAR_CONVERGED = 1e-18  # squared change after which the next one is below rounding (quadratic convergence)
 
@@ -187,64 +186,6 @@ def elastic_stress(w, state, elastic):
         x, y, z = s[0] - s[1], s[1] - s[2], s[2] - s[0]
         square = 0.5 * (x * x + y * y + z * z) + 3.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5])
         w[MISES + lane] = np.sqrt(square)
-
-
-@njit(**LANE_OPTIONS)
-def count_above(values, at, limit):
-    """Return in how many lanes an entry is above a limit."""
-    count = 0.0
-    for lane in range(LANES):
-        count += 1.0 if values[at + lane] > limit else 0.0
-    return count
-
-
-@njit(cache=True, error_model="numpy")
-def plastic_flow(w, state, law, weight, work):
-    """Return the stress to the yield surface where the elastic trial state lies outside (radial return).
-
-    Its von Mises stress is then that after the step.
-
-    Plastic work is the mean of the stress before and after the step times the plastic strain increment, as the elastic
-    energy s : C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
-
-    Args:
-        w: Workspace.
-        state: Of the point, with the elastic trial stress.
-        law: Row of ``kernels.plasticity.plastic_constants``, whose first entry is 3 G, and the step dt [s].
-        weight: ``(16,)`` [m^3] volume of the point.
-        work: ``(16,)`` [J] plastic work, added to.
-    """
-    plastic, step = law
-    if count_above(w, MISES, plastic[FIRST_YIELD]) == 0.0:
-        return
-    for lane in range(LANES):
-        trial = w[MISES + lane]
-        if not trial > plastic[FIRST_YIELD]:
-            continue
-        flow = plastic_increment(trial, state[PLASTIC + lane], plastic, step)
-        if flow == 0.0:
-            continue
-        mises = trial - plastic[0] * flow
-        mean_stress = trial - 0.5 * (plastic[0] * flow + mises_change(w, state, lane, plastic[0]))
-        work[lane] += weight[lane] * flow * mean_stress
-        pressure = (state[lane] + state[LANES + lane] + state[2 * LANES + lane]) / 3.0
-        for k in range(6):
-            mean = pressure if k < 3 else 0.0
-            at = STRESS + LANES * k + lane
-            state[at] = mean + (state[at] - mean) * mises / trial
-        state[PLASTIC + lane] += flow
-        w[MISES + lane] = mises
-
-
-@njit(cache=True, error_model="numpy")
-def mises_change(w, state, lane, stiffness):
-    """Return by how much the strain increment de raised the stress along the trial deviator s: 3 G s : de / |s|."""
-    x, y, z = state[lane], state[LANES + lane], state[2 * LANES + lane]
-    mean, total = (x + y + z) / 3.0, 0.0
-    for k in range(3):
-        total += (state[LANES * k + lane] - mean) * w[INCREMENT + LANES * k + lane]
-        total += state[LANES * (k + 3) + lane] * w[INCREMENT + LANES * (k + 3) + lane]
-    return stiffness * total / w[MISES + lane]
 
 
 @njit(**LANE_OPTIONS)

@@ -20,11 +20,11 @@ from reflowshock.fem.kernels.nonlinear import (
     elastic_stress,
     nominal_stress_finite,
     nominal_stress_small,
-    plastic_flow,
     rotate,
     small_increment,
     stretch_increment,
 )
+from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
 
 FINE = -1  # no element is turned inside out
 
@@ -105,12 +105,13 @@ def add_point(blocks, b, point, path, w):
     upright = strain_increment(w, state, path.finite)
     if upright:
         elastic_stress(w, state, blocks.elastic[material])
-        weight = blocks.weight[pattern, point]
-        plastic_flow(w, state, (blocks.plastic[material], path.step), weight, blocks.plastic_work[b])
+        law, weight = law_of(blocks.plastic, material, path.step), blocks.weight[pattern]
+        if plastic_flow(w, blocks.state[b], point, law):
+            add_work(w, weight, point, blocks.plastic_work[b])
         if path.finite:
-            nominal_stress_finite(w, state, weight)
+            nominal_stress_finite(w, state, weight[point])
         else:
-            nominal_stress_small(w, state, weight)
+            nominal_stress_small(w, state, weight[point])
     return upright
 
 

@@ -1,20 +1,19 @@
 """Numba kernels of the fully integrated hexahedron with incompatible modes, material and geometric nonlinearity.
 
-The element is that of ``kernels.hexahedron.stiffness``. With F_c the compatible deformation at a Gauss point, a_k the
-incompatible modes in the frame R_0 of the element's centre, and Pr the least-squares fit by 1, xi, eta, zeta with the
-weights w:
+Positions are seen from the frame R that turns with the centre of the element (polar decomposition of the deformation
+there), x^ = R^T x, and so are stresses and strains of all Gauss points. The strain increment of a step is that of its
+middle, with j = dx^/dxi of the positions between both ends (Hughes & Winget, IJNME 15, 1980):
 
-    F = F_c + sum_k R_0 a_k x g_k, g_k = xi_k N_k / w;  J' = det F + Pr(det F_c) - det F_c;  F' = (J' / det F)^(1/3) F
+    d = sym(dj j^-1) + (Pr(t) - t) 1 / 3 + sum_k xi_k / w sym(a_k x n_k),    t = tr(dj j^-1),
 
-and F' goes to the material (small kinematics: the same, linearised). Forces are the derivative of the stress work, with
-s = dev s + p 1 the Kirchhoff stress and c = (J' / det F)^(1/3): on the modes, which are in equilibrium, and on F_c,
-
-    P = c R (dev s + p / c^3 1) U'^-1,  P_c = P + (Pr(p / J') - p / J') cof F_c.
+Pr the least-squares fit by 1, xi, eta, zeta with the weights w, a_k the steps of the incompatible modes, and n_k the
+gradients of xi_k at the centre. Small kinematics have R = 1 and j of the body at rest. Forces are those with the same
+power, s the Kirchhoff stress after the step and p its pressure: on x^, w (s + (Pr(p) - p) 1) j^-T; on the modes,
+sum over points of xi_k s n_k = 0. A rotation gives no strain, stress gives no moment, and to first order in the
+displacement all is that of ``kernels.hexahedron``.
 
 Modes follow each step by one Newton correction with the elastic operator: exact while elastic; what plastic flow leaves
-over is corrected in the next step, its work on the modes counts as hourglass energy. Elastic strains must stay small,
-as those of metals do: in compression above 7 to 20 %, by their shape, the modes grow without load at any step, known of
-all enhanced strains (Wriggers & Reese, CMAME 135, 1996); take the one-point element there.
+over is corrected in the next step, its work on the modes counts as hourglass energy.
 """
 
 from typing import NamedTuple
@@ -23,57 +22,49 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from reflowshock.fem.kernels.box_rotation import DEFORMATION, ROTATION, X, Y, Z, transform_corners
 from reflowshock.fem.kernels.hexahedron import GAUSS
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
+    applied,
+    cross,
     gather_lanes,
     nine,
     put_nine,
-    put_six,
+    put_six_of,
+    put_three,
     scatter_lanes,
-    turn,
-    turn_back,
+    six,
+    six_of,
+    three,
+    transposed,
 )
-from reflowshock.fem.kernels.nonlinear import (
-    DEFORMATION,
-    NOMINAL,
-    ROTATION,
-    STATE_SLOTS,
-    WORK_SLOTS,
-    add_identity,
-    elastic_stress,
-    plastic_flow,
-    rotate,
-    small_increment,
-    stretch,
-    stretch_increment,
-)
-from reflowshock.fem.kernels.nonlinear_dilatation import (
-    change_dilatation_finite,
-    change_dilatation_small,
-    finish_nominal,
-    nominal_finite,
-    nominal_small,
-    write_dilatation,
-)
+from reflowshock.fem.kernels.nonlinear import INCREMENT, MISES, WORK_SLOTS, rotate
 from reflowshock.fem.kernels.nonlinear_gradient import FINE
 from reflowshock.fem.kernels.nonlinear_modes import (
-    add_modes,
+    AFTER,
+    ALL_SLOTS,
+    BEFORE,
+    CHANGE,
+    MIDDLE,
+    SUMS,
+    add_elastic,
     add_remainder,
-    add_residual,
-    correct_modes,
-    push_normals,
-    write_inverse,
+    solve_modes,
+    write_normals,
     write_operator,
+    write_sums,
+    write_trial,
 )
-from reflowshock.fem.kernels.nonlinear_parent import (
-    add_point_monomials,
-    fit,
-    gather_monomials,
-    point_gradient,
-    scatter_monomials,
-)
+from reflowshock.fem.kernels.nonlinear_parent import EDGES, places, write_edges, write_fit, write_modes
+from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
+from reflowshock.fem.kernels.plasticity import FIRST_YIELD
+
+CORNERS = 21 * LANES  # entries of positions but for their mean
+MODES = 24 * LANES
+POINT = 7 * LANES  # of the state of a Gauss point: stress, equivalent plastic strain
+TRACE = 6 * LANES  # where a Gauss point has its trace, then its equivalent stress, then its pressure
 
 
 class HexahedronBlocks(NamedTuple):
@@ -81,16 +72,15 @@ class HexahedronBlocks(NamedTuple):
 
     Attributes:
         cells, filled, pattern, material, elastic, plastic: As in ``kernels.nonlinear_gradient.Blocks``.
-        inverse: ``(np, 8, 16 * 9)`` [1/m] inverse Jacobian at the Gauss points.
-        weight: ``(np, 16 * 8)`` [m^3].
+        corners: ``(np, 16 * 21)`` [m] transformed positions at rest of the parities 1 to 7.
+        inverse: ``(np, 16 * 9)`` [1/m] inverse of the matrix whose columns are those of x, y and z.
+        weight, reciprocal: ``(np, 8, 16)`` [m^3], [1/m^3].
         basis: ``(np, 16 * 32)`` linear functions at the Gauss points, orthonormal under the weights.
-        normal: ``(np, 16 * 9)`` [m^2] N_k: -2 det J_0 times the inverse of the Jacobian at the centre, J_0.
         coupling: ``(np, 16 * 6)`` [1/m^3] sums of xi_k xi_l / w, order of a symmetric matrix.
-        state: ``(nb, 8, 16 * 13)``, see ``kernels.nonlinear``.
-        modes: ``(nb, 16 * 9)`` [1/m^2] a_k.
+        state: ``(nb, 8, 16 * 7)`` stress [Pa], equivalent plastic strain.
+        place: ``(nb, 16 * 21)`` [m] transformed x^.
         plastic_work: ``(nb, 16)`` [J].
-        residual: ``(nb, 16 * 9)`` [N m] forces on the modes.
-        hourglass_energy: ``(nb, 16)`` [J] their work.
+        hourglass_energy: ``(nb, 16)`` [J] work of forces on the modes.
     """
 
     cells: NDArray[np.int32]
@@ -99,172 +89,235 @@ class HexahedronBlocks(NamedTuple):
     material: NDArray[np.int32]
     elastic: NDArray[np.float64]
     plastic: NDArray[np.float64]
+    corners: NDArray[np.float64]
     inverse: NDArray[np.float64]
     weight: NDArray[np.float64]
+    reciprocal: NDArray[np.float64]
     basis: NDArray[np.float64]
-    normal: NDArray[np.float64]
     coupling: NDArray[np.float64]
     state: NDArray[np.float64]
-    modes: NDArray[np.float64]
+    place: NDArray[np.float64]
     plastic_work: NDArray[np.float64]
-    residual: NDArray[np.float64]
     hourglass_energy: NDArray[np.float64]
 
 
-class Bench(NamedTuple):
-    """Kinematics, and the arrays of the block at work."""
-
-    finite: bool
-    nodal: NDArray[np.float64]
-    monomials: NDArray[np.float64]
-    compatible: NDArray[np.float64]
-    nominal: NDArray[np.float64]
-    dilatation: NDArray[np.float64]
-    fitted: NDArray[np.float64]
-    point: NDArray[np.float64]
-    trial: NDArray[np.float64]
-    factor: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    turned: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    operator: NDArray[np.float64]
-    pressure: NDArray[np.float64]
-    change: NDArray[np.float64]
-
-
-@njit(cache=True)
-def new_bench(finite):
-    """Return the arrays of a block."""
-    return Bench(
-        finite,
-        np.empty(24 * LANES),
-        np.empty(24 * LANES),
-        np.empty((8, 9 * LANES)),
-        np.empty((8, 9 * LANES)),
-        np.empty(8 * LANES),
-        np.empty(8 * LANES),
-        np.empty(WORK_SLOTS),
-        np.empty(STATE_SLOTS),
-        np.empty(LANES),
-        np.empty(15 * LANES),
-        np.empty(9 * LANES),
-        np.empty(9 * LANES),
-        np.empty(54 * LANES),
-        np.empty(8 * LANES),
-        np.empty(9 * LANES),
-    )
-
-
-@njit(cache=True)
-def strain_at(blocks, b, g, bench, state):
-    """Move the strain of a Gauss point on, and its stress by the elastic law; return whether it is upright."""
-    w, pattern, at = bench.point, blocks.pattern[b], slice(LANES * g, LANES * (g + 1))
-    w[DEFORMATION : DEFORMATION + 9 * LANES] = bench.compatible[g]
-    xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
-    add_modes(w, bench.turned, blocks.normal[pattern], xi, blocks.weight[pattern, at])
-    if bench.finite:
-        wrong = change_dilatation_finite(w, bench.dilatation[at], bench.fitted[at], bench.factor)
-        if wrong > 0.0 or not rotate(w):
-            return False
-        stretch_increment(w, state)
-    else:
-        change_dilatation_small(w, bench.dilatation[at], bench.fitted[at])
-        small_increment(w, state)
-    elastic_stress(w, state, blocks.elastic[blocks.material[b]])
-    return True
-
-
-@njit(cache=True)
-def write_nominal(bench, state, pressure):
-    """Write P of a Gauss point and its p / J'."""
-    if bench.finite:
-        nominal_finite(bench.point, state, bench.factor, pressure)
-    else:
-        nominal_small(bench.point, state, pressure)
+@njit(**LANE_OPTIONS)
+def write_centre(inverse, w):
+    """Write the deformation of the centre from the transformed displacements."""
+    for lane in range(LANES):
+        m, x, y, z = nine(inverse, lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
+        put_nine(
+            w,
+            DEFORMATION + lane,
+            (
+                1.0 + x[0] * m[0] + y[0] * m[3] + z[0] * m[6],
+                x[0] * m[1] + y[0] * m[4] + z[0] * m[7],
+                x[0] * m[2] + y[0] * m[5] + z[0] * m[8],
+                x[1] * m[0] + y[1] * m[3] + z[1] * m[6],
+                1.0 + x[1] * m[1] + y[1] * m[4] + z[1] * m[7],
+                x[1] * m[2] + y[1] * m[5] + z[1] * m[8],
+                x[2] * m[0] + y[2] * m[3] + z[2] * m[6],
+                x[2] * m[1] + y[2] * m[4] + z[2] * m[7],
+                1.0 + x[2] * m[2] + y[2] * m[5] + z[2] * m[8],
+            ),
+        )
 
 
 @njit(**LANE_OPTIONS)
-def write_frame(w, frame):
-    """Write rotation and stretch of the centre."""
-    for lane in range(LANES):
-        r = nine(w, ROTATION + lane)
-        put_nine(frame, lane, r)
-        put_six(frame, 9 * LANES + lane, stretch(r, nine(w, DEFORMATION + lane)))
+def add_corners(corners, p, w):
+    """Turn displacements into positions."""
+    for k in range(CORNERS):
+        w[X + k] += corners[p, k]
 
 
-@njit(cache=True)
-def write_centre(blocks, b, bench):
-    """Write the frame of the element's centre; return whether it is upright."""
-    write_inverse(blocks.normal[blocks.pattern[b]], bench.frame)
-    point_gradient(bench.monomials, (0.0, 0.0, 0.0), bench.frame, bench.point)
-    add_identity(bench.point)
-    upright = rotate(bench.point)
-    write_frame(bench.point, bench.frame)
-    return upright
+@njit(**LANE_OPTIONS)
+def turn_back(w):
+    """Turn positions into the frame R."""
+    for k in range(X, MODES, 3 * LANES):
+        for lane in range(LANES):
+            put_three(w, k + lane, applied(transposed(nine(w, ROTATION + lane)), three(w, k + lane)))
 
 
-@njit(cache=True)
-def write_compatible(blocks, b, bench):
-    """Write the compatible deformation of all Gauss points and the fit of its dilatation."""
-    pattern = blocks.pattern[b]
+@njit(**LANE_OPTIONS)
+def turn(w):
+    """Turn forces out of the frame R."""
+    for k in range(X, MODES, 3 * LANES):
+        for lane in range(LANES):
+            put_three(w, k + lane, applied(nine(w, ROTATION + lane), three(w, k + lane)))
+
+
+@njit(**LANE_OPTIONS)
+def move_place(w, place, b):
+    """Write middle and change of positions from those before and after the step; keep the latter."""
+    for k in range(CORNERS):
+        new, old = w[X + k], place[b, k]
+        w[CHANGE + X + k] = new - old
+        w[MIDDLE + X + k] = 0.5 * (new + old)
+        place[b, k] = new
+
+
+@njit(**LANE_OPTIONS)
+def write_strains(edges, points):
+    """Write the increments of the compatible strain and their traces at the Gauss points.
+
+    Args:
+        edges: Derivatives of the positions in the middle of the step; behind them those of their change.
+        points: ``(8, 16 * 7)``.
+    """
     for g in range(8):
-        xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
-        point_gradient(bench.monomials, xi, blocks.inverse[pattern, g], bench.point)
-        if bench.finite:
-            add_identity(bench.point)
-        bench.compatible[g] = bench.point[DEFORMATION : DEFORMATION + 9 * LANES]
-        write_dilatation(bench.point, bench.finite, bench.dilatation[LANES * g : LANES * (g + 1)])
-    fit(blocks.basis[pattern], blocks.weight[pattern], bench.dilatation, bench.fitted)
+        p, q, r = places(g)
+        for lane in range(LANES):
+            a, b, c = three(edges, p + lane), three(edges, q + lane), three(edges, r + lane)
+            d, e, f = three(edges, EDGES + p + lane), three(edges, EDGES + q + lane), three(edges, EDGES + r + lane)
+            u, v, t = cross(b, c), cross(c, a), cross(a, b)
+            s = 1.0 / (a[0] * u[0] + a[1] * u[1] + a[2] * u[2])
+            xx = s * (d[0] * u[0] + e[0] * v[0] + f[0] * t[0])
+            yy = s * (d[1] * u[1] + e[1] * v[1] + f[1] * t[1])
+            zz = s * (d[2] * u[2] + e[2] * v[2] + f[2] * t[2])
+            xy = d[0] * u[1] + e[0] * v[1] + f[0] * t[1] + d[1] * u[0] + e[1] * v[0] + f[1] * t[0]
+            yz = d[1] * u[2] + e[1] * v[2] + f[1] * t[2] + d[2] * u[1] + e[2] * v[1] + f[2] * t[1]
+            xz = d[0] * u[2] + e[0] * v[2] + f[0] * t[2] + d[2] * u[0] + e[2] * v[0] + f[2] * t[0]
+            row = points[g]
+            row[lane], row[LANES + lane], row[2 * LANES + lane] = xx, yy, zz
+            row[3 * LANES + lane], row[4 * LANES + lane], row[5 * LANES + lane] = s * xy, s * yz, s * xz
+            row[TRACE + lane] = xx + yy + zz
 
 
-@njit(cache=True)
-def write_turned(blocks, b, bench):
-    """Write the modes in the frame of the body."""
-    bench.turned[:] = blocks.modes[b]
-    if bench.finite:
-        turn(bench.frame, bench.turned)
-
-
-@njit(cache=True)
-def relax_modes(blocks, b, bench):
-    """Correct the modes from an elastic trial step; return whether all Gauss points are upright."""
-    pattern = blocks.pattern[b]
-    write_turned(blocks, b, bench)
-    bench.residual[:] = 0.0
+@njit(**LANE_OPTIONS)
+def fit_dilatation(points, fitted):
+    """Replace the dilatations by their fits."""
     for g in range(8):
-        bench.trial[:] = blocks.state[b, g]
-        if not strain_at(blocks, b, g, bench, bench.trial):
-            return False
-        write_nominal(bench, bench.trial, bench.pressure)
-        xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
-        add_residual(bench.point, blocks.normal[pattern], xi, bench.residual)
-    if bench.finite:
-        turn_back(bench.frame, bench.residual)
-    elastic = blocks.elastic[blocks.material[b]]
-    bench.turned[:] = blocks.normal[pattern]
-    if bench.finite:
-        push_normals(bench.frame, bench.turned)
-    write_operator(bench.turned, blocks.coupling[pattern], elastic, bench.operator)
-    correct_modes(bench.operator, bench.residual, blocks.modes[b], bench.change)
-    write_turned(blocks, b, bench)
-    return True
+        for lane in range(LANES):
+            third = (fitted[LANES * g + lane] - points[g, TRACE + lane]) / 3.0
+            points[g, lane] += third
+            points[g, LANES + lane] += third
+            points[g, 2 * LANES + lane] += third
+
+
+@njit(**LANE_OPTIONS)
+def move_points(w, points, reciprocal, state, elastic):
+    """Move the stress of all Gauss points on by an elastic step.
+
+    Args:
+        w: Workspace, with the strains of the modes.
+        points: Strain increments, see ``write_strains``: added to; squares of
+            the equivalent stresses in the place of traces.
+        reciprocal: ``(8, 16)`` of the weights.
+        state: ``(8, 16 * 7)``.
+        elastic: Nine constants.
+    """
+    for g in range(8):
+        x, y, z = GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2]
+        for lane in range(LANES):
+            r = reciprocal[g, lane]
+            u, v, t = x * r, y * r, z * r
+            d = six_of(points, g, lane)
+            m, n, o = six(w, SUMS + lane), six(w, SUMS + 6 * LANES + lane), six(w, SUMS + 12 * LANES + lane)
+            d = (
+                d[0] + u * m[0] + v * n[0] + t * o[0],
+                d[1] + u * m[1] + v * n[1] + t * o[1],
+                d[2] + u * m[2] + v * n[2] + t * o[2],
+                d[3] + u * m[3] + v * n[3] + t * o[3],
+                d[4] + u * m[4] + v * n[4] + t * o[4],
+                d[5] + u * m[5] + v * n[5] + t * o[5],
+            )
+            put_six_of(points, g, lane, d)
+            s = add_elastic(six_of(state, g, lane), d, elastic)
+            put_six_of(state, g, lane, s)
+            a, b, c = s[0] - s[1], s[1] - s[2], s[2] - s[0]
+            shear = s[3] * s[3] + s[4] * s[4] + s[5] * s[5]
+            points[g, TRACE + lane] = 0.5 * (a * a + b * b + c * c) + 3.0 * shear
+
+
+@njit(**LANE_OPTIONS)
+def count_yielding(points, limit):
+    """Return at how many Gauss points the equivalent stress is above a limit."""
+    count, square = 0.0, limit * limit
+    for g in range(8):
+        for lane in range(LANES):
+            count += 1.0 if points[g, TRACE + lane] > square else 0.0
+    return count
 
 
 @njit(cache=True)
-def move_points(blocks, b, bench, step):
-    """Move all Gauss points on by a step, write P and the forces on the modes; return whether they are upright."""
-    pattern = blocks.pattern[b]
-    weight, law = blocks.weight[pattern], (blocks.plastic[blocks.material[b]], step)
+def flow(blocks, b, points, step, w):
+    """Return the stresses of a block to the yield surface; ``w`` is a workspace of ``kernels.nonlinear``."""
+    state, weight, work = blocks.state[b], blocks.weight[blocks.pattern[b]], blocks.plastic_work[b]
+    law = law_of(blocks.plastic, blocks.material[b], step)
     for g in range(8):
-        state, at = blocks.state[b, g], slice(LANES * g, LANES * (g + 1))
-        if not strain_at(blocks, b, g, bench, state):
-            return False
-        plastic_flow(bench.point, state, law, weight[at], blocks.plastic_work[b])
-        write_nominal(bench, state, bench.pressure[at])
-        bench.nominal[g] = bench.point[NOMINAL : NOMINAL + 9 * LANES]
-        xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
-        add_residual(bench.point, blocks.normal[pattern], xi, bench.residual)
-    return True
+        for k in range(TRACE):
+            w[INCREMENT + k] = points[g, k]
+        for lane in range(LANES):
+            w[MISES + lane] = np.sqrt(points[g, TRACE + lane])
+        if plastic_flow(w, state, g, law):
+            add_work(w, weight, g, work)
+
+
+@njit(**LANE_OPTIONS)
+def write_pressures(state, points):
+    """Write the pressures of the Gauss points, positive in tension."""
+    for g in range(8):
+        for lane in range(LANES):
+            points[g, TRACE + lane] = (state[g, lane] + state[g, LANES + lane] + state[g, 2 * LANES + lane]) / 3.0
+
+
+@njit(**LANE_OPTIONS)
+def write_forces(edges, load, forces):
+    """Write the forces on the derivatives of x^ at the Gauss points.
+
+    Args:
+        edges: Derivatives after the step.
+        load: State ``(8, 16 * 7)``, pressures among ``points``, their fit, weights.
+        forces: ``(8, 16 * 9)``.
+
+    Returns:
+        At how many points and lanes it is not upright.
+    """
+    state, points, fitted, weight = load
+    wrong = 0.0
+    for g in range(8):
+        p, q, r = places(g)
+        for lane in range(LANES):
+            a, b, c = three(edges, p + lane), three(edges, q + lane), three(edges, r + lane)
+            u, v, t = cross(b, c), cross(c, a), cross(a, b)
+            volume = a[0] * u[0] + a[1] * u[1] + a[2] * u[2]
+            wrong += 0.0 if volume < 0.0 else 1.0
+            f, m = weight[g, lane] / volume, six_of(state, g, lane)
+            shift = fitted[LANES * g + lane] - points[g, TRACE + lane]
+            s = (f * (m[0] + shift), f * (m[1] + shift), f * (m[2] + shift), f * m[3], f * m[4], f * m[5])
+            forces[g, lane] = s[0] * u[0] + s[3] * u[1] + s[5] * u[2]
+            forces[g, LANES + lane] = s[3] * u[0] + s[1] * u[1] + s[4] * u[2]
+            forces[g, 2 * LANES + lane] = s[5] * u[0] + s[4] * u[1] + s[2] * u[2]
+            forces[g, 3 * LANES + lane] = s[0] * v[0] + s[3] * v[1] + s[5] * v[2]
+            forces[g, 4 * LANES + lane] = s[3] * v[0] + s[1] * v[1] + s[4] * v[2]
+            forces[g, 5 * LANES + lane] = s[5] * v[0] + s[4] * v[1] + s[2] * v[2]
+            forces[g, 6 * LANES + lane] = s[0] * t[0] + s[3] * t[1] + s[5] * t[2]
+            forces[g, 7 * LANES + lane] = s[3] * t[0] + s[1] * t[1] + s[4] * t[2]
+            forces[g, 8 * LANES + lane] = s[5] * t[0] + s[4] * t[1] + s[2] * t[2]
+    return wrong
+
+
+@njit(**LANE_OPTIONS)
+def copy_corners(source, b, w, at):
+    """Write positions, of a row of ``source (., 16 * 21)``."""
+    for k in range(CORNERS):
+        w[at + X + k] = source[b, k]
+
+
+@njit(**LANE_OPTIONS)
+def constants_of(elastic, m):
+    """Return the nine constants of a material."""
+    return (
+        elastic[m, 0],
+        elastic[m, 1],
+        elastic[m, 2],
+        elastic[m, 3],
+        elastic[m, 4],
+        elastic[m, 5],
+        elastic[m, 6],
+        elastic[m, 7],
+        elastic[m, 8],
+    )
 
 
 @njit(cache=True)
@@ -280,32 +333,51 @@ def add_hexahedron_force(blocks, path, displacement, force):
     Returns:
         ``FINE``, or the first block with an element that is turned inside out; then the force is not complete.
     """
-    bench = new_bench(path.finite)
+    w, edges, point = np.zeros(ALL_SLOTS), np.empty(2 * EDGES), np.empty(WORK_SLOTS)
+    points, forces, fitted = np.empty((8, POINT)), np.empty((8, 9 * LANES)), np.empty(8 * LANES)
+    corners, place, finite = blocks.corners, blocks.place, path.finite
     for b in range(len(blocks.cells)):
-        pattern = blocks.pattern[b]
-        gather_lanes(blocks.cells[b], displacement, bench.nodal)
-        gather_monomials(bench.nodal, bench.monomials)
-        if path.finite and not write_centre(blocks, b, bench):
+        pattern, material = blocks.pattern[b], blocks.material[b]
+        weight, basis, state = blocks.weight[pattern], blocks.basis[pattern], blocks.state[b]
+        elastic = constants_of(blocks.elastic, material)
+        gather_lanes(blocks.cells[b], displacement, w)
+        transform_corners(w)
+        if finite:
+            write_centre(blocks.inverse[pattern], w)
+            if not rotate(w[DEFORMATION:]):
+                return b
+        add_corners(corners, pattern, w)
+        if finite:
+            turn_back(w)
+        move_place(w, place, b)
+        if not finite:
+            copy_corners(corners, pattern, w, MIDDLE)
+        write_edges(w, MIDDLE, edges, 0)
+        write_edges(w, CHANGE, edges, EDGES)
+        write_strains(edges, points)
+        write_fit(points, TRACE, weight, basis, fitted)
+        fit_dilatation(points, fitted)
+        write_normals(w)
+        write_sums(state, w, BEFORE)
+        write_sums(points, w, SUMS)
+        write_trial(w, elastic)
+        write_operator(w, blocks.coupling[pattern], elastic)
+        solve_modes(w)
+        move_points(w, points, blocks.reciprocal[pattern], state, elastic)
+        if count_yielding(points, blocks.plastic[material, FIRST_YIELD]) > 0.0:
+            flow(blocks, b, points, path.step, point)
+        write_sums(state, w, AFTER)
+        add_remainder(w, blocks.hourglass_energy[b])
+        write_pressures(state, points)
+        write_fit(points, TRACE, weight, basis, fitted)
+        if finite:
+            copy_corners(place, b, w, MIDDLE)
+            write_edges(w, MIDDLE, edges, 0)
+        if write_forces(edges, (state, points, fitted, weight), forces) > 0.0:
             return b
-        write_compatible(blocks, b, bench)
-        if not relax_modes(blocks, b, bench):
-            return b
-        bench.residual[:] = 0.0
-        if not move_points(blocks, b, bench, path.step):
-            return b
-        if path.finite:
-            turn_back(bench.frame, bench.residual)
-        add_remainder(bench.residual, bench.change, blocks.residual[b], blocks.hourglass_energy[b])
-        fit(blocks.basis[pattern], blocks.weight[pattern], bench.pressure, bench.fitted)
-        bench.fitted[:] -= bench.pressure
-        bench.monomials[:] = 0.0
-        for g in range(8):
-            at = slice(LANES * g, LANES * (g + 1))
-            finish_nominal(
-                bench.nominal[g], bench.compatible[g], blocks.weight[pattern, at], bench.fitted[at], path.finite
-            )
-            xi = (GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2])
-            add_point_monomials(bench.nominal[g], xi, blocks.inverse[pattern, g], bench.monomials)
-        scatter_monomials(bench.monomials, bench.nodal)
-        scatter_lanes(blocks.cells[b], blocks.filled[b], bench.nodal, force)
+        write_modes(forces, w)
+        if finite:
+            turn(w)
+        transform_corners(w)
+        scatter_lanes(blocks.cells[b], blocks.filled[b], w, force)
     return FINE

@@ -1,18 +1,19 @@
-"""Numba kernels of the incompatible modes of sixteen hexahedra: gradients, forces, elastic operator."""
+"""Numba kernels of the incompatible modes of sixteen hexahedra, see ``kernels.nonlinear_hexahedron``."""
 
-import numpy as np
 from numba import njit
 
+from reflowshock.fem.kernels.box_rotation import X, Y, Z
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
     applied,
     cofactor,
-    cofactor_symmetric,
+    cross,
     determinant,
     full,
     nine,
     put_nine,
+    put_six,
     put_three,
     scaled,
     six,
@@ -20,45 +21,90 @@ from reflowshock.fem.kernels.lanes import (
     times,
     transposed,
 )
-from reflowshock.fem.kernels.nonlinear import DEFORMATION, NOMINAL
+from reflowshock.fem.kernels.nonlinear_parent import SIDE
 
-PAIRS = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 3), (1, 2, 4), (0, 2, 5))  # k, l, place in a symmetric matrix
+# Slots of the workspace behind F and R and their room: transformed positions in the middle of the step, their change,
+# n_k, sums of xi_k s over the Gauss points before and after the step, of the strains, and what is solved.
+MIDDLE, CHANGE, NORMAL, BEFORE, AFTER, SUMS, RESIDUAL, OPERATOR, ALL_SLOTS = (
+    LANES * n for n in (58, 82, 106, 115, 133, 151, 169, 178, 232)
+)
 
 
 @njit(**LANE_OPTIONS)
-def add_modes(w, turned, normal, xi, weight):
-    """Add the gradients of the incompatible modes at a Gauss point."""
-    a, b, c = xi
+def write_normals(w):
+    """Write n_k, the gradients of the parent coordinates at the centre in the middle of the step."""
     for lane in range(LANES):
-        f = nine(w, DEFORMATION + lane)
-        m, n = nine(turned, lane), nine(normal, lane)
-        s = 1.0 / weight[lane]
-        u, v, t = a * s, b * s, c * s
-        new = (
-            f[0] + u * m[0] * n[0] + v * m[3] * n[3] + t * m[6] * n[6],
-            f[1] + u * m[0] * n[1] + v * m[3] * n[4] + t * m[6] * n[7],
-            f[2] + u * m[0] * n[2] + v * m[3] * n[5] + t * m[6] * n[8],
-            f[3] + u * m[1] * n[0] + v * m[4] * n[3] + t * m[7] * n[6],
-            f[4] + u * m[1] * n[1] + v * m[4] * n[4] + t * m[7] * n[7],
-            f[5] + u * m[1] * n[2] + v * m[4] * n[5] + t * m[7] * n[8],
-            f[6] + u * m[2] * n[0] + v * m[5] * n[3] + t * m[8] * n[6],
-            f[7] + u * m[2] * n[1] + v * m[5] * n[4] + t * m[8] * n[7],
-            f[8] + u * m[2] * n[2] + v * m[5] * n[5] + t * m[8] * n[8],
+        a, b, c = three(w, MIDDLE + X + lane), three(w, MIDDLE + Y + lane), three(w, MIDDLE + Z + lane)
+        u, v, t = cross(b, c), cross(c, a), cross(a, b)
+        s = 1.0 / (a[0] * u[0] + a[1] * u[1] + a[2] * u[2])
+        put_nine(
+            w,
+            NORMAL + lane,
+            (s * u[0], s * u[1], s * u[2], s * v[0], s * v[1], s * v[2], s * t[0], s * t[1], s * t[2]),
         )
-        put_nine(w, DEFORMATION + lane, new)
 
 
 @njit(**LANE_OPTIONS)
-def add_residual(w, normal, xi, residual):
-    """Add the force of a Gauss point on the modes: xi_k P N_k."""
-    for k in range(3):
-        factor = xi[k]
-        n, r = normal[3 * LANES * k :], residual[3 * LANES * k :]
-        for lane in range(LANES):
-            v = applied(nine(w, NOMINAL + lane), three(n, lane))
-            r[lane] += factor * v[0]
-            r[LANES + lane] += factor * v[1]
-            r[2 * LANES + lane] += factor * v[2]
+def write_sums(values, w, at):
+    """Write the sums ``(16 * 18,)`` of xi_k s over the Gauss points, of six values s each: ``(8, 96 or more)``."""
+    for i in range(6 * LANES):
+        a, b, c, d = values[0, i], values[1, i], values[2, i], values[3, i]
+        e, f, g, h = values[4, i], values[5, i], values[6, i], values[7, i]
+        w[at + i] = SIDE * ((b - a) + (d - c) + (f - e) + (h - g))
+        w[at + 6 * LANES + i] = SIDE * ((c - a) + (d - b) + (g - e) + (h - f))
+        w[at + 12 * LANES + i] = SIDE * ((e - a) + (f - b) + (g - c) + (h - d))
+
+
+@njit(**LANE_OPTIONS)
+def add_elastic(s, d, c):
+    """Return s + C d, six entries, d with engineering shear; c as in ``kernels.nonlinear.elastic_stress``."""
+    return (
+        s[0] + c[0] * d[0] + c[3] * d[1] + c[5] * d[2],
+        s[1] + c[3] * d[0] + c[1] * d[1] + c[4] * d[2],
+        s[2] + c[5] * d[0] + c[4] * d[1] + c[2] * d[2],
+        s[3] + c[6] * d[3],
+        s[4] + c[7] * d[4],
+        s[5] + c[8] * d[5],
+    )
+
+
+@njit(**LANE_OPTIONS)
+def write_trial(w, elastic):
+    """Write the forces on the modes after an elastic step with modes at rest: (S_k + C T_k) n_k.
+
+    S and T are the sums over the Gauss points of the stresses before the step and of the strain increments.
+    """
+    for lane in range(LANES):
+        u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
+        a = add_elastic(six(w, BEFORE + lane), six(w, SUMS + lane), elastic)
+        b = add_elastic(six(w, BEFORE + 6 * LANES + lane), six(w, SUMS + 6 * LANES + lane), elastic)
+        c = add_elastic(six(w, BEFORE + 12 * LANES + lane), six(w, SUMS + 12 * LANES + lane), elastic)
+        put_three(w, RESIDUAL + lane, applied(full(a), u))
+        put_three(w, RESIDUAL + 3 * LANES + lane, applied(full(b), v))
+        put_three(w, RESIDUAL + 6 * LANES + lane, applied(full(c), t))
+
+
+@njit(**LANE_OPTIONS)
+def strain_of(a, n):
+    """Return minus the symmetric part of a (x) n, six entries with engineering shear."""
+    return (
+        -a[0] * n[0],
+        -a[1] * n[1],
+        -a[2] * n[2],
+        -a[0] * n[1] - a[1] * n[0],
+        -a[1] * n[2] - a[2] * n[1],
+        -a[0] * n[2] - a[2] * n[0],
+    )
+
+
+@njit(**LANE_OPTIONS)
+def add_remainder(w, energy):
+    """Subtract the work ``(16,)`` of the mean forces of a step on the modes."""
+    for lane in range(LANES):
+        total = 0.0
+        for k in range(0, 18 * LANES, LANES):
+            total += (w[BEFORE + k + lane] + w[AFTER + k + lane]) * w[SUMS + k + lane]
+        energy[lane] -= 0.5 * total
 
 
 @njit(**LANE_OPTIONS)
@@ -79,28 +125,17 @@ def elastic_block(m, n, elastic):
 
 
 @njit(**LANE_OPTIONS)
-def push_normals(frame, normals):
-    """Turn N_k into U_0^-1 N_k, in place; U_0 is in the frame behind the rotation."""
-    for k in range(3):
-        v = normals[3 * LANES * k :]
-        for lane in range(LANES):
-            u = six(frame, 9 * LANES + lane)
-            c = cofactor_symmetric(u)
-            scale = 1.0 / (u[0] * c[0] + u[3] * c[3] + u[5] * c[5])
-            put_three(v, lane, applied(scaled(scale, full(c)), three(v, lane)))
-
-
-@njit(**LANE_OPTIONS)
-def write_operator(n, coupling, elastic, result):
-    """Write the six different 3 x 3 blocks of the modes' elastic operator ``(16 * 54,)``, order xx yy zz xy yz xz."""
-    c = (
-        elastic[0], elastic[1], elastic[2], elastic[3], elastic[4], elastic[5], elastic[6], elastic[7], elastic[8],
-    )  # fmt: skip
-    for k, m, place in PAIRS:
-        first, second, block = n[3 * LANES * k :], n[3 * LANES * m :], result[9 * LANES * place :]
-        factor = coupling[LANES * place :]
-        for lane in range(LANES):
-            put_nine(block, lane, scaled(factor[lane], elastic_block(three(first, lane), three(second, lane), c)))
+def write_operator(w, coupling, elastic):
+    """Write the six different 3 x 3 blocks of the modes' elastic operator, order xx yy zz xy yz xz."""
+    for lane in range(LANES):
+        u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
+        c = six(coupling, lane)
+        put_nine(w, OPERATOR + lane, scaled(c[0], elastic_block(u, u, elastic)))
+        put_nine(w, OPERATOR + 9 * LANES + lane, scaled(c[1], elastic_block(v, v, elastic)))
+        put_nine(w, OPERATOR + 18 * LANES + lane, scaled(c[2], elastic_block(t, t, elastic)))
+        put_nine(w, OPERATOR + 27 * LANES + lane, scaled(c[3], elastic_block(u, v, elastic)))
+        put_nine(w, OPERATOR + 36 * LANES + lane, scaled(c[4], elastic_block(v, t, elastic)))
+        put_nine(w, OPERATOR + 45 * LANES + lane, scaled(c[5], elastic_block(u, t, elastic)))
 
 
 @njit(**LANE_OPTIONS)
@@ -127,45 +162,23 @@ def less(v, m, u):
 
 
 @njit(**LANE_OPTIONS)
-def correct_modes(operator, residual, modes, change):
-    """Subtract the operator's inverse times the residual ``(16 * 9,)``, the change, from the modes, by blocks."""
+def solve_modes(w):
+    """Replace the sums of strains by those of minus the modes that the operator finds to the residual, by blocks."""
     for lane in range(LANES):
-        a12, a23 = nine(operator, 27 * LANES + lane), nine(operator, 36 * LANES + lane)
-        a13 = nine(operator, 45 * LANES + lane)
-        i1 = inverse(nine(operator, lane))
+        a12, a23 = nine(w, OPERATOR + 27 * LANES + lane), nine(w, OPERATOR + 36 * LANES + lane)
+        a13 = nine(w, OPERATOR + 45 * LANES + lane)
+        i1 = inverse(nine(w, OPERATOR + lane))
         l21, l31 = times(transposed(a12), i1), times(transposed(a13), i1)
-        i2 = inverse(minus(nine(operator, 9 * LANES + lane), times(l21, a12)))
+        i2 = inverse(minus(nine(w, OPERATOR + 9 * LANES + lane), times(l21, a12)))
         a23 = minus(a23, times(l21, a13))
         l32 = times(transposed(a23), i2)
-        i3 = inverse(minus(minus(nine(operator, 18 * LANES + lane), times(l31, a13)), times(l32, a23)))
-        r1 = three(residual, lane)
-        r2 = less(three(residual, 3 * LANES + lane), l21, r1)
-        r3 = less(less(three(residual, 6 * LANES + lane), l31, r1), l32, r2)
+        i3 = inverse(minus(minus(nine(w, OPERATOR + 18 * LANES + lane), times(l31, a13)), times(l32, a23)))
+        r1 = three(w, RESIDUAL + lane)
+        r2 = less(three(w, RESIDUAL + 3 * LANES + lane), l21, r1)
+        r3 = less(less(three(w, RESIDUAL + 6 * LANES + lane), l31, r1), l32, r2)
         x3 = applied(i3, r3)
         x2 = applied(i2, less(r2, a23, x3))
         x1 = applied(i1, less(less(r1, a12, x2), a13, x3))
-        put_three(change, lane, x1)
-        put_three(change, 3 * LANES + lane, x2)
-        put_three(change, 6 * LANES + lane, x3)
-    for k in range(0, 9 * LANES, LANES):
-        for lane in range(LANES):
-            modes[k + lane] -= change[k + lane]
-
-
-@njit(**LANE_OPTIONS)
-def add_remainder(residual, change, before, energy):
-    """Add the work of the mean residual of a step on minus the change of the modes; keep the residual."""
-    for lane in range(LANES):
-        total = 0.0
-        for k in range(0, 9 * LANES, LANES):
-            total += (residual[k + lane] + before[k + lane]) * change[k + lane]
-        energy[lane] += 0.5 * total
-    before[:] = residual
-
-
-@njit(**LANE_OPTIONS)
-def write_inverse(normal, result):
-    """Write the inverse of the Jacobian at the centre J_0 from N = -2 det(J_0) J_0^-1: det N = -8 det(J_0)^2."""
-    for lane in range(LANES):
-        n = nine(normal, lane)
-        put_nine(result, lane, scaled(-1.0 / np.sqrt(-0.5 * determinant(n, cofactor(n))), n))
+        put_six(w, SUMS + lane, strain_of(x1, three(w, NORMAL + lane)))
+        put_six(w, SUMS + 6 * LANES + lane, strain_of(x2, three(w, NORMAL + 3 * LANES + lane)))
+        put_six(w, SUMS + 12 * LANES + lane, strain_of(x3, three(w, NORMAL + 6 * LANES + lane)))

@@ -38,12 +38,12 @@ from reflowshock.fem.kernels.nonlinear import (
     STRESS,
     STRETCH,
     elastic_stress,
-    plastic_flow,
     rotate,
     small_increment,
     stretch_increment,
 )
 from reflowshock.fem.kernels.nonlinear_gradient import FINE
+from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, yield_stress
 from reflowshock.fem.kernels.turned_hexahedron import (
     SHIFT,
@@ -195,8 +195,9 @@ def move_centre(blocks, b, path, w):
     else:
         small_increment(point, state)
     elastic_stress(point, state, blocks.elastic[material])
-    weight, law = blocks.weight[blocks.pattern[b], 0], (blocks.plastic[material], path.step)
-    plastic_flow(point, state, law, weight, blocks.plastic_work[b])
+    weight, law = blocks.weight[blocks.pattern[b]], law_of(blocks.plastic, material, path.step)
+    if plastic_flow(point, blocks.state[b], 0, law):
+        add_work(point, weight, 0, blocks.plastic_work[b])
     return True
 
 

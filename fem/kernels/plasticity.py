@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from reflowshock.fem.kernels.hexahedron import FINITE
 from reflowshock.fem.materials.parameters import Isotropic, Material
 
 NEVER_YIELDS = np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])  # ``plastic_constants`` of what stays elastic
@@ -98,7 +99,7 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
     return min(x, largest)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FINITE, error_model="numpy")
 def small_power(growth, exponent):
     """Return (1 + growth)^exponent of a growth below ``SMALL_GROWTH``: five terms of its series, to 1e-13."""
     n, e = exponent, growth

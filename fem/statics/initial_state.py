@@ -156,7 +156,7 @@ def begin_path(
     points = HenckyElements.build(term.elements, materials, free_expansion(materials, change)).points(displacement)
     order, state = term.lanes.element, by_lane(term.history["state"])
     state[..., :6] = points.stress[order]
-    state[..., 12] = points.plastic_strain[order]
+    state[..., 6] = points.plastic_strain[order]
     if "hourglass" in term.history:
         term.history["hourglass"][...] = points.hourglass_energy[order]
     if "slip" in term.history:

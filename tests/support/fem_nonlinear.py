@@ -30,14 +30,14 @@ class PointTwin:
         rate = (stretch - self.stretch) @ np.linalg.inv(0.5 * (stretch + self.stretch))
         return voigt(0.5 * (rate + rate.T)[None])[0] * SHEAR_TWICE, stretch, rotation
 
-    def trial(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the elastic trial stress (6,)."""
-        return self.stress + self.elasticity @ self.increment(gradient)[0]
-
     def move(self, gradient: np.ndarray) -> None:
-        """Take the step."""
-        stress = self.trial(gradient)
-        self.stretch = self.increment(gradient)[1]
+        """Take the step to a gradient."""
+        increment, self.stretch, _ = self.increment(gradient)
+        self.take(increment)
+
+    def take(self, increment: np.ndarray) -> None:
+        """Take the step of a strain increment (6,), engineering shear."""
+        stress = self.stress + self.elasticity @ increment
         matrix = symmetric(stress[None])[0]
         pressure = np.trace(matrix) / 3 * np.eye(3)
         mises = np.sqrt(1.5) * np.linalg.norm(matrix - pressure)
@@ -55,64 +55,50 @@ class PointTwin:
 
 
 class HexahedronTwin:
-    """One hexahedron with incompatible modes; formulas of ``kernels_nonlinear_hexahedron``."""
+    """One hexahedron with incompatible modes; formulas of ``kernels.nonlinear_hexahedron``."""
 
     def __init__(self, corners: np.ndarray, material: Material, elasticity: np.ndarray, path: Path) -> None:
-        self.finite, self.elasticity = path.finite, elasticity
-        self.points = [PointTwin(material, elasticity, path.finite, path.step) for _ in range(8)]
-        jacobian = np.array([corners.T @ derivatives for derivatives in shape_derivatives(GAUSS)])
-        self.weight = np.linalg.det(jacobian)
-        self.gradient = shape_derivatives(GAUSS) @ np.linalg.inv(jacobian)
-        derivatives = shape_derivatives(np.zeros((1, 3)))[0]
-        centre = corners.T @ derivatives
-        self.centre = derivatives @ np.linalg.inv(centre)
-        self.normal = -2.0 * np.linalg.det(centre) * np.linalg.inv(centre)
+        self.finite, self.elasticity, self.corners = path.finite, elasticity, corners
+        self.points = [PointTwin(material, elasticity, False, path.step) for _ in range(8)]
+        self.derivatives, self.centre = shape_derivatives(GAUSS), shape_derivatives(np.zeros((1, 3)))[0]
+        self.weight = np.linalg.det(np.einsum("ai,gad->gid", corners, self.derivatives))
         basis, root = np.column_stack([np.ones(8), GAUSS]), np.sqrt(self.weight)[:, None]
         self.fit = basis @ np.linalg.pinv(basis * root) * root.T
-        self.modes = np.zeros((3, 3))
+        self.place = corners
 
     def force(self, displacement: np.ndarray) -> np.ndarray:
         """Return the internal force (8, 3) of the next step."""
-        unit = np.eye(3) if self.finite else np.zeros((3, 3))
-        compatible = unit + np.einsum("ai,gaj->gij", displacement, self.gradient)
-        rotation, stretch = polar(unit + displacement.T @ self.centre) if self.finite else (np.eye(3), np.eye(3))
-        shapes = GAUSS[:, :, None] * self.normal / self.weight[:, None, None]
-        gradients, total = self.deformations(compatible, rotation, shapes)
-        stress = np.array([p.trial(f) for p, f in zip(self.points, gradients, strict=True)])
-        residual = np.einsum("g,gij,gkj->ki", self.weight, self.nominals(gradients, total, stress)[0], shapes)
-        strain = strain_matrix(shapes @ np.linalg.inv(stretch).T)
-        operator = np.einsum("g,gia,ij,gjb->ab", self.weight, strain, self.elasticity, strain)
-        self.modes = self.modes - np.linalg.solve(operator, (residual @ rotation).ravel()).reshape(3, 3)
-        gradients, total = self.deformations(compatible, rotation, shapes)
-        for point, gradient in zip(self.points, gradients, strict=True):
-            point.move(gradient)
-        stress = np.array([p.stress for p in self.points])
-        nominal, pressure = self.nominals(gradients, total, stress)
-        change = self.fit @ pressure - pressure
-        cofactor = np.linalg.det(compatible)[:, None, None] * np.linalg.inv(compatible).transpose(0, 2, 1)
-        nominal = nominal + change[:, None, None] * (cofactor if self.finite else np.eye(3))
-        return np.einsum("g,gij,gaj->ai", self.weight, nominal, self.gradient)
-
-    def deformations(
-        self, compatible: np.ndarray, rotation: np.ndarray, shapes: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return what goes to the material, and the total deformation before its dilatation is changed."""
-        total = compatible + np.einsum("ki,gkj->gij", self.modes @ rotation.T, shapes)
-        if not self.finite:
-            trace = np.trace(compatible, axis1=1, axis2=2)
-            return total + (self.fit @ trace - trace)[:, None, None] / 3 * np.eye(3), total
-        own = np.linalg.det(compatible)
-        ratio = (np.linalg.det(total) + self.fit @ own - own) / np.linalg.det(total)
-        return np.cbrt(ratio)[:, None, None] * total, total
-
-    def nominals(self, gradients: np.ndarray, total: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return P on the total deformation (8, 3, 3), and p / J' (8,)."""
+        place, rotation = self.corners + displacement, np.eye(3)
+        if self.finite:
+            rotation = polar(place.T @ self.centre @ np.linalg.inv(self.corners.T @ self.centre))[0]
+        place = place @ rotation
+        middle = 0.5 * (place + self.place) if self.finite else self.corners
+        strain = self.compatible(middle, place - self.place)
+        self.place = place
+        for point, increment in zip(self.points, strain + self.modes(middle, strain), strict=True):
+            point.take(increment)
+        stress = np.array([point.stress for point in self.points])
         pressure = stress[:, :3].mean(axis=1)
-        if not self.finite:
-            return symmetric(stress), pressure
-        mean = np.linalg.det(gradients)
-        cube = mean / np.linalg.det(total)
-        shifted = stress + np.outer(pressure / cube - pressure, [1, 1, 1, 0, 0, 0])
-        points = zip(self.points, gradients, shifted, strict=True)
-        plain = np.array([point.nominal(gradient, one) for point, gradient, one in points])
-        return np.cbrt(cube)[:, None, None] * plain, pressure / mean
+        loads = symmetric(stress + np.outer(self.fit @ pressure - pressure, [1, 1, 1, 0, 0, 0]))
+        gradients = self.gradients(place if self.finite else self.corners)
+        return np.einsum("g,gij,gaj->ai", self.weight, loads, gradients) @ rotation.T
+
+    def gradients(self, place: np.ndarray) -> np.ndarray:
+        """Return the gradients (8, 8, 3) of the shape functions at the Gauss points of a deformed element."""
+        return self.derivatives @ np.linalg.inv(np.einsum("ai,gad->gid", place, self.derivatives))
+
+    def compatible(self, middle: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return strain increments (8, 6) with fitted dilatation, engineering shear."""
+        rate = np.einsum("ai,gaj->gij", change, self.gradients(middle))
+        trace = np.trace(rate, axis1=1, axis2=2)
+        rate = rate + (self.fit @ trace - trace)[:, None, None] / 3 * np.eye(3)
+        return voigt(0.5 * (rate + rate.transpose(0, 2, 1))) * SHEAR_TWICE
+
+    def modes(self, middle: np.ndarray, strain: np.ndarray) -> np.ndarray:
+        """Return the strain increments (8, 6) of the modes: a Newton step from an elastic trial."""
+        normal = np.linalg.inv(middle.T @ self.centre)
+        shapes = strain_matrix(GAUSS[:, :, None] * normal / self.weight[:, None, None])
+        trial = np.array([point.stress for point in self.points]) + strain @ self.elasticity
+        residual = np.einsum("g,gia,gi->a", self.weight, shapes, trial)
+        operator = np.einsum("g,gia,ij,gjb->ab", self.weight, shapes, self.elasticity, shapes)
+        return -shapes @ np.linalg.solve(operator, residual)
