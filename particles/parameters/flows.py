@@ -22,8 +22,10 @@ class MethodNumerics(Parameters):
 
     The smoothing length is over the spacing of the particles, the speed of sound over the largest speed expected;
     density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
+    Sums over pairs run on threads of the processor, or on a GPU (cuda).
     """
 
+    device: Literal["cpu", "cuda"] = "cpu"
     kernel: Literal["cubic_spline", "wendland"] = "cubic_spline"
     smoothing_length: float = Field(1.3, ge=1.0, le=2.5)
     sound_speed: float = Field(10.0, ge=5, le=100)

@@ -49,7 +49,7 @@ def dam(scene: DamBreak) -> Simulation:
     outside = (block[0] < 0.0) | (block[0] > length * spacing) | (block[2] < 0.0)
     pressure = scene.density * scene.gravity * (scene.height - liquid[2])
     fields = flow.liquid_and_walls(liquid, block[:, outside], pressure, law)
-    return Simulation(fields, liquid.shape[1], law)
+    return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
 
 def tank_columns(scene: DamBreak) -> int:

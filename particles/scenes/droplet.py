@@ -68,7 +68,7 @@ def droplet(scene: Droplet) -> Simulation:
     surface = LiquidSurface(*triangles, tension, cos(scene.angle), law)
     for _ in range(ENCLOSURES):
         surface.enclose(scene.volume)
-    return Simulation(fields, points.shape[1], law, surface)
+    return Simulation(fields, points.shape[1], law, surface, flow.device_of(scene))
 
 
 def _start(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:

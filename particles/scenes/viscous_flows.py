@@ -50,7 +50,7 @@ def channel(scene: Poiseuille) -> Simulation:
     liquid = flow.lattice(columns, np.arange(across), scene.spacing)
     walls = flow.lattice(columns, np.concatenate((-1 - beside, across + beside)), scene.spacing)
     fields = flow.liquid_and_walls(liquid, walls, np.zeros(liquid.shape[1]), law)
-    return Simulation(fields, liquid.shape[1], law)
+    return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
 
 def solve_taylor_green(
@@ -90,4 +90,4 @@ def vortices(scene: TaylorGreen) -> Simulation:
     u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)
     fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
     fields.u[:], fields.w[:] = scene.speed * u, scene.speed * w
-    return Simulation(fields, liquid.shape[1], law)
+    return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))

@@ -13,9 +13,9 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.simulation import Loops, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
-from reflowshock.particles.sph.threads import threads_for
+from reflowshock.particles.sph.threads import ThreadLoops, threads_for
 
 PICTURES = 24
 SAMPLES = 2000
@@ -140,6 +140,19 @@ def _flow_until(
             checkpoint.write(run.saved())
         if progress is not None:
             progress(min(1.0, simulation.time / until))
+
+
+def device_of(scene: SphFlow) -> Callable[[Law], Loops]:
+    """Return what runs the loops of a flow; a GPU is looked for only where one is asked for.
+
+    Raises:
+        NoDeviceError: there is none.
+    """
+    if scene.numerics.device == "cpu":
+        return ThreadLoops
+    from reflowshock.particles.sph.cuda_loops import CudaLoops
+
+    return CudaLoops
 
 
 def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:

@@ -4,10 +4,11 @@ E = gamma (A_free - cos(theta) A_wet). Vertices move with the particles beside t
 them by the same weights (`surface_loops.py`): what the surface loses, the particles gain, so that a drop comes to rest.
 The contact angle is nowhere set: it is the balance of the forces on the contact line.
 
-Particles at a free surface lack neighbours, and what their pressure transmits ends some `DEPTH` below the surface: in a
-sphere it balances tension on the surface only if it is too high by 2 x DEPTH / R, at any resolution. The tension that
-acts is therefore gamma (1 - DEPTH x mean curvature), of the whole surface. DEPTH was found once, with spheres of 12
-particles an edge of the cube of their volume; it is no parameter of a case, and vanishes with the spacing.
+Particles at a free surface lack neighbours, and what their pressure transmits ends below the surface, by a depth of
+`DEPTH` smoothing lengths: in a sphere it balances tension on the surface only if it is too high by 2 x depth / R, at
+any resolution. The tension that acts is therefore gamma (1 - depth x mean curvature), of the whole surface; wetting
+acts as it is, which the balance of a cap asks for. DEPTH was found once, with spheres of 12 particles an edge of the
+cube of their volume and the cubic spline; it is no parameter of a case, and the depth vanishes with the spacing.
 
 A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
 have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
@@ -30,8 +31,10 @@ from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between
 from reflowshock.particles.surface.level_set import Grid, extract_surface, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
-# In spacings of the particles: edges of triangles, how far below the surface pressure ends, the skin of the lists.
-EDGE, DEPTH, SKIN = 1.2, 0.243, 0.5
+# Of the smoothing length: how far below the surface pressure ends.
+DEPTH = 0.187
+# In spacings of the particles: edges of triangles, the skin of the lists.
+EDGE, SKIN = 1.2, 0.5
 # The same: triangles lower than this above the wall are on it; no air is followed that would have to leave.
 TOUCH = 0.3
 # Steps after which triangles are evened out.
@@ -121,7 +124,7 @@ class LiquidSurface:
     def forces(self) -> Floats:
         """Forces -dE/dx on the vertices `(m, 3)` [N]; those of contact lines along the wall, which holds them."""
         steep = area_gradient(self.points, self.triangles)
-        tension = self.tension * (1.0 - DEPTH * self.law.spacing * self._mean_curvature(steep))
+        tension = self.tension * (1.0 - DEPTH * self.law.length * self._mean_curvature(steep))
         result = -tension * steep
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)

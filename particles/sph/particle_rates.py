@@ -24,6 +24,12 @@ def across(distance, period):
 
 
 @njit(cache=True)
+def positive(value):
+    """Return a value, or zero where it is negative; Numba 0.68 cannot compile `max` for a GPU."""
+    return value if value > 0.0 else 0.0
+
+
+@njit(cache=True)
 def seen(n, i, neighbours, mirror):
     """Return the n-th that a particle sees, and -1 for an image, else 1: two of each at a mirror, and its own."""
     row = n >> mirror
@@ -78,7 +84,7 @@ def rates_of(i, fluids, neighbours, fields, law):
             k = j - fluids
             closing = (u - fields.wall_u[k]) * dx + (v - fields.wall_v[k]) * dy + (w - fields.wall_w[k]) * dz
         rate += pair_terms.continuity(closing, steep, volume, density)
-        own = max(pressure, 0.0) if law.has_surface and not liquid else pressure  # walls do not pull
+        own = positive(pressure) if law.has_surface and not liquid else pressure  # walls do not pull
         other = fields.pressure[j] + (side - 1.0) * law.gravity_z * fields.z[j] * beside  # an image has more weight
         push = pair_terms.pressure(own, other, steep, volume, density)
         if law.artificial > 0.0 and liquid:
@@ -174,4 +180,4 @@ def wall_values(i, fluids, neighbours, fields, law):
         return 0.0, fields.wall_u[k], fields.wall_v[k], fields.wall_w[k]
     u, v, w = 2.0 * fields.wall_u[k] - u / total, 2.0 * fields.wall_v[k] - v / total, 2.0 * fields.wall_w[k] - w / total
     pressure /= total
-    return max(pressure, 0.0) if law.has_surface else pressure, u, v, w
+    return positive(pressure) if law.has_surface else pressure, u, v, w

@@ -1,18 +1,18 @@
 """Steps with time: velocity Verlet, one loop over the pairs a step."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.parameters.flows import largest_time_step
-from reflowshock.particles.sph import threads
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.threads import ThreadLoops
 
 # Of the smoothing length: how far beyond their support particles are listed.
 SKIN = 0.3
@@ -68,6 +68,16 @@ class Rows:
         return points, source
 
 
+class Loops(Protocol):
+    """The loops over particles of a law, on some device; see `threads.ThreadLoops`."""
+
+    def find_rates(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, rates: Floats, /) -> None:
+        """Write the rates `(10, n)` of the liquid."""
+
+    def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
+        """Write pressures and velocities `(4, m)` of walls."""
+
+
 @dataclass(slots=True)
 class Simulation:
     """A fluid between walls that moves.
@@ -77,6 +87,7 @@ class Simulation:
         fluids: number of particles that are liquid.
         law: what acts between two particles.
         surface: with tension; None where none acts.
+        device: makes the loops of a law.
         rows: neighbours.
         rates: `(10, n)` of the last positions, as `rates_of` returns them.
         time: [s].
@@ -87,14 +98,17 @@ class Simulation:
     fluids: int
     law: Law
     surface: LiquidSurface | None = None
+    device: Callable[[Law], Loops] = ThreadLoops
     rows: Rows = field(init=False)
     rates: Floats = field(init=False)
+    loops: Loops = field(init=False)
     time: float = 0.0
     steps: int = 0
 
     def __post_init__(self) -> None:
         self.rows = Rows(self.law)
         self.rates = np.zeros((RATES, self.fluids))
+        self.loops = self.device(self.law)
         self._find_rates()
 
     @property
@@ -167,7 +181,7 @@ class Simulation:
         self.rows.update(np.array(fields[:3]))
         fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)
         self._extend_to_walls()
-        threads.find_rates(self.fluids, self.rows.lists, fields, law, self.rates)
+        self.loops.find_rates(self.fluids, self.rows.lists, fields, self.rates)
         self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
         if self.surface:
             self.surface.add_to(self.rates, fields, self.fluids)
@@ -178,7 +192,7 @@ class Simulation:
         """Give the particles of walls the pressure of the liquid beside them, and the velocity that viscosity sees."""
         fields, law, walls = self.fields, self.law, slice(self.fluids, None)
         found = np.empty((4, len(fields.x) - self.fluids))
-        threads.find_wall_values(self.fluids, self.rows.lists, fields, law, found)
+        self.loops.find_wall_values(self.fluids, self.rows.lists, fields, found)
         fields.pressure[walls], fields.u[walls], fields.v[walls], fields.w[walls] = found
         fields.density[walls] = law.rest_density + found[0] / law.sound**2
 

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 
 from numba import get_num_threads, njit, prange, set_num_threads
 
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.particle_rates import rates_of, wall_values
 
 # With fewer particles a thread more costs more than it brings.
@@ -25,9 +27,23 @@ def threads_for(particles: int) -> Iterator[None]:
         set_num_threads(before)
 
 
+class ThreadLoops:
+    """The loops over particles of a law, on threads."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+
+    def find_rates(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, rates: Floats) -> None:
+        """Write what `rates_of` returns of each particle of the liquid into rows of ``rates`` `(10, n)`."""
+        _find_rates(fluids, lists, fields, self._law, rates)
+
+    def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
+        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(4, m)`."""
+        _find_wall_values(fluids, lists, fields, self._law, found)
+
+
 @njit(cache=True, parallel=True)
-def find_rates(fluids, lists, fields, law, rates):
-    """Write what `rates_of` returns of each particle of the liquid into rows of ``rates`` `(10, n)`."""
+def _find_rates(fluids, lists, fields, law, rates):
     offsets, indices = lists
     for i in prange(fluids):
         found = rates_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
@@ -36,8 +52,7 @@ def find_rates(fluids, lists, fields, law, rates):
 
 
 @njit(cache=True, parallel=True)
-def find_wall_values(fluids, lists, fields, law, found):
-    """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(4, m)`."""
+def _find_wall_values(fluids, lists, fields, law, found):
     offsets, indices = lists
     for i in prange(fluids, fields.x.shape[0]):
         values = wall_values(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)

@@ -32,7 +32,7 @@ def test_a_drop_has_its_volume_and_its_surface_encloses_it():
 
 def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy():
     surface = droplet(drop(contact_angle=1.0)).surface
-    surface.law = surface.law._replace(spacing=0.0)  # tension is not lessened
+    surface.law = surface.law._replace(length=0.0)  # tension is not lessened
     forces, random = surface.forces(), np.random.default_rng(5)
     direction = random.normal(size=surface.points.shape)
     for ring in surface.rings:
@@ -46,7 +46,7 @@ def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy():
     work = -(energies[0] - energies[1]) / (2.0 * step)
     assert work == pytest.approx((forces * direction).sum(), rel=1e-6)
     free = droplet(drop()).surface
-    free.law = free.law._replace(spacing=0.0)
+    free.law = free.law._replace(length=0.0)
     assert np.abs(free.forces().sum(axis=0)).max() < 1e-12
 
 
