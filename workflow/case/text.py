@@ -6,24 +6,21 @@ CHECK_UNITS = {
     r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz",
     r"standoff_spread_.*": "m",
 }  # fmt: skip
-LONGEST_IN_MS = 0.1
-LEAST_IN_NEWTON = 1.0
+# Below so much another unit reads better.
+LESS = {"s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "Pa": ((1e4, 1e-3, "kPa"),), "N": ((1.0, 1e3, "mN"),)}
 SHOWN = {
     "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm³"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m³"),
-    "N": (1e3, "mN"), "N m": (1e3, "N mm"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
+    "N m": (1e3, "N mm"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
 }  # fmt: skip
 
 
 def quantity(metric: dict) -> str:
-    """Text of a metric record: fractions as per cent, stresses in MPa, lengths in mm, small forces in mN."""
+    """Text of a metric record: fractions as per cent, stresses in MPa or kPa, lengths in mm, small forces in mN."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
-    if unit == "s" and 0.0 < value < LONGEST_IN_MS:
-        return f"{number(1e3 * value)} ms"
-    if unit == "N" and abs(value) >= LEAST_IN_NEWTON:
-        return f"{number(value)} N"
-    factor, shown = SHOWN.get(unit, (1.0, unit))
+    smaller = ((factor, shown) for least, factor, shown in LESS.get(unit, ()) if 0.0 < abs(value) < least)
+    factor, shown = next(smaller, SHOWN.get(unit, (1.0, unit)))
     return f"{number(factor * value)} {shown}".strip()
 
 
