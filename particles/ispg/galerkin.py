@@ -1,8 +1,8 @@
 """Space of the Galerkin scheme: linear MLS of the velocity, direct nodal integration, walls mirrored.
 
-Coefficients of a velocity are even along a wall and odd across it, so that nothing passes a wall. The operators act
-without being assembled; the transposed of each is made of the same weights, so that what a force does to coefficients
-is the virtual power of the velocity that they give, to rounding.
+Velocities of particles are even along a wall and odd across it, so that nothing passes a wall. The operators act
+without being assembled; the transposed of each is made of the same weights, so that what a force or stress does to the
+particles is its virtual power, to rounding.
 """
 
 from dataclasses import dataclass
@@ -72,36 +72,36 @@ class Galerkin:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
         return self.shape @ coefficients[np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))]
 
-    def velocity(self, field: Floats) -> Floats:
-        """Velocity `(n, 3)` [m/s] of coefficients."""
-        return self.shape @ self._with_images(field)
+    def rough(self, field: Floats) -> Floats:
+        """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
+        return field - self.shape @ self._with_images(field)
 
-    def load_forces(self, force: Floats) -> Floats:
-        """The transposed of `velocity`: forces `(n, 3)` [N] on coefficients of forces on the particles."""
-        return self._folded(self.shape.T @ force)
+    def load_rough(self, force: Floats) -> Floats:
+        """The transposed of `rough`: forces on the particles `(n, 3)` [N]."""
+        return force - self._folded(self.shape.T @ force)
 
-    def values(self, field: Floats) -> tuple[Floats, Floats]:
-        """Velocity `(n, 3)` [m/s] and its gradient `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, of coefficients."""
-        return kernels.velocity_and_gradient(self.starts, self.columns, self.weights, self._with_images(field))
+    def gradient(self, field: Floats) -> Floats:
+        """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
+        return kernels.velocity_gradient(self.starts, self.columns, self.weights, self._with_images(field))
 
-    def load(self, force: Floats, stress: Floats) -> Floats:
-        """Forces `(n, 3)` [N] on coefficients of forces `(n, 3)` [N] and stresses times volume `(n, 3, 3)` [N m]."""
+    def load(self, stress: Floats) -> Floats:
+        """The transposed of `gradient`: forces on particles `(n, 3)` [N] of stresses times volume `(n, 3, 3)` [N m]."""
         result = self._nothing()
-        kernels.forces_of(self.starts, self.columns, self.weights, (force, stress), result)
+        kernels.forces_of(self.starts, self.columns, self.weights, stress, result)
         return self._folded(result)
 
     def divergence(self, field: Floats) -> Floats:
-        """Divergence of coefficients at the particles `(n,)` [1/s]."""
+        """Divergence of a velocity at the particles `(n,)` [1/s]."""
         return kernels.divergence(self.starts, self.columns, self.weights, self._with_images(field))
 
     def divergence_load(self, factor: Floats) -> Floats:
-        """The transposed of `divergence`: forces on the coefficients `(n, 3)` of factors `(n,)` [N m]."""
+        """The transposed of `divergence`: forces on the particles `(n, 3)` [N] of factors `(n,)` [N m]."""
         result = self._nothing()
         kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
         return self._folded(result)
 
     def divergence_rows(self) -> sparse.csr_matrix:
-        """Rows of `divergence` as a matrix `(n, 3 n)`, coefficients by particle."""
+        """Rows of `divergence` as a matrix `(n, 3 n)`, velocities by particle."""
         count = len(self.starts) - 1
         columns = (3 * self.columns[:, None] + np.arange(3, dtype=np.int32)).ravel()
         size = 3 * (count + len(self.ghosts.source))
@@ -109,7 +109,7 @@ class Galerkin:
         return rows @ self._reflection(count)
 
     def _reflection(self, count: int) -> sparse.csr_matrix:
-        """Extension of coefficients by their images, `(3 (n + g), 3 n)`."""
+        """Extension of velocities by their images, `(3 (n + g), 3 n)`."""
         blocks = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), self.ghosts.reflection))
         source = np.concatenate((np.arange(count), self.ghosts.source))
         starts = np.arange(len(source) + 1)

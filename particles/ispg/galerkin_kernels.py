@@ -138,19 +138,16 @@ def shape_rows(points, lists, squares, starts, shares):
 
 
 @njit(cache=True)
-def velocity_and_gradient(starts, columns, weights, field):
-    """Velocity `(n, 3)` and velocity gradient `(n, 3, 3)`, [i, c, d] = d v_c / d x_d, of coefficients `(n + g, 3)`."""
+def velocity_gradient(starts, columns, weights, field):
+    """Velocity gradient `(n, 3, 3)`, [i, c, d] = d v_c / d x_d, of velocities `(n + g, 3)`."""
     count = starts.shape[0] - 1
-    velocity, gradient = np.empty((count, 3)), np.empty((count, 3, 3))
+    gradient = np.empty((count, 3, 3))
     for i in range(count):
-        u0 = u1 = u2 = g00 = g01 = g02 = g10 = g11 = g12 = g20 = g21 = g22 = 0.0
+        g00 = g01 = g02 = g10 = g11 = g12 = g20 = g21 = g22 = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, w = columns[k], weights[k]
-            w0, wx, wy, wz = w[0], w[1], w[2], w[3]
+            wx, wy, wz = w[1], w[2], w[3]
             x, y, z = field[j, 0], field[j, 1], field[j, 2]
-            u0 += w0 * x
-            u1 += w0 * y
-            u2 += w0 * z
             g00 += wx * x
             g01 += wy * x
             g02 += wz * x
@@ -160,34 +157,31 @@ def velocity_and_gradient(starts, columns, weights, field):
             g20 += wx * z
             g21 += wy * z
             g22 += wz * z
-        velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
         gradient[i, 0, 0], gradient[i, 0, 1], gradient[i, 0, 2] = g00, g01, g02
         gradient[i, 1, 0], gradient[i, 1, 1], gradient[i, 1, 2] = g10, g11, g12
         gradient[i, 2, 0], gradient[i, 2, 1], gradient[i, 2, 2] = g20, g21, g22
-    return velocity, gradient
+    return gradient
 
 
 @njit(cache=True)
-def forces_of(starts, columns, weights, loads, result):
-    """Add the transposed: forces on coefficients `(n + g, 3)` of forces `(n, 3)` and stresses `(n, 3, 3)`."""
-    force, stress = loads
+def forces_of(starts, columns, weights, stress, result):
+    """Add the transposed: forces on particles and images `(n + g, 3)` of stresses `(n, 3, 3)`."""
     for i in range(starts.shape[0] - 1):
-        f0, f1, f2 = force[i, 0], force[i, 1], force[i, 2]
         s = stress[i]
         s00, s01, s02 = s[0, 0], s[0, 1], s[0, 2]
         s10, s11, s12 = s[1, 0], s[1, 1], s[1, 2]
         s20, s21, s22 = s[2, 0], s[2, 1], s[2, 2]
         for k in range(starts[i], starts[i + 1]):
             j, w = columns[k], weights[k]
-            w0, wx, wy, wz = w[0], w[1], w[2], w[3]
-            result[j, 0] += w0 * f0 + wx * s00 + wy * s01 + wz * s02
-            result[j, 1] += w0 * f1 + wx * s10 + wy * s11 + wz * s12
-            result[j, 2] += w0 * f2 + wx * s20 + wy * s21 + wz * s22
+            wx, wy, wz = w[1], w[2], w[3]
+            result[j, 0] += wx * s00 + wy * s01 + wz * s02
+            result[j, 1] += wx * s10 + wy * s11 + wz * s12
+            result[j, 2] += wx * s20 + wy * s21 + wz * s22
 
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Divergence `(n,)` of coefficients `(n + g, 3)`."""
+    """Divergence `(n,)` of velocities `(n + g, 3)`."""
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):

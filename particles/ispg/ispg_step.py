@@ -1,10 +1,9 @@
 """ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, with BDF2 in time.
 
-A particle moves with the velocity N v that the shape functions show at it; the coefficients v are carried from step to
-step, so that nothing is interpolated. What evening out and the shift of particles below the surface displace takes
-the velocity there. The smoothing is part of the equations: a friction on v - N v, which vanishes for linear velocities,
-so that momentum and angular momentum stay; it acts at the rate at which the capillary waves of the grid swing, whatever
-the time step.
+Particles move with their own velocities v, which the shape functions N differentiate; nothing is interpolated from step
+to step. What evening out and the shift of particles below the surface displace takes the velocity there. The smoothing
+is part of the equations: a friction on v - N v, which vanishes for linear velocities, so that momentum and angular
+momentum stay; its rate is a multiple of the frequency of the grid's capillary waves, whatever the time step.
 
 As in `inertial_step`, forces and operators are taken at predicted positions, and the implicit surface tension acts on
 the change of the velocity only.
@@ -15,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats
@@ -33,8 +33,9 @@ from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
-# Of the frequency sqrt(gamma / (rho h^3)).
-SMOOTHING = 1.0
+# Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
+# At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
+SMOOTHING = 10.0
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
 
@@ -47,7 +48,7 @@ class LostEnergy:
         viscous: to viscosity.
         smoothing: to the smoothing of velocities.
         integration: to the time integration: of the momentum, and of the way that the forces act along.
-        transfer: to the shift of particles, which take the velocity where they come, and to new shape functions.
+        transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
     """
 
@@ -69,22 +70,24 @@ class GalerkinPast:
 
     Attributes:
         points: `(n, 3)` where it took the particles [m].
-        coefficients: `(n, 3)` of the velocity [m/s].
-        gradient: `(n, 3, 3)` of the velocity at the particles [1/s].
+        velocity: `(n, 3)` of the particles [m/s].
+        gradient: `(n, 3, 3)` of the velocity [1/s].
         kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
         pressure: `(n,)` coefficients [Pa].
-        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s]; None before the first step.
-        history: its displacement and change of the coefficients.
+        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
+        momenta_change: of these in it, `(6,)`.
+        history: its displacement and change of the velocity.
         losses: of all steps.
     """
 
     points: Floats
-    coefficients: Floats
+    velocity: Floats
     gradient: Floats
     kinetic: float | None
     potential: float
     pressure: Floats
-    momenta: Floats | None
+    momenta: Floats
+    momenta_change: Floats
     history: BackwardDifference
     losses: LostEnergy
 
@@ -93,12 +96,13 @@ class GalerkinPast:
         """A body that starts with its velocity, and an energy of the forces [J]."""
         slope, start = np.zeros((len(body.points), 3, 3)), BackwardDifference.start(len(body.points))
         losses = losses or LostEnergy()
-        return cls(body.points, body.velocity, slope, None, potential, body.pressure, None, start, losses)
+        still = np.zeros(6)
+        return cls(body.points, body.velocity, slope, None, potential, body.pressure, still, still, start, losses)
 
     def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
         """The past of particles that are now elsewhere: they have the velocity there."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        return replace(self, points=body.points, coefficients=physics.admit(body, self.coefficients + change))
+        return replace(self, points=body.points, velocity=physics.admit(body, self.velocity + change))
 
 
 @dataclass(slots=True)
@@ -193,31 +197,39 @@ class PreparedIspgStep:
             NoVolumes: the particles do not fill the body.
         """
         body, past = self.body, self.past
-        base = past.history.base(body.points, past.coefficients, time_step)
+        base = past.history.base(body.points, past.velocity, time_step)
         guess = self._guess(base)
         predicted = replace(body, points=base.points + base.time_step * guess)
         enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
-        lost = self._lost_momentum(equations)
-        past, base = replace(past, coefficients=past.coefficients + lost), replace(base, velocity=base.velocity + lost)
+        if past.kinetic is not None:
+            past, base = self._with_momenta(equations, base)
         force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
         start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
-        coefficients, change = equations.project(start, rate, self.solver.factors)
+        velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
-        velocity, gradient = equations.space.values(coefficients)
         points = base.points + base.time_step * velocity
-        history = BackwardDifference(points - body.points, coefficients - past.coefficients, time_step)
+        history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
-        pull = force - base.time_step * (equations.stiffness @ equations.space.velocity(start))
-        kinetic, potential = equations.kinetic(coefficients), self.physics.energy(replace(body, points=points))
         momenta = rigid_momenta(rigid_motions(points), equations.masses, velocity)
-        losses = self._carried_losses(equations, past.coefficients)
+        losses = self._carried_losses(equations, past.velocity)
+        losses = _step_losses(losses, equations, base, (past.velocity, start, velocity), time_step)
+        potential = self.physics.energy(replace(body, points=points))
+        pull = force - base.time_step * (equations.stiffness @ start)
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
-        losses = replace(losses, integration=losses.integration + self.physics.energy(body) - potential - work)
-        losses = _step_losses(losses, equations, base, (past.coefficients, start, coefficients), time_step)
+        gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
-            points, coefficients, gradient, kinetic, potential, pressure, momenta, history, losses
+            points=points,
+            velocity=velocity,
+            gradient=equations.space.gradient(velocity),
+            kinetic=equations.kinetic(velocity),
+            potential=potential,
+            pressure=pressure,
+            momenta=momenta,
+            momenta_change=gain,
+            history=history,
+            losses=replace(losses, integration=losses.integration + self.physics.energy(body) - potential - work),
         )
         return Motion(
             velocity=velocity,
@@ -228,24 +240,29 @@ class PreparedIspgStep:
             iterations=self.solver.factors.iterations,
         )
 
-    def _lost_momentum(self, equations: GalerkinEquations) -> Floats:
-        """Velocity `(n, 3)` [m/s] that gives back the momenta of the last step along rigid motions that walls admit.
+    def _with_momenta(self, equations: GalerkinEquations, base: Base) -> tuple[GalerkinPast, Base]:
+        """The last velocity, and that of the base, with the momenta of the last steps.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
         """
-        body, momenta = self.body, self.past.momenta
-        motions = rigid_motions(body.points)
-        admitted = [
-            np.allclose(self.physics.admit(body, motion), motion, rtol=0.0, atol=ROUNDING * np.abs(motion).max())
-            for motion in motions
-        ]
-        if momenta is None or not any(admitted):
-            return np.zeros_like(body.points)
-        motions = motions[admitted]
-        masses, velocity = equations.masses, equations.space.values(self.past.coefficients)[0]
-        missing = momenta[admitted] - rigid_momenta(motions, masses, velocity)
-        inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions])
-        return np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
+        past, kept = self.past, self._admitted_motions()
+
+        def corrected(velocity: Floats, momenta: Floats) -> Floats:
+            if not kept.any():
+                return velocity
+            motions = rigid_motions(self.body.points)[kept]
+            missing = momenta[kept] - rigid_momenta(motions, equations.masses, velocity)
+            inertia = np.array([rigid_momenta(motions, equations.masses, motion) for motion in motions])
+            return velocity + np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
+
+        start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
+        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+
+    def _admitted_motions(self) -> NDArray[np.bool_]:
+        """Which rigid motions walls admit, `(6,)`."""
+        motions = rigid_motions(self.body.points)
+        changes = [np.abs(self.physics.admit(self.body, motion) - motion).max() for motion in motions]
+        return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
@@ -263,7 +280,6 @@ class PreparedIspgStep:
         coefficient = sum(part.coefficient for part in tensions)
         fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
-        flux = space.load(body.volume()[1], np.zeros((len(body.points), 3, 3)))
         nothing = sparse.csr_matrix((len(body.points),) * 2)
         return GalerkinEquations(
             space=space,
@@ -271,13 +287,13 @@ class PreparedIspgStep:
             basis=basis,
             spacing=spacing,
             stiffness=sum((part.stiffness(body) for part in tensions), nothing),
-            unbalanced=flux - space.divergence_load(space.volumes),
+            unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
         )
 
-    def _carried_losses(self, equations: GalerkinEquations, coefficients: Floats) -> LostEnergy:
-        """Losses up to this step, which starts with new shape functions and coefficients `(n, 3)`."""
-        past, kinetic = self.past, equations.kinetic(coefficients)
+    def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:
+        """Losses up to this step, which starts with new masses and a velocity `(n, 3)` [m/s]."""
+        past, kinetic = self.past, equations.kinetic(velocity)
         transfer = 0.0 if past.kinetic is None else past.kinetic - kinetic
         evening = past.potential - self.physics.energy(self.body)
         losses = past.losses
@@ -288,16 +304,16 @@ def _step_losses(
     losses: LostEnergy,
     equations: GalerkinEquations,
     base: Base,
-    coefficients: tuple[Floats, Floats, Floats],
+    velocities: tuple[Floats, Floats, Floats],
     time_step: float,
 ) -> LostEnergy:
     """Losses with those of a step [s], but for the way that the forces act along.
 
-    The coefficients `(n, 3)` are the last, predicted and new ones.
+    The velocities `(n, 3)` are the last, predicted and new ones [m/s].
 
     Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
     """
-    last, start, now = coefficients
+    last, start, now = velocities
     power = equations.losses(start, now)
     change = time_step / base.time_step * float((now * equations.momentum(now - base.velocity)).sum())
     gain = equations.kinetic(now) - equations.kinetic(last)

@@ -23,10 +23,12 @@ PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
 STEPS_PER_PERIOD = 60
 
 
-LONG = [pytest.param(*row, marks=pytest.mark.long) for row in ((6, 120.0), (11, 60.0), (11, 120.0))]
+LONG = [
+    pytest.param(*row, marks=pytest.mark.long) for row in ((5, 120.0), (6, 60.0), (7, 60.0), (11, 60.0), (11, 120.0))
+]
 
 
-@pytest.mark.parametrize(("count", "degrees"), [(6, 60.0), *LONG])
+@pytest.mark.parametrize(("count", "degrees"), [(5, 60.0), *LONG])
 def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
     """Values of the paper; its errors at 11 an edge: height 0.87, 2.84 %, width 3.26, 1.17 % at 60 and 120 degrees."""
     angle = float(np.radians(degrees))
@@ -49,7 +51,7 @@ def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
 def test_a_free_drop_swings_with_its_period():
     """Radius, density and surface tension one, 309 particles; Reid's period and decay at the viscosity of real solder.
 
-    The decay is some three times too fast: the ledger says that evening out the triangles takes most.
+    The decay is twice too fast: the ledger says that evening out the triangles takes most of what viscosity does not.
     """
     viscosity, volume = 2e-3, 4.0 / 3.0 * np.pi
     tension, friction = SurfaceTension(1.0), Viscosity(viscosity)
@@ -71,8 +73,10 @@ def test_a_free_drop_swings_with_its_period():
     exact_decay, exact = viscous_oscillation(2, omega, viscosity)
     decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
     assert abs(exact / found - 1.0) < 0.015
-    assert 1.0 < decay / exact_decay < 3.5
+    assert 1.0 < decay / exact_decay < 2.2
     past, first = flow.solver.past, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
+    assert past.losses.viscous / start == pytest.approx(1.0 - np.exp(-2.0 * exact_decay * flow.time), rel=0.1)
+    assert past.losses.smoothing < 0.25 * past.losses.viscous
     gained = swing.energy(ball) - first + past.kinetic - start
     assert abs(gained + past.losses.total) < 0.01 * start

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import cholesky, null_space
+from scipy.linalg import null_space
 
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
@@ -12,7 +12,7 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.gripc_step import force_pressure
-from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.ispg_step import IspgStep, rigid_momenta, rigid_motions
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
@@ -44,22 +44,20 @@ def space(body):
 
 def test_linear_velocities_along_the_wall_are_exact(body, space):
     slope = np.array([[0.3, -0.7, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, -0.8]])
-    velocity, gradient = space.values(body.points @ slope.T + [1.0, -2.0, 0.0])
-    assert velocity == pytest.approx(body.points @ slope.T + [1.0, -2.0, 0.0])
+    velocity = body.points @ slope.T + [1.0, -2.0, 0.0]
+    gradient = space.gradient(velocity)
+    assert space.rough(velocity) == pytest.approx(0.0, abs=1e-9)
     assert gradient == pytest.approx(np.broadcast_to(slope, gradient.shape), abs=1e-9)
     assert space.divergence(body.points @ slope.T) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_loads_are_the_transposed(body, space):
-    """Virtual power: f . N v + s : grad v, and p div v, as matrix and without one."""
+    """Virtual power: f . (v - N v), s : grad v and p div v, as matrix and without one."""
     random = np.random.default_rng(3)
     field, force = random.normal(size=(2, len(body.points), 3))
     stress, factor = random.normal(size=(len(body.points), 3, 3)), random.normal(size=len(body.points))
-    velocity, gradient = space.values(field)
-    power = (force * velocity).sum() + (stress * gradient).sum()
-    assert (space.load(force, stress) * field).sum() == pytest.approx(power)
-    assert space.velocity(field) == pytest.approx(velocity)
-    assert (space.load_forces(force) * field).sum() == pytest.approx((force * velocity).sum())
+    assert (space.load(stress) * field).sum() == pytest.approx((stress * space.gradient(field)).sum())
+    assert (space.load_rough(force) * field).sum() == pytest.approx((force * space.rough(field)).sum())
     assert (space.divergence_load(factor) * field).sum() == pytest.approx(factor @ space.divergence(field))
     assert space.divergence_rows() @ field.ravel() == pytest.approx(space.divergence(field))
 
@@ -73,33 +71,30 @@ def test_volumes_have_the_moments_of_the_body(body, space):
     assert space.volumes.min() > 0.0
 
 
-def test_a_uniform_pressure_pushes_the_surface_only(body, space):
-    """B^T 1 is the load of the gradient of the enclosed volume, whatever nodal integration misses."""
+def test_a_uniform_pressure_pushes_the_surface_only(body):
+    """B^T 1 is the gradient of the enclosed volume, whatever nodal integration misses."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
-    flux = space.load(body.volume()[1], np.zeros((len(body.points), 3, 3)))
-    assert equations.push(np.ones(len(body.points))) == pytest.approx(flux, abs=1e-12)
+    assert equations.push(np.ones(len(body.points))) == pytest.approx(body.volume()[1], abs=1e-12)
 
 
-def test_linear_velocities_have_the_energy_of_the_body_and_none_has_too_little(body):
-    """A stretch: sum of m v v, exact by the moments; rough velocities keep half of their own at least."""
+def test_linear_velocities_have_the_energy_of_the_body(body):
+    """A stretch: sum of m v v, exact by the moments."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
-    stretch = body.points * [1.0, 1.0, -2.0]
     second = np.diag(body_moments(body)[2])
-    assert equations.kinetic(stretch) == pytest.approx(0.5 * (second @ [1.0, 1.0, 4.0]))
-    rough = np.random.default_rng(2).normal(size=body.points.shape)
-    own = 0.5 * float(equations.masses @ (rough**2).sum(axis=1))
-    assert 0.5 * own < equations.kinetic(rough) < 2.0 * own
+    assert equations.kinetic(body.points * [1.0, 1.0, -2.0]) == pytest.approx(0.5 * (second @ [1.0, 1.0, 4.0]))
 
 
-def test_the_projection_solves_with_the_mass(ball):
-    """Accelerations of the change of the pressure: B v is met, and M (v - v*) is dt B^T phi to a percent."""
+def test_the_projection_keeps_the_volumes(ball):
+    """B v is met, the change of momentum is dt B^T phi, and no pressure moves or turns the whole."""
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     start = np.random.default_rng(4).normal(size=body.points.shape)
     field, potential = equations.project(start, 0.0, LaggedCholesky())
     assert equations.constraint(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.constraint(start)).max())
     push = equations.time_step * equations.push(potential)
-    assert np.linalg.norm(equations.momentum(field - start) - push) < 0.02 * np.linalg.norm(push)
+    assert equations.momentum(field - start) == pytest.approx(push, abs=1e-12 * np.abs(push).max())
+    lost = rigid_momenta(rigid_motions(body.points), equations.masses, field - start)
+    assert lost == pytest.approx(0.0, abs=1e-10 * np.abs(push).sum())
 
 
 def test_a_lonely_particle_is_named():
@@ -152,17 +147,53 @@ def shaken_inside(ball):
 
 
 def test_no_mode_of_the_linearised_scheme_grows(ball):
-    """Squares of the frequencies of M v' = -N^T K x + B^T p, x' = N v, B v = 0 at rest; those of order two: 8."""
+    """Squares of the frequencies of m v' = -K x + B^T p, x' = v, B v = 0 at rest; those of order two: 8.
+
+    A mode counts by its share of the linear velocities without divergence; modes of the grid have next to none.
+    """
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     units = np.eye(body.points.size).reshape(-1, *body.points.shape)
-    shown = np.array([equations.space.values(unit)[0].ravel() for unit in units]).T
-    root = np.linalg.inv(cholesky(np.array([equations.momentum(unit).ravel() for unit in units]), lower=True)).T
-    free = null_space(np.array([equations.constraint(unit) for unit in units]).T @ root, rcond=1e-9)
-    scaled = shown @ root
-    squares = np.linalg.eigvalsh(free.T @ scaled.T @ stiffness(body) @ scaled @ free)
+    root = np.repeat(equations.masses, 3) ** -0.5
+    free = null_space(np.array([equations.constraint(unit) for unit in units]).T * root, rcond=1e-9)
+    squares, modes = np.linalg.eigh(free.T @ (root[:, None] * stiffness(body) * root) @ free)
     assert squares.min() > -1e-8
-    assert ((squares > 5.0) & (squares < 8.0)).sum() >= 5
+    shears = [np.eye(3)[:, [k]] * np.eye(3)[k - 1] for k in range(3)]
+    slopes = [np.diag([1.0, -1.0, 0.0]), np.diag([1.0, 1.0, -2.0]), *shears]
+    swings = np.linalg.qr(np.array([(body.points @ (slope + slope.T)).ravel() / root for slope in slopes]).T)[0]
+    share = ((modes.T @ free.T @ swings) ** 2).sum(axis=1)
+    assert share.sum() == pytest.approx(5.0, abs=1e-3)
+    near = (squares > 7.0) & (squares < 9.0)
+    assert share[near].sum() > 4.7
+    assert share @ squares / 5.0 == pytest.approx(8.0, rel=0.02)
+
+
+def test_a_zigzag_of_the_surface_dies_away(ball):
+    """One that the shape functions hardly show; 98 % were left when particles moved with N v."""
+    body = shaken_inside(ball)
+    equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
+    count, zigzag = body.cloud.surface_count, np.zeros_like(body.points)
+    normals = body.volume()[1][:count]
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    signs = np.linalg.svd(equations.space.shape.toarray()[:count, :count])[2][-1]
+    zigzag[:count] = signs[:, None] * normals
+    shown = zigzag - equations.space.rough(zigzag)
+    assert np.abs((shown[:count] * normals).sum(axis=1)).max() < 0.1 * np.abs(signs).max()
+    height = 0.02 * body.cloud.spacing / np.abs(signs).max()
+
+    def moved(displacement):
+        flow = LiquidFlow(replace(body, points=body.points + displacement), water(), time_step(body), IspgStep())
+        for _ in range(20):
+            flow.step()
+        return flow.body.points
+
+    left = moved(height * zigzag) - moved(0.0 * zigzag)
+    assert abs((left * zigzag).sum()) < 0.3 * height
+
+
+def time_step(body):
+    """One that hardly changes."""
+    return TimeStep(0.1, body.cloud.spacing, 0.1)
 
 
 @pytest.mark.parametrize("basis", ["linear", "quadratic"])

@@ -208,8 +208,7 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop.contact_angle=148 deg", "contact angles outside 60 deg to 120 deg"),
         ("solder.wall=no-slip", "free slip only"),
         ("drop={volume='1 mm^3'}", "free drops"),
-        ("drop.particles_per_edge=13", "13 particles along an edge (for 6 and 11 it is)"),
-        ("drop.particles_per_edge=7", "7 particles along an edge (for 6 and 11 it is)"),
+        ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
 )
