@@ -145,7 +145,7 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     return (
         simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
-        float(surface.points[:, 2].max()) / scene.diameter, float(np.sqrt(squares.max())),
+        _height(scene, surface.points) / scene.diameter, float(np.sqrt(squares.max())),
         0.5 * float(fields.mass @ squares), surface.energy, surface.volume / scene.volume,
     )  # fmt: skip
 
@@ -155,6 +155,11 @@ def width(points: Floats) -> float:
     angles = pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
     return float(np.ptp(along, axis=0).mean())
+
+
+def _height(scene: Droplet, points: Floats) -> float:
+    """Height of a surface `(m, 3)` above the wall, or of a free one in itself [m]."""
+    return float(points[:, 2].max() if scene.has_wall else np.ptp(points[:, 2]))
 
 
 def base_width(points: Floats, spacing: float) -> float:
