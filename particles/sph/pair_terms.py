@@ -11,13 +11,13 @@ from numba import njit
 SOFTENING = 0.01
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def continuity(approach, slope, volume, density):
     """Change of density as particles come near: rho_i (u_i - u_j) . grad W V_j; ``approach`` = (u_i - u_j) . d."""
     return density * approach * slope * volume
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def density_diffusion(jump, rise, slope, volume):
     """Diffusion of density over delta h c0 (Antuono et al. 2010): none where density is linear.
 
@@ -27,19 +27,19 @@ def density_diffusion(jump, rise, slope, volume):
     return -2.0 * (jump - rise) * slope * volume
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pressure(pressure_i, pressure_j, slope, volume, density):
     """Gradient of pressure: -(p_i + p_j) grad W V_j / rho_i."""
     return -(pressure_i + pressure_j) * slope * volume / density
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def artificial_viscosity(approach, distance2, slope, volume, density):
     """Artificial viscosity over alpha h c0 rho_0: (u_ij . r_ij) / r_ij^2 grad W V_j / rho_i (Antuono et al. 2012)."""
     return approach / distance2 * slope * volume / density
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def central_viscosity(approach, softened2, slope, volume, factor):
     """Newtonian viscosity along the line of the particles (Cleary 1998): a body that turns as a whole feels none.
 
@@ -50,7 +50,7 @@ def central_viscosity(approach, softened2, slope, volume, factor):
     return factor * approach / softened2 * slope * volume
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shear_viscosity(distance2, softened2, slope, volume, factor):
     """Newtonian viscosity as a factor of u_i - u_j [1/s] (Morris et al. 1997): right on lattices too, within 4 %.
 

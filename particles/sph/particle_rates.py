@@ -17,19 +17,19 @@ FEWEST_MOMENTS = 0.05
 PAIRING, POWER = 0.2, 4
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def across(distance, period):
     """Return a component of a vector between particles [m] to the nearest image; a period of 0 is none."""
     return distance - period * floor(distance / period + 0.5) if period > 0.0 else distance
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def positive(value):
     """Return a value, or zero where it is negative; Numba 0.68 cannot compile `max` for a GPU."""
     return value if value > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def seen(n, i, neighbours, mirror):
     """Return the n-th that a particle sees, and -1 for an image, else 1: two of each at a mirror, and its own."""
     row = n >> mirror
@@ -38,7 +38,7 @@ def seen(n, i, neighbours, mirror):
     return np.int64(neighbours[row]), 1.0 - 2.0 * (n & mirror)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rates_of(i, fluids, neighbours, fields, law):
     """Return what a particle of the liquid is told by its neighbours.
 
@@ -127,7 +127,7 @@ def rates_of(i, fluids, neighbours, fields, law):
     return rate, ax, ay, az, bx, by, bz, cx, cy, cz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solved(moments, sums, dimension):
     """Return the gradient `moments^-1 sums`, in a plane that of x and z; zero where neighbours do not resolve it."""
     xx, yy, zz, xy, yz, xz = moments
@@ -151,7 +151,7 @@ def solved(moments, sums, dimension):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def wall_values(i, fluids, neighbours, fields, law):
     """Return pressure and velocity (3) of a particle of a wall, from the liquid beside it (Adami et al. 2012).
 

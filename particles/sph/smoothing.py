@@ -23,7 +23,7 @@ def norm(kernel: int, dimension: int, length: float) -> float:
     return NORMS[kernel][dimension - 1] / length**dimension
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shape(kernel, line, q):
     """Return W / sigma at q >= 0; ``line`` says that the flow has one dimension."""
     if q >= 2.0:
@@ -38,7 +38,7 @@ def shape(kernel, line, q):
     return rest**4 * (2.0 * q + 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
     """Return (dW / dq) / (sigma q) at q >= 0: times sigma / h^2 and the vector between the points it is grad W."""
     if q >= 2.0:

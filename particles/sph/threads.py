@@ -42,7 +42,7 @@ class ThreadLoops:
         _find_wall_values(fluids, lists, fields, self._law, found)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _find_rates(fluids, lists, fields, law, rates):
     offsets, indices = lists
     for i in prange(fluids):
@@ -51,7 +51,7 @@ def _find_rates(fluids, lists, fields, law, rates):
             rates[k, i] = found[k]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _find_wall_values(fluids, lists, fields, law, found):
     offsets, indices = lists
     for i in prange(fluids, fields.x.shape[0]):

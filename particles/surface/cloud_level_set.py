@@ -70,9 +70,10 @@ def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
     Raises:
         CannotRebuild: loops meet in a vertex.
     """
-    edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    known = set(map(tuple, edges.tolist()))
-    outer = [(i, j) for i, j in known if (j, i) not in known]
+    edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
+    size = edges.max(initial=0) + 1
+    there, back = edges @ (size, 1), edges @ (1, size)
+    outer = edges[~np.isin(there, back)].tolist()
     after = dict(outer)
     if len(after) < len(outer):
         raise CannotRebuild("contact lines of a new surface meet in a point: too coarse for its shape")
