@@ -1,7 +1,7 @@
 """Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
 
 from dataclasses import replace
-from math import asin, degrees, inf, pi, sin
+from math import asin, degrees, inf, pi, radians, sin
 from typing import Protocol
 
 from reflowshock.particles.parameters import checks
@@ -18,7 +18,7 @@ FEWEST_PER_EDGE = 5
 MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
-ISPG_ANGLES = (pi / 3.0, 2.0 * pi / 3.0)
+ISPG_ANGLES = (radians(30.0), radians(148.0))
 ISPG_EDGES = (5, 11)
 KEYS = {
     "solder.volume": "joint.volume",

@@ -24,7 +24,8 @@ STEPS_PER_PERIOD = 60
 
 
 LONG = [
-    pytest.param(*row, marks=pytest.mark.long) for row in ((5, 120.0), (6, 60.0), (7, 60.0), (11, 60.0), (11, 120.0))
+    pytest.param(*row, marks=pytest.mark.long)
+    for row in ((5, 120.0), (6, 60.0), (7, 30.0), (7, 60.0), (7, 148.0), (11, 60.0), (11, 120.0))
 ]
 
 
@@ -45,7 +46,7 @@ def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
     assert abs(metrics["volume_drift"]) < 1e-12
     assert abs(metrics["energy_imbalance"]) < 0.002
     assert min(metrics["viscous_loss"], metrics["smoothing_loss"]) > 0.01
-    assert np.ptp(drop.shape.history["height"]) > 0.5e-3
+    assert np.ptp(drop.shape.history["height"]) > (0.15e-3 if degrees > 140.0 else 0.5e-3)  # 148: a cap of 1.16 mm
 
 
 def test_a_free_drop_swings_with_its_period():
