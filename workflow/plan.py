@@ -20,6 +20,7 @@ from reflowshock.workflow.store.state import StageState, examine, why_stale
 from reflowshock.workflow.store.store import Store
 
 LONGEST_LIST = 4
+FORMER = "*"  # marks a cost that former runs in the folder have corrected
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +104,13 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PredictedCost:
-    """Wall time [s] of a stage, and by what it was corrected, in words; empty where by nothing."""
+    """Wall time [s] of a stage, and what is said of its source; empty where nothing has corrected it."""
 
     seconds: float
     source: str = ""
 
     def __str__(self) -> str:
-        return f"about {duration(self.seconds)}{self.source and f' ({self.source})'}"
+        return f"about {duration(self.seconds)}{self.source}"
 
 
 def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> dict[str, PredictedCost]:
@@ -119,21 +120,25 @@ def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> d
     study, former = calibration_of(case) or Calibration({}, 0), calibration_in(store, seconds)
     costs = {}
     for stage, forecast in seconds.items():
-        known, source = former, "as former runs here"
+        known, source = former, FORMER
         if study.knows(stage):
-            known, source = study, f"measured: accuracy, {study.points} points"
+            known, source = study, f" (measured: accuracy, {study.points} points)"
         costs[stage] = PredictedCost(known.seconds(stage, forecast), source if known.knows(stage) else "")
     return costs
 
 
 def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
-    costs, left = predicted_costs(store, point.case, seconds), 0.0
-    for name, state in examine(store, point).items():
+    states, costs = examine(store, point), predicted_costs(store, point.case, seconds)
+    for name, state in states.items():
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
-        left += costs[name].seconds if state.stale else 0.0
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
-    table.add_row("all", "", f"about {duration(left)}" if left else "nothing to do", _about_time(left), style="bold")
+    stale = [costs[name] for name, state in states.items() if state.stale]
+    left = sum(cost.seconds for cost in stale)
+    remark = _about_time(left)
+    if any(cost.source == FORMER for cost in stale):
+        remark += f"; {FORMER}: as former runs here took"
+    table.add_row("all", "", f"about {duration(left)}" if left else "nothing to do", remark, style="bold")
     return table
 
 

@@ -19,6 +19,7 @@ from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.lanes import LANES
+from reflowshock.fem.kernels.nonlinear import PLASTIC
 from reflowshock.fem.materials.parameters import JohnsonCook
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.body import Body
@@ -178,7 +179,7 @@ class Measures:
         mises = von_mises(state[..., :6].reshape(-1, 6)).reshape(weight.shape)
         return {
             "von_mises": float(np.average(mises, weights=weight)),
-            "plastic_strain": float(np.average(state[..., 12], weights=weight)),
+            "plastic_strain": float(np.average(state[..., PLASTIC // LANES], weights=weight)),
             "plastic_work": float(blocks.plastic_work[chosen].sum() / weight.sum()),
         }
 

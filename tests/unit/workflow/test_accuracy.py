@@ -202,7 +202,7 @@ def test_the_plan_is_corrected_by_former_runs_in_its_folder(tmp_path):
     record_of(tmp_path / ".store/products/reflow-2", **here | {"continued": "from 50 %", "seconds": 1.0})
     record_of(tmp_path / ".store/products/reflow-3", **here | {"machine": "another", "seconds": 1.0})
     costs = predicted_costs(store, case, {"reflow": 4.0, "surface": 1.0})
-    assert str(costs["reflow"]) == "about 10 s (as former runs here)"
+    assert str(costs["reflow"]) == "about 10 s*"
     assert str(costs["surface"]) == "about 1 s"
 
 
