@@ -1,5 +1,7 @@
 # `make demo` and `make test` install what is missing first (.ci/setup); the second time that takes no time.
 export OMP_NUM_THREADS = 1
+# Without compiled modules every process compiles them anew: half a second each, and a run starts dozens.
+unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON := .venv/bin/python
 CASE := cases/jedec_bga/case.toml

@@ -95,11 +95,18 @@ def in_unit(value: float, unit: str) -> float:
     """Return the magnitude of an SI value in a unit."""
     if not math.isfinite(value):
         return value
-    parsed = registry().Unit(unit)
-    base = registry().get_base_units(parsed)[1]
+    parsed, base = _with_its_base(unit)
     return float(registry().Quantity(Decimal(repr(float(value))), base).to(parsed).magnitude)
 
 
+@lru_cache(maxsize=1024)
+def _with_its_base(unit: str) -> "tuple[pint.Unit, pint.Unit]":
+    """Return a unit, and that of its dimension in SI base units."""
+    parsed = registry().Unit(unit)
+    return parsed, registry().get_base_units(parsed)[1]
+
+
+@lru_cache(maxsize=1024)
 def dimension(unit: "str | pint.Unit") -> str:
     """Name the dimension of a unit: "length" for "mm", "acceleration" for "G"; else its formula."""
     wanted = registry().Unit(unit)

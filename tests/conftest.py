@@ -48,10 +48,18 @@ def drop_folder(tmp_path_factory, worker_id, tmp_path) -> Path:
     return shutil.copytree(folder, tmp_path / "run")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> None:
+    """Workers share the cores: loops on two threads each would wait for each other, which costs a tenth of all time."""
+    import numba
+
+    numba.set_num_threads(1)
+
+
 @pytest.fixture
 def every_thread():
-    """Return how many threads there are; afterwards loops run on all of them again."""
+    """Return how many threads there are; afterwards loops run on one again."""
     import numba
 
     yield numba.config.NUMBA_NUM_THREADS
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    numba.set_num_threads(1)

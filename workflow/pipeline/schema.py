@@ -1,6 +1,7 @@
 """JSON schema of the case file, in which a quantity is a string with its unit."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel
@@ -21,8 +22,9 @@ SCALES = {
 }
 
 
+@cache
 def case_schema() -> dict:
-    """Return the JSON schema (draft 2020-12) of a case file: that of any kind."""
+    """Return the JSON schema (draft 2020-12) of a case file: that of any kind. All callers share it."""
     kinds: list[dict] = []
     definitions: dict = {}
     for kind in (one.case for one in KINDS):

@@ -14,6 +14,7 @@ from reflowshock.workflow.examples import EXAMPLES
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.store.folders import locked
+from tests.support.case_schema import validate
 from tests.support.command_parser import commands, parse
 from tests.support.workflow_command import command_line
 
@@ -175,10 +176,10 @@ def test_the_schema_accepts_cases_and_refuses_bare_numbers(call):
     assert schema == case_schema()
     table = tomllib.loads(CASE.read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(table, schema)
+    validate(table)
     table["package"]["pitch"] = 1.0
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(table, schema)
+        validate(table)
 
 
 def test_the_version(call):

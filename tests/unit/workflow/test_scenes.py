@@ -1,20 +1,18 @@
 """Kinds of case: a drop, a joint; refused with place, key, value, range and nearest name where they cannot be."""
 
-import tomllib
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import templates, write_new_case
 from reflowshock.workflow.solder.case import DropCase, JointCase, of_joint
 from reflowshock.workflow.solder.forecast import forecast_solder
 from reflowshock.workflow.store.keys import stage_inputs
+from tests.support.case_schema import validate
 from tests.support.workflow_command import WHO_COMPUTES
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
@@ -153,7 +151,7 @@ def test_every_case_is_a_template(name, tmp_path):
     case = read_case(write_new_case("mine", name, tmp_path), oversubscribe=True)
     template = read_case(templates()[name], ["case.name=mine"], oversubscribe=True)
     assert display_values(case) == display_values(template)
-    jsonschema.validate(tomllib.loads((tmp_path / "mine.toml").read_text()), case_schema())
+    validate(tmp_path / "mine.toml")
     used = {key for stage in case.pipeline.stages for key in stage_inputs(case, stage)}
     used -= {f"{key}.sha256" for key in case.files}  # what its files hold
     assert used == {key for key, _ in _leaves(case.model_dump())} - WHO_COMPUTES

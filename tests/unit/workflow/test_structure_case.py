@@ -9,11 +9,11 @@ import pytest
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.pipeline.template import case_text, templates
 from reflowshock.workflow.store.keys import compare, stage_inputs
 from reflowshock.workflow.structure.forecast import forecast_structure
 from reflowshock.workflow.structure.report import meshed_part
+from tests.support.case_schema import validate
 
 BOARD = Path(__file__).resolve().parents[2] / "pipeline" / "structure.toml"
 POKE = "kind='point_force',at=['1 mm','-2 mm','0 mm'],direction=[0,0,-1]"
@@ -172,14 +172,14 @@ def test_a_new_case_is_equal_to_its_template(tmp_path):
     path = tmp_path / "again.toml"
     path.write_text(case_text(case, "structure"))
     assert display_values(read_case(path)) == display_values(case)
-    jsonschema.validate(tomllib.loads(path.read_text()), case_schema())
+    validate(path)
 
 
 def test_the_schema_refuses_a_number_without_unit():
     table = tomllib.loads(BOARD.read_text())
     table["structure"]["holes"]["spacing"] = [24.0, 14.0]
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(table, case_schema())
+        validate(table)
 
 
 def test_a_stage_depends_on_what_it_reads():
@@ -223,7 +223,7 @@ def test_a_force_is_in_the_schema_the_template_and_the_plan(tmp_path):
     again.write_text(case_text(case, "structure"))
     assert 'kind = "point_force"' in again.read_text()
     assert display_values(read_case(again)) == display_values(case)
-    jsonschema.validate(tomllib.loads(again.read_text()), case_schema())
+    validate(again)
     with pytest.raises(CaseError, match="is not plausible"):
         read_case(tmp_path / "case.toml", [f"loads.poke={{{poke},peak='1e4 kN',duration='0.1 ms'}}"])
     (tmp_path / "force.csv").write_text("time [ms], force [G]\n0,0\n0.1,1\n")
