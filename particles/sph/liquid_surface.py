@@ -15,8 +15,8 @@ have shrunk or grown too much, the surface is made anew from its distance, and t
 Parts that come as near to each other as particles stand, of two drops or of one, become one: the gap between them is
 closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched.
 
-On solid particles (`solids`) the surface stays closed: where it lies on them its tension is -gamma cos(theta) in place
-of gamma, which makes the contact angle there. How much that is of a vertex is renewed when triangles are evened out.
+On a solid body (`ground`) the surface stays closed: where it lies on it its tension is -gamma cos(theta) in place of
+gamma, along the ground, which makes the contact angle there as on the wall.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_neighbours
@@ -34,8 +34,8 @@ from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between, boundary_loops
-from reflowshock.particles.surface.level_set import Grid, extract_surface, relax, signed_distance
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between, boundary_loops, mirrored
+from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
 
 # Of the smoothing length: how far below the surface pressure ends.
@@ -47,8 +47,6 @@ TOUCH = 0.3
 # The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
 # tried where contact lines would meet in a point.
 MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
-# The same: from this distance to a solid particle on a vertex starts to be wet, and is nearer than that.
-DRY, WET = 1.3, 0.7
 # Steps after which triangles are evened out.
 CARE = 10
 # Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
@@ -83,8 +81,8 @@ class LiquidSurface:
         rings: contact lines, anticlockwise about liquid, as vertices `(k,)`; found where triangles end.
         moves: number of steps.
         rebuilds: how often it was made anew.
-        solids: `(k, 3)` particles that do not move and are not the liquid's, on which it may lie [m].
-        wetness: `(m,)` how much of each vertex is on them, 0 to 1.
+        ground: distance to solid bodies on which it may lie, negative in them; None where there are none.
+        wetness: `(m,)` how much of each vertex is on them, 0 to 1; and their normals there, `(m, 3)`.
         meetings: liquids that merged or parted.
     """
 
@@ -96,8 +94,8 @@ class LiquidSurface:
     rings: tuple[Indices, ...] = field(init=False)
     moves: int = 0
     rebuilds: int = 0
-    solids: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    wetness: Floats = field(default_factory=lambda: np.empty(0))
+    ground: LevelSet | None = None
+    wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
     meetings: list[Meeting] = field(default_factory=list)
     _built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
     _lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
@@ -105,14 +103,13 @@ class LiquidSurface:
 
     def __post_init__(self) -> None:
         self.rings = boundary_loops(self.triangles)
-        self._find_wetness()
 
     def saved(self) -> dict[str, Any]:
         """All of it, for a checkpoint."""
         return {
             "points": self.points, "triangles": self.triangles, "rings": list(self.rings), "moves": self.moves,
-            "rebuilds": self.rebuilds, "built_at": self._built_at, "shares": self._shares, "solids": self.solids,
-            "wetness": self.wetness, "meetings": list(self.meetings),
+            "rebuilds": self.rebuilds, "built_at": self._built_at, "shares": self._shares,
+            "meetings": list(self.meetings),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -120,7 +117,8 @@ class LiquidSurface:
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
         self.moves, self.rebuilds = saved["moves"], saved["rebuilds"]
         self._built_at, self._shares = saved["built_at"], saved["shares"]
-        self.solids, self.wetness, self.meetings = saved["solids"], saved["wetness"], saved["meetings"]
+        self.meetings = saved["meetings"]
+        self._find_wetness()
         self._list(self._built_at)
 
     @property
@@ -136,42 +134,81 @@ class LiquidSurface:
     @property
     def energy(self) -> float:
         """E [J], of the triangles themselves."""
-        if not len(self.solids):
-            return self.tension * (surface_area(self.points, self.triangles) - self.cosine * self.wetted_area)
-        areas = triangle_areas(self.points, self.triangles)
-        return self.tension * float(areas @ self._shares_of_tension() - self.cosine * self.wetted_area)
+        area, wet = surface_area(self.points, self.triangles), self.wetted_area
+        if self.ground is not None:
+            grounded = float(triangle_areas(self.points, self.triangles) @ self._wet_shares())
+            area, wet = area - grounded, wet + grounded
+        return self.tension * (area - self.cosine * wet)
 
-    def _shares_of_tension(self) -> Floats:
-        """What acts of the tension in each triangle `(t,)`: all where it is free, -cos(theta) on solids."""
-        return 1.0 - (1.0 + self.cosine) * self.wetness[self.triangles].mean(axis=1)
+    def _wet_shares(self) -> Floats:
+        """How much of each triangle lies on the ground `(t,)`: what its highest vertex does."""
+        return self.wetness[0][self.triangles].min(axis=1)
 
     def _find_wetness(self) -> None:
-        if not len(self.solids):
-            self.wetness = np.zeros(len(self.points))
+        """Find what lies on the ground, none of it below."""
+        if self.ground is None or not len(self.points):
             return
-        distance, _ = cKDTree(self.solids).query(self.points, distance_upper_bound=DRY * self.law.spacing)
-        self.wetness = np.clip((DRY - distance / self.law.spacing) / (DRY - WET), 0.0, 1.0)
+        near = TOUCH * self.law.spacing
+        distance = self.ground.at(self.points, 1)
+        share = np.clip(2.0 - distance / near, 0.0, 1.0)
+        normals, close = np.zeros_like(self.points), share > 0.0
+        normals[close] = self.ground.gradient(self.points[close], 1)
+        normals[close] /= np.maximum(np.linalg.norm(normals[close], axis=1), 1e-300)[:, None]
+        away = (vertex_normals(self.points, self.triangles, len(self.points)) * normals).sum(axis=1) > 0.0
+        down = (distance < near) & ~away | (distance < 0.0)
+        self.points[down] -= distance[down, None] * normals[down]
+        share[away] = 0.0
+        self.wetness = share, normals
 
-    def add_to(self, rates: Floats, fields: Fields, fluids: int) -> None:
-        """Add the accelerations that it gives the particles to rows 1 to 3 of their rates `(10, n)`.
+    def add(self, points: Floats, triangles: Indices) -> None:
+        """Add the surface of more liquid, apart from this one: `(k, 3)` [m], `(t, 3)`."""
+        triangles = np.concatenate((self.triangles, triangles + len(self.points)))
+        self._take(np.concatenate((self.points, points)), triangles)
+
+    def take_out(self, vertices: NDArray[np.bool_]) -> tuple[Floats, Indices]:
+        """Give away connected parts, those of vertices `(m,)`: points and triangles."""
+        theirs = vertices[self.triangles[:, 0]]
+        used, numbers = np.unique(self.triangles[theirs], return_inverse=True)
+        found = self.points[used], numbers.reshape(-1, 3).astype(np.int32)
+        self._take(self.points, self.triangles[~theirs])
+        return found
+
+    def lie_on(self, ground: LevelSet | None) -> None:
+        """Lie from now on on this ground; the particles that carry it may be others, too."""
+        self.ground = ground
+        self._take(self.points, self.triangles)
+
+    def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
+        """Add the accelerations that it gives particles to rows 1 to 3 of their rates `(10, n)`.
+
+        Args:
+            rates: of the liquid.
+            fields: of all particles.
+            carriers: how many of them, the liquid's the first, carry the surface.
 
         Raises:
             SurfaceLost: there are no particles beside a vertex.
         """
-        self._update_lists(np.array(fields[:3])[:, :fluids])
+        self._update_lists(np.array(fields[:3])[:, :carriers])
         self._shares = np.empty((2, len(self._lists[1])))
         surface_loops.find_shares(self.points, self._lists, fields, self.law, self._shares)
         starts = self._lists[0][:-1]
         if (np.diff(self._lists[0]) == 0).any() or not np.add.reduceat(self._shares[0], starts).all():
             raise SurfaceLost("the liquid has left its surface")
-        surface_loops.share_forces(self._lists, self._shares, self.forces(), fields.mass, rates)
+        pushes = np.zeros((3, carriers))
+        surface_loops.share_forces(self._lists, self._shares, self.forces(), fields.mass, pushes)
+        rates[1:4] += pushes[:, : rates.shape[1]]
 
     def forces(self) -> Floats:
         """Forces -dE/dx on the vertices `(m, 3)` [N]; those of contact lines along the wall, which holds them."""
-        weights = self._shares_of_tension() if len(self.solids) else None
-        steep = area_gradient(self.points, self.triangles, weights)
+        wet = None if self.ground is None else self._wet_shares()
+        steep = area_gradient(self.points, self.triangles, None if wet is None else 1.0 - wet)
         tension = self.tension * (1.0 - DEPTH * self.law.length * self._mean_curvature(steep))
         result = -tension * steep
+        if wet is not None:
+            share, normals = self.wetness
+            result += self.tension * self.cosine * area_gradient(self.points, self.triangles, wet)
+            result -= (share * (result * normals).sum(axis=1))[:, None] * normals
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
             pull = 0.5 * self.tension * self.cosine
@@ -187,7 +224,8 @@ class LiquidSurface:
             outward[ring] = 0.0
         area = np.linalg.norm(outward, axis=1)
         normals = outward / np.maximum(area, 1e-300)[:, None]
-        return float((steep * normals).sum() / area.sum())
+        free = area if self.ground is None else area * (1.0 - self.wetness[0])
+        return float((steep * normals).sum() / free.sum())
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
         """Move with the velocities of the particles `(3, n)` [m/s] over a time step [s].
@@ -208,7 +246,7 @@ class LiquidSurface:
             elif self._is_worn():
                 self._make_anew()
             self.enclose(volume)
-            self._find_wetness()
+        self._find_wetness()
 
     def _update_lists(self, liquid: Floats) -> None:
         """Find the particles beside each vertex again when either has moved half the skin."""
@@ -280,10 +318,11 @@ class LiquidSurface:
     def _make_anew(self, gaps: Sequence[float] = (0.0,)) -> None:
         """Triangulate the same surface anew, without gaps narrower than the first of `gaps` [spacings] that it can."""
         self.rebuilds += 1
-        before, energy, closed = parts_of(self.triangles), self.energy, self._closed()
-        grid = Grid.around(closed[0], EDGE * self.law.spacing)
+        before, energy = parts_of(self.triangles), self.energy
+        closed = mirrored(self.points, self.triangles) if self.law.mirror else (self.points, self.triangles)
+        distance = signed_distance(*closed, Grid.around(closed[0], EDGE * self.law.spacing))
         for gap in gaps:
-            level = closed_level(*closed, grid, gap * self.law.spacing) if gap else signed_distance(*closed, grid)
+            level = closed_level(distance, gap * self.law.spacing) if gap else distance
             points, triangles = extract_surface(level)
             if self.law.mirror:
                 points, triangles = between(points, triangles, (WALL,), 1e-6 * self.law.spacing)
@@ -296,16 +335,6 @@ class LiquidSurface:
             if gap or after != before:
                 self.meetings.append(Meeting(self.moves, before, after, self.energy - energy))
             return
-
-    def _closed(self) -> tuple[Floats, Indices]:
-        """The surface with its image behind the wall."""
-        if not self.law.mirror:
-            return self.points, self.triangles
-        image = len(self.points) + np.arange(len(self.points), dtype=np.int32)
-        for ring in self.rings:
-            image[ring] = ring
-        points = np.concatenate((self.points, self.points * np.array([1.0, 1.0, -1.0])))
-        return points, np.concatenate((self.triangles, image[self.triangles][:, ::-1]))
 
     def enclose(self, volume: float) -> None:
         """Move along the normals by one distance, contact lines along the wall, to enclose a volume [m^3]."""

@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, signed_distance
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, signed_distance
 
 # Cosine of the angle between the normals of vertices that face each other, at most.
 FACING = -0.5
@@ -32,14 +32,13 @@ def narrowest_gap(points: Floats, normals: Floats, gap: float, aside: float) -> 
     return float(height[(height > 0.0) & (height < gap) & (beside < aside)].min(initial=np.inf))
 
 
-def closed_level(points: Floats, triangles: Indices, grid: Grid, gap: float) -> LevelSet:
-    """Return a level set of a closed surface `(m, 3)`, `(t, 3)` whose gaps narrower than ``gap`` [m] are filled.
+def closed_level(level: LevelSet, gap: float) -> LevelSet:
+    """Return a level set whose gaps narrower than ``gap`` [m] are filled.
 
     What is within half of it is added, and what is then within half of it of the outside is taken away again.
     """
-    level = signed_distance(points, triangles, grid)
-    wider = signed_distance(*extract_surface(LevelSet(grid, level.values - 0.5 * gap)), grid)
-    return LevelSet(grid, np.minimum(level.values, wider.values + 0.5 * gap))
+    wider = signed_distance(*extract_surface(LevelSet(level.grid, level.values - 0.5 * gap)), level.grid)
+    return LevelSet(level.grid, np.minimum(level.values, wider.values + 0.5 * gap))
 
 
 def part_of_vertex(triangles: Indices, count: int) -> Indices:
