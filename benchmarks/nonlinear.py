@@ -15,7 +15,8 @@ Parts, each by itself where it is named; figures of earlier calls stay:
   which solder flows.
 - ``drift``: energy over 1e5 windows of two models in finite rotation, elastic, no damping.
 - ``growth``: of one window of every scheme, over the grid of coupling_stability.py, where the models have turned by 40
-  degrees and strained by half a per cent, and the block flows: its elements have their tangents.
+  degrees and strained by half a per cent, and the block flows: its elements have their tangents. One-point elements;
+  ``growth_of_modes``: those with incompatible modes.
 
 Sides take turns; ratios are of processor seconds. Bars that stand in ``not_measured`` need longer runs.
 """
@@ -236,19 +237,19 @@ def drift() -> tuple[Bars, dict]:
     }
 
 
-def growth(every: int = 1) -> tuple[Bars, dict]:
+def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some."""
     found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
     for pair, fraction in list(grid())[::every]:
         for name, values in found.items():
-            coupled = flowing_pair(pair, SCHEMES[name], fraction)
+            coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)
             values[repr(pair)] = coupled.spectral_radius() - 1.0
             if name == ALONG_PATHS[0]:
                 levels[repr(pair)] = len(coupled.meso.motion.body.schedule)
     grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
     bars = {
-        f"nonlinear windows that grow by more than {GROWTH:g}, {name}": turns.bar(count, 0, False)
+        f"nonlinear windows that grow by more than {GROWTH:g}, {formulation}, {name}": turns.bar(count, 0, False)
         for name, count in grown.items()
     }
     worst = {name: max(values.values()) for name, values in found.items()}
@@ -256,6 +257,7 @@ def growth(every: int = 1) -> tuple[Bars, dict]:
 
 
 PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter, two_scales, errors, drift, growth)}
+PARTS["growth_of_modes"] = partial(growth, formulation="incompatible_modes")
 
 
 def main() -> None:
@@ -263,7 +265,7 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; without, all")
     parser.add_argument("--every", type=int, default=1, help="growth: takes one of so many pairs of the grid")
     options = parser.parse_args()
-    parts = PARTS | {"growth": partial(growth, options.every)}
+    parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
     found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
     for name in chosen:
