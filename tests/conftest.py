@@ -46,3 +46,12 @@ def drop_folder(tmp_path_factory, worker_id, tmp_path) -> Path:
     folder, ended = shared_run("drop", tmp_path_factory, worker_id)
     assert ended.returncode == 0, ended.stderr
     return shutil.copytree(folder, tmp_path / "run")
+
+
+@pytest.fixture
+def every_thread():
+    """Return how many threads there are; afterwards loops run on all of them again."""
+    import numba
+
+    yield numba.config.NUMBA_NUM_THREADS
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)

@@ -239,3 +239,16 @@ def turn_back(rotation, vectors):
         v = vectors[start : start + 3 * LANES]
         for lane in range(LANES):
             put_three(v, lane, applied(transposed(nine(rotation, lane)), three(v, lane)))
+
+
+@njit(**LANE_OPTIONS)
+def add_elastic(s, d, c):
+    """Return s + C d, six entries, d with engineering shear; c as in ``kernels.nonlinear.elastic_stress``."""
+    return (
+        s[0] + c[0] * d[0] + c[3] * d[1] + c[5] * d[2],
+        s[1] + c[3] * d[0] + c[1] * d[1] + c[4] * d[2],
+        s[2] + c[5] * d[0] + c[4] * d[1] + c[2] * d[2],
+        s[3] + c[6] * d[3],
+        s[4] + c[7] * d[4],
+        s[5] + c[8] * d[5],
+    )

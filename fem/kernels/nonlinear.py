@@ -19,6 +19,7 @@ from numba import njit
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
+    add_elastic,
     cofactor,
     cofactor_symmetric,
     determinant,
@@ -172,16 +173,7 @@ def elastic_stress(w, state, elastic):
         elastic: ``(9,)`` [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for lane in range(LANES):
-        d = six(w, INCREMENT + lane)
-        s = six(state, STRESS + lane)
-        s = (
-            s[0] + elastic[0] * d[0] + elastic[3] * d[1] + elastic[5] * d[2],
-            s[1] + elastic[3] * d[0] + elastic[1] * d[1] + elastic[4] * d[2],
-            s[2] + elastic[5] * d[0] + elastic[4] * d[1] + elastic[2] * d[2],
-            s[3] + elastic[6] * d[3],
-            s[4] + elastic[7] * d[4],
-            s[5] + elastic[8] * d[5],
-        )
+        s = add_elastic(six(state, STRESS + lane), six(w, INCREMENT + lane), elastic)
         put_six(state, STRESS + lane, s)
         x, y, z = s[0] - s[1], s[1] - s[2], s[2] - s[0]
         square = 0.5 * (x * x + y * y + z * z) + 3.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5])

@@ -27,6 +27,7 @@ from reflowshock.fem.kernels.hexahedron import GAUSS
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
+    add_elastic,
     applied,
     cross,
     gather_lanes,
@@ -49,7 +50,6 @@ from reflowshock.fem.kernels.nonlinear_modes import (
     CHANGE,
     MIDDLE,
     SUMS,
-    add_elastic,
     add_remainder,
     solve_modes,
     write_normals,

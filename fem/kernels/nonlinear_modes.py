@@ -6,6 +6,7 @@ from reflowshock.fem.kernels.box_rotation import X, Y, Z
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
+    add_elastic,
     applied,
     cofactor,
     cross,
@@ -53,19 +54,6 @@ def write_sums(values, w, at):
         w[at + i] = SIDE * ((b - a) + (d - c) + (f - e) + (h - g))
         w[at + 6 * LANES + i] = SIDE * ((c - a) + (d - b) + (g - e) + (h - f))
         w[at + 12 * LANES + i] = SIDE * ((e - a) + (f - b) + (g - c) + (h - d))
-
-
-@njit(**LANE_OPTIONS)
-def add_elastic(s, d, c):
-    """Return s + C d, six entries, d with engineering shear; c as in ``kernels.nonlinear.elastic_stress``."""
-    return (
-        s[0] + c[0] * d[0] + c[3] * d[1] + c[5] * d[2],
-        s[1] + c[3] * d[0] + c[1] * d[1] + c[4] * d[2],
-        s[2] + c[5] * d[0] + c[4] * d[1] + c[2] * d[2],
-        s[3] + c[6] * d[3],
-        s[4] + c[7] * d[4],
-        s[5] + c[8] * d[5],
-    )
 
 
 @njit(**LANE_OPTIONS)

@@ -13,6 +13,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from reflowshock.fem.kernels.lanes import LANE_OPTIONS, LANES, put_six_of, six, six_of
+from reflowshock.fem.kernels.nonlinear import INCREMENT, MISES, NOMINAL, PLASTIC
 from reflowshock.fem.kernels.plasticity import (
     CONVERGED,
     FIRST_YIELD,
@@ -27,9 +28,8 @@ ABOVE = 1e-3  # of a ceiling over its rough logarithm: it only keeps steps from 
 LN2 = 0.6931471805599453
 ROOT_BITS = 0x3FE6A09E667F3BCD  # of sqrt(1/2): mantissas are taken from there to sqrt(2)
 MANTISSA, BIAS = 52, 1023
-# Slots of the workspace and of the state, see ``kernels.nonlinear``.
-INCREMENT, MISES, FLOW, LOGARITHM, CEILING, BEFORE, INVERSE = (LANES * k for k in (18, 24, 25, 26, 27, 28, 29))
-PLASTIC = 6 * LANES
+# Slots of the workspace where ``kernels.nonlinear`` has the nominal stress, which is written afterwards.
+FLOW, LOGARITHM, CEILING, BEFORE, INVERSE = (NOMINAL + LANES * k for k in range(5))
 
 
 def bit_pattern(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -164,13 +164,6 @@ def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     assert simulation.fields.z.min() >= 0.0
 
 
-@pytest.fixture
-def every_thread():
-    """Afterwards loops run on all threads again."""
-    yield numba.config.NUMBA_NUM_THREADS
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-
-
 def test_threads_change_no_droplet(every_thread):
     found = []
     for threads in (1, every_thread):

@@ -136,13 +136,6 @@ def test_walls_do_not_slip_where_viscosity_acts():
     assert not fields.wall_u.any()
 
 
-@pytest.fixture
-def every_thread():
-    """Afterwards loops run on all threads again."""
-    yield numba.config.NUMBA_NUM_THREADS
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-
-
 def test_threads_change_nothing(every_thread):
     found = []
     for threads in (1, every_thread):
