@@ -59,7 +59,7 @@ class Coupling(Parameters):
     velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
     model, which takes nothing back. ``levels`` are those of the meso model's steps below the window; with held velocity
     there are three at most, and one under damping, springs, a large mass or stress of cooling. ``buffer_layers`` of
-    board elements lie between joints and an interface of held velocity, and of any elements between its levels.
+    board elements lie between joints and an interface of held velocity; between its levels ``path_levels`` has them.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
