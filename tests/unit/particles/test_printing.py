@@ -15,7 +15,7 @@ INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
     "pitch": 23.2e-6, "columns": 2, "rows": 1,
 }  # fmt: skip
-BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)
+BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: a second has to land on what is cured
 
 
 def printing(**changes):
