@@ -100,4 +100,3 @@ def test_threads_and_a_restart_change_no_merging(every_thread):
     assert again.surface.meetings and isinstance(again.surface.meetings[0], Meeting)
     found.append(np.concatenate((np.array(again.fields[:8]).ravel(), again.surface.points.ravel())))
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
-
