@@ -112,7 +112,7 @@ class ShockNumerics(Parameters):
     """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
-    formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
+    formulations; those that yield are two to four times cheaper with one point, a few per cent stronger in bending.
     Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
     yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
     ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others, at most to
