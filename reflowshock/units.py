@@ -134,6 +134,7 @@ KINDS = {
     "stiffness per area": "N/m^3",
     "force": "N",
     "frequency": "Hz",
+    "irradiance": "W/m^2",
 }
 
 

@@ -26,7 +26,14 @@ from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
 from reflowshock.workflow.fluid import case as fluid_case
 from reflowshock.workflow.fluid import stages as fluid_stages
-from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, TaylorGreenCase
+from reflowshock.workflow.fluid.case import (
+    DamBreakCase,
+    DropletCase,
+    FlowCase,
+    PoiseuilleCase,
+    PrintingCase,
+    TaylorGreenCase,
+)
 from reflowshock.workflow.fluid.forecast import flow_size, flow_tables, forecast_flow
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
@@ -241,6 +248,10 @@ KINDS = (
     _flow_kind(TaylorGreenCase, fluid_case.of_viscous, fluid_stages.flow_taylor_green),
     replace(
         _flow_kind(DropletCase, fluid_case.of_droplet, fluid_stages.flow_droplet),
+        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS),
+    ),
+    replace(
+        _flow_kind(PrintingCase, fluid_case.of_printing, fluid_stages.flow_printing),
         effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS),
     ),
     PACKAGE,

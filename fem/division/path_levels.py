@@ -5,7 +5,9 @@ path from one of these states to the next (r-RESPA; M. Tuckerman, B. J. Berne, G
 1990-2001). Impulses have no resultant, so that momentum is kept to round-off by any path; no state is a mean, as those
 of local steps are, so that plastic work is what it is in one model. Impulses drive what swings with half their period.
 Elements swing at most with 2 / T of their critical step T. So layers of elements that could take the larger step lie
-between those that cannot and those that do: what would resonate fades in them.
+between those that cannot and those that do: what would resonate fades in them. Through a layer with the critical step T
+a swing of half the period t fades by exp(-2 arcosh(pi T / (2 t))), as in a chain of masses and springs above its
+highest frequency. There are two layers, or one in which it fades as much as in two that can just take the larger step.
 """
 
 import math
@@ -44,6 +46,15 @@ def candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
                     yield (first, *inner)
 
 
+def opaque_ratio(fraction: float) -> float:
+    """Return the step of an element, over the larger one, from which on one layer is as good as two that just take it.
+
+    Both are ``fraction`` of critical steps. The swing fades in it by twice the exponent: arcosh(r x) = 2 arcosh(x).
+    """
+    just = 0.5 * math.pi / fraction
+    return 2.0 * just - 1.0 / just
+
+
 class FinerCells:
     """Cells of the meso model that need smaller steps than some share of the window, and layers around them."""
 
@@ -51,16 +62,15 @@ class FinerCells:
         """Take a divided mesh."""
         self._whole, self._meso = whole, division.meso
         self._steps, self._window = rules.fraction * survey.step, division.plan.window
-        self._layers = rules.coupling.buffer_layers
+        self._opaque = opaque_ratio(rules.fraction)
         self._known: dict[int, NDArray[np.bool_]] = {}
 
     def than(self, count: int) -> NDArray[np.bool_]:
         """Return which cells ``(ne,)`` may not take ``count`` steps a window."""
         if count not in self._known:
-            taken = self._meso & (self._steps < self._window / count * (1.0 - ROUNDING))
-            for _ in range(self._layers if taken.any() else 0):
-                taken = self._meso & self._around(taken)
-            self._known[count] = taken
+            larger = self._window / count * (1.0 - ROUNDING)
+            taken = self._around(self._meso & (self._steps < larger))
+            self._known[count] = taken | self._around(taken & (self._steps < self._opaque * larger))
         return self._known[count]
 
     def level(self, ratios: tuple[int, ...]) -> NDArray[np.int32]:
@@ -69,7 +79,7 @@ class FinerCells:
         return np.sum([self._meso, *inner], axis=0, dtype=np.int32)
 
     def _around(self, taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the cells ``(ne,)`` that share a node with some, by a tie or without."""
+        """Return the cells ``(ne,)`` of the meso model that share a node with some, by a tie or without."""
         tie, nodes = self._whole.tie, seeds_of(self._whole, taken)
         nodes[tie.slave[nodes[tie.master].any(axis=1)]] = True
-        return touching(self._whole.mesh.cells, nodes)
+        return self._meso & touching(self._whole.mesh.cells, nodes)

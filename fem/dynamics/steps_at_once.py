@@ -64,12 +64,13 @@ class StepsAtOnce:
 
     Attributes:
         forces: Its force terms by pace.
-        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, and ``moved`` as there.
+        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, ``tied`` in this order, and ``moved`` as there.
         terms: By pace, entry of ``ForceArrays`` -> the term.
     """
 
     forces: PacedForces
     order: np.ndarray
+    tied: tuple[np.ndarray, np.ndarray, np.ndarray]
     moved: np.ndarray
     terms: list[dict[str, Any]]
 
@@ -95,7 +96,9 @@ class StepsAtOnce:
             np.minimum.at(slowest, body.elements.cells, body.element_paces[:, None])
         every, own = np.array([*found, *[0] * rest]), slowest[body.tie.slave]
         moved = np.sum(own[:, None] <= every, axis=0)
-        return cls(PacedForces(arrays, every), np.argsort(own, kind="stable"), moved, list(found.values()))
+        order, tie = np.argsort(own, kind="stable"), body.tie
+        tied = tie.slave[order], tie.master[order], tie.weight[order]
+        return cls(PacedForces(arrays, every), order, tied, moved, list(found.values()))
 
     def take(
         self, motion: Motion, state: tuple[np.ndarray, np.ndarray], interface: Interface, accelerations: np.ndarray
@@ -111,9 +114,8 @@ class StepsAtOnce:
         Raises:
             InvertedElementError: An element is turned inside out; the motion's time is that of the step.
         """
-        tie, force = motion.body.tie, motion.slave_force[self.order]
-        tied = tie.slave[self.order], tie.master[self.order], tie.weight[self.order]
-        steps = StepArrays(*state, motion.mobility, motion.counted_mass, *tied, self.moved, force)
+        force = motion.slave_force[self.order]
+        steps = StepArrays(*state, motion.mobility, motion.counted_mass, *self.tied, self.moved, force)
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
         motion.slave_force[self.order] = force
         for _ in range(taken):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.kernels.box_rotation import add_turned_block_forces, add_turned_row_forces
 from reflowshock.fem.kernels.box_rows import add_row_forces, read_lines, subtract_lines
 from reflowshock.fem.kernels.force import add_block_force
+from reflowshock.fem.kernels.hexahedron import FINITE
 from reflowshock.fem.kernels.motion import add_impulse, advance, gather_from_slaves, spread_to_slaves
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
@@ -190,10 +191,10 @@ def move_interface(interface, substep, velocity):
 @njit(cache=True)
 def add_ahead(ahead, force):
     """Add to the force ``(n, 3)`` [N] what has acted for the steps that follow, and zero it."""
-    for i in range(len(force)):
-        for c in range(3):
-            force[i, c] += ahead[i, c]
-            ahead[i, c] = 0.0
+    total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
+    for i in range(len(total)):
+        total[i] += rest[i]
+        rest[i] = 0.0
 
 
 @njit(cache=True)
@@ -230,11 +231,11 @@ def add_paced_forces(motion, forces, substep, pushed):
 @njit(cache=True)
 def add_pushed(pushed, every, force, ahead):
     """Add to the force ``(n, 3)`` [N] what acts once in some steps, to ``ahead`` its share of the others; zero it."""
-    for i in range(len(pushed)):
-        for c in range(3):
-            force[i, c] += pushed[i, c]
-            ahead[i, c] += (every - 1) * pushed[i, c]
-            pushed[i, c] = 0.0
+    own, total, rest = pushed.reshape(-1), force.reshape(-1), ahead.reshape(-1)
+    for i in range(len(own)):
+        total[i] += own[i]
+        rest[i] += (every - 1) * own[i]
+        own[i] = 0.0
 
 
 @njit(cache=True)
@@ -250,7 +251,7 @@ def gather_forces(motion, moved, due):
         gather_from_slaves(slave, master, weight, motion.ahead)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FINITE)
 def power_of(acceleration, mass, velocity):
     """Return the power [W] of an acceleration ``(3,)`` on masses ``(n,)`` at velocities ``(n, 3)``."""
     x = y = z = 0.0

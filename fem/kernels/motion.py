@@ -40,22 +40,28 @@ def advance(state, mobility, acceleration, step):
 def spread_to_slaves(slave, master, weight, values):
     """Overwrite the slaves' rows with the weighted sum of their masters' rows."""
     for i in range(len(slave)):
-        for c in range(3):
-            total = 0.0
-            for k in range(4):
-                total += weight[i, k] * values[master[i, k], c]
-            values[slave[i], c] = total
+        x = y = z = 0.0
+        for k in range(4):
+            node, share = np.uintp(master[i, k]), weight[i, k]
+            x += share * values[node, 0]
+            y += share * values[node, 1]
+            z += share * values[node, 2]
+        row = np.uintp(slave[i])
+        values[row, 0], values[row, 1], values[row, 2] = x, y, z
 
 
 @njit(cache=True)
 def gather_from_slaves(slave, master, weight, values):
     """Add the slaves' rows to their masters' rows by the transposed weights, then zero them."""
     for i in range(len(slave)):
-        row = slave[i]
-        for c in range(3):
-            for k in range(4):
-                values[master[i, k], c] += weight[i, k] * values[row, c]
-            values[row, c] = 0.0
+        row = np.uintp(slave[i])
+        x, y, z = values[row, 0], values[row, 1], values[row, 2]
+        for k in range(4):
+            node, share = np.uintp(master[i, k]), weight[i, k]
+            values[node, 0] += share * x
+            values[node, 1] += share * y
+            values[node, 2] += share * z
+        values[row, 0] = values[row, 1] = values[row, 2] = 0.0
 
 
 @njit(cache=True)

@@ -59,7 +59,7 @@ class Coupling(Parameters):
     velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
     model, which takes nothing back. ``levels`` are those of the meso model's steps below the window; with held velocity
     there are three at most, and one under damping, springs, a large mass or stress of cooling. ``buffer_layers`` of
-    board elements lie between joints and an interface of held velocity, and of any elements between its levels.
+    board elements lie between joints and an interface of held velocity; between its levels ``path_levels`` has them.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
@@ -112,7 +112,7 @@ class ShockNumerics(Parameters):
     """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
 
     ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
-    formulations; those that yield are seven to eight times cheaper with one point, a few per cent stronger in bending.
+    formulations; those that yield are two to four times cheaper with one point, a few per cent stronger in bending.
     Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
     yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
     ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others, at most to

@@ -32,10 +32,21 @@ def surface_area(points, triangles):
 
 
 @njit(cache=True)
-def area_gradient(points, triangles):
+def triangle_areas(points, triangles):
+    """Area of each triangle, `(t,)` [m^2]."""
+    result = np.empty(triangles.shape[0])
+    for t in range(triangles.shape[0]):
+        x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        result[t] = 0.5 * np.sqrt(x * x + y * y + z * z)
+    return result
+
+
+@njit(cache=True)
+def area_gradient(points, triangles, weights=None):
     """Gradient of `surface_area` with respect to each point, `(n, 3)` [m]; triangles without area have none.
 
-    It is K x with the stiffness of `cotangent_laplacian`, of which nothing is kept.
+    It is K x with the stiffness of `cotangent_laplacian`, of which nothing is kept. ``weights`` `(t,)` multiply the
+    areas of triangles.
     """
     result = np.zeros_like(points)
     for t in range(triangles.shape[0]):
@@ -44,6 +55,8 @@ def area_gradient(points, triangles):
         if size == 0.0:
             continue
         x, y, z = 0.5 * x / size, 0.5 * y / size, 0.5 * z / size
+        if weights is not None:
+            x, y, z = weights[t] * x, weights[t] * y, weights[t] * z
         for k in range(3):
             i, j, m = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
             ex, ey, ez = points[m, 0] - points[j, 0], points[m, 1] - points[j, 1], points[m, 2] - points[j, 2]

@@ -31,7 +31,7 @@ class Ghosts:
     Attributes:
         points: `(g, 3)` [m].
         source: `(g,)` the particle that each is the image of.
-        reflection: `(g, 3, 3)` orthogonal matrices that map the source's vectors to the image's.
+        reflection: `(g, 3, 3)` matrices that map the source's vectors to the image's; orthogonal without friction.
     """
 
     points: Floats
@@ -60,17 +60,28 @@ class Ghosts:
         return result
 
 
-def mirror(points: Floats, plates: Sequence[Plate], reach: float) -> Ghosts:
+def mirror(
+    points: Floats, plates: Sequence[Plate], reach: float, slip_lengths: Sequence[float] | None = None
+) -> Ghosts:
     """Mirror the particles `(n, 3)` [m] that are nearer to a plate than the reach [m], plate by plate.
 
     What the plates before have added is mirrored, too: an edge between two plates at right angles has images of both.
+    Velocities along a plate become (b - z) / (b + z) of theirs, b the slip length and z the height of the particle: a
+    flow that is linear and would rest at a depth b stays so. They are even with free slip and odd without slip.
+
+    Args:
+        points: particles.
+        plates: walls.
+        reach: of the images [m].
+        slip_lengths: of the plates [m], 0 without slip; free slip where none are given.
     """
     all_points, source = points, np.arange(len(points))
     reflection = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-    for plate in plates:
+    for plate, slip in zip(plates, slip_lengths or [np.inf] * len(plates), strict=True):
         height = -plate.side * plate.local(all_points)[:, 2]
         near = np.flatnonzero((height > ON_PLATE * reach) & (height < reach))
-        flip = np.eye(3) - 2.0 * np.outer(plate.normal, plate.normal)
+        along, across = 1.0 - 2.0 * height[near] / (slip + height[near]), np.outer(plate.normal, plate.normal)
+        flip = along[:, None, None] * (np.eye(3) - across) - across
         images = all_points[near] - 2.0 * np.outer(plate.local(all_points[near])[:, 2], plate.normal)
         all_points = np.concatenate((all_points, images))
         source = np.concatenate((source, source[near]))

@@ -1,8 +1,8 @@
 """Space of the Galerkin scheme: linear MLS of the velocity, direct nodal integration, walls mirrored.
 
-Velocities of particles are even along a wall and odd across it, so that nothing passes a wall. The operators act
-without being assembled; the transposed of each is made of the same weights, so that what a force or stress does to the
-particles is its virtual power, to rounding.
+Velocities of particles are odd across a wall, so that nothing passes it, and along it even with free slip, odd without
+slip, between the two with Navier slip (`mirror`). The operators act without being assembled; the transposed of each is
+made of the same weights, so that what a force or stress does to the particles is its virtual power, to rounding.
 """
 
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ class Galerkin:
     ghosts: Ghosts
 
     @classmethod
-    def of(cls, body: Body) -> "Galerkin":
-        """Fit the shape functions at the particles of a body.
+    def of(cls, body: Body, slip_length: float = np.inf) -> "Galerkin":
+        """Fit the shape functions at the particles of a body, on plates with a slip length [m].
 
         Raises:
             DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
@@ -52,8 +52,9 @@ class Galerkin:
         """
         count, spacing = len(body.points), body.cloud.spacing
         planes = [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in body.cloud.symmetry]
+        slips = [slip_length] * len(body.plates) + [np.inf] * len(planes)
         for reach in REACHES:
-            ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing)
+            ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing, slips)
             points = np.concatenate((body.points, ghosts.points))
             lists = find_neighbours(points, reach * spacing)
             squares, lengths = kernels.supports(count, points, (*lists, reach * spacing), spacing)

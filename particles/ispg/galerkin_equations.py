@@ -4,9 +4,11 @@
     dt B m^-1 B^T phi = g - B v*,     v = v* + dt m^-1 B^T phi,     p_new = p + phi - mu div v*
 
 v are the velocities of the particles, m their masses, f the forces on them, V viscosity (2 mu D : D), K implicit
-surface tension, S the smoothing (1 - N)^T c m (1 - N). The shape functions N give gradients only. Where particles move
-with N v and forces act as N^T f, as printed, a zigzag of the surface does not show: N reduces it to a thousandth. What
-evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its energy is least.
+surface tension, S the smoothing (1 - N)^T c m (1 - N). The shape functions N give gradients only, and the velocity
+N v that slips on walls with friction: the stress that acts on a wall reaches the particles next to it, too. Where
+particles move with N v and forces act as N^T f, as printed, a zigzag of the surface does not show: N reduces it to a
+thousandth. What evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its
+energy is least.
 
 The rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface.
 They add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
@@ -46,7 +48,7 @@ class Flow:
 
 @dataclass(frozen=True, slots=True)
 class LostPower:
-    """Power that a velocity loses [W]: to viscosity, to smoothing."""
+    """Power that a velocity loses [W]: to viscosity, walls with friction included, and to smoothing."""
 
     viscous: float
     smoothing: float
@@ -61,6 +63,7 @@ class GalerkinEquations:
         fluid: its density, viscosity and smoothing.
         basis: `(3 n, d)` admissible velocities, orthonormal columns, by particle.
         stiffness: `(n, n)` of the surface tension, gamma K [N/m].
+        drag: `(n,)` friction on the particles on walls [kg/s].
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -70,6 +73,7 @@ class GalerkinEquations:
     fluid: Flow
     basis: sparse.csr_matrix
     stiffness: sparse.csr_matrix
+    drag: Floats
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -156,7 +160,9 @@ class GalerkinEquations:
         """m/dt + V + S + dt K of a velocity, [N]."""
         space, gradient = self.space, self.space.gradient(field)
         direct = self.momentum(field) / self.time_step + self.time_step * (self.stiffness @ field)
-        return direct + space.load_rough(self._friction(space.rough(field))) + space.load(self._stress(gradient))
+        rough = space.rough(field)
+        drag = self.drag[:, None] * (field - rough)
+        return direct + drag + space.load_rough(self._friction(rough) - drag) + space.load(self._stress(gradient))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -170,11 +176,11 @@ class GalerkinEquations:
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
         """What a velocity loses to forces that the prediction v* has set."""
-        space, resisted = self.space, self._friction(self.space.rough(start))
-        return LostPower(
-            viscous=float((self._stress(space.gradient(start)) * space.gradient(field)).sum()),
-            smoothing=float((resisted * space.rough(field)).sum()),
-        )
+        space = self.space
+        before, after = space.rough(start), space.rough(field)
+        inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
+        on_walls = float((self.drag[:, None] * (start - before) * (field - after)).sum())
+        return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
 
     def _stress(self, gradient: Floats) -> Floats:
         """Viscous stress times volume `(n, 3, 3)` [N m]."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import wall_corners
+from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import share
 
 PAIRS = np.triu_indices(3)
@@ -39,6 +39,16 @@ def cell_share(body: Body) -> Floats:
     """Part of a whole cell that each particle has, were walls not there, `(n,)`."""
     on_surface = np.arange(len(body.points)) < body.cloud.surface_count
     return np.where(on_surface, 0.5, 1.0)
+
+
+def wall_shares(body: Body, volumes: Floats) -> Floats:
+    """Wetted area that each particle on a wall stands for `(n,)` [m^2]: shared out by their volumes `(n,)` [m^3]."""
+    areas = np.zeros(len(body.points))
+    for wall, ring in enumerate(body.cloud.rings):
+        on_wall = body.cloud.wall == wall
+        wetted = ring_area(body.points, ring)
+        areas[on_wall] = wetted * volumes[on_wall] / volumes[on_wall].sum()
+    return areas
 
 
 def nodal_volumes(body: Body, density: Floats) -> Floats:

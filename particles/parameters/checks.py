@@ -68,8 +68,8 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
 
 def _wall_problems(solder: Solder) -> list[Problem]:
     scheme = solder.numerics.scheme
-    if scheme != "energy" and solder.wall != "free-slip":
-        message = f'the scheme "{scheme}" has walls with free slip only'
+    if scheme == "gripc" and solder.wall != "free-slip":
+        message = 'the scheme "gripc" has walls with free slip only'
         return [Problem("solder.wall", message, solder.wall, "free-slip")]
     if (solder.wall == "slip") == (solder.slip_length is not None):
         return []

@@ -7,6 +7,7 @@ from reflowshock.effect import Decision, Effect, decided, decision
 from reflowshock.particles.parameters.droplets import Droplet
 from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, SphFlow
+from reflowshock.particles.parameters.printing import Printing
 
 # Thickness of a boundary layer, over the length of the flow: with less, viscosity is left out where walls are smooth.
 THIN_LAYER = 0.01
@@ -129,5 +130,7 @@ def artificial_viscosity(scene: SphFlow) -> float:
 
 def decide_flow(scene: SphFlow) -> dict[str, Decision]:
     """Decide on all effects of a flow."""
+    if isinstance(scene, Printing):
+        return decide_flow(scene.drop)
     found = decided(FLOW_EFFECTS, scene)
     return found | decided(DROPLET_EFFECTS, scene) if isinstance(scene, Droplet) else found

@@ -62,6 +62,7 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "pads": drop.pad_radius is not None,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(drop.contact_angle),
         "hysteresis": drop.hysteresis is not None,
+        "walls that hold the liquid": solder.wall != "free-slip",
         "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (

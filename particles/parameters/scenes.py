@@ -293,7 +293,8 @@ class Drops(Parameters):
 class Oscillation(Parameters):
     """A free drop that swings in its second mode: it starts as a ball, with the velocity of that mode.
 
-    The amplitude is in radii, the duration in Rayleigh's periods.
+    The amplitude is in radii, the duration in Rayleigh's periods. The scheme inertia carries tetrahedra along, ispg is
+    the paper's particle method in a form that holds.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -301,6 +302,7 @@ class Oscillation(Parameters):
     periods: float = Field(2.0, ge=1, le=50)
     particles_per_radius: int = Field(4, ge=2, le=20)
     steps_per_period: int = Field(100, ge=16)
+    scheme: Literal["inertia", "ispg"] = "inertia"
 
     @property
     def radius(self) -> float:
@@ -314,7 +316,8 @@ class Oscillation(Parameters):
 
     def resolve(self, liquid: Liquid) -> Solder:
         """Return the drop's liquid."""
-        numerics = SolderNumerics(spacing=self.radius / self.particles_per_radius)
+        scheme = "ispg" if self.scheme == "ispg" else "energy"
+        numerics = SolderNumerics(spacing=self.radius / self.particles_per_radius, scheme=scheme)
         return Solder(volume=self.volume, numerics=numerics, **liquid.properties)
 
 

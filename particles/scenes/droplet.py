@@ -56,7 +56,7 @@ def solve_droplet(
 
 def droplet(scene: Droplet) -> Simulation:
     """Set up the particles under the pressure of surface tension, and the surface about them."""
-    points, triangles, spacing = _start(scene)
+    points, triangles, spacing = start_shape(scene)
     effects = decide_flow(scene)
     weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
@@ -71,7 +71,7 @@ def droplet(scene: Droplet) -> Simulation:
     return Simulation(fields, points.shape[1], law, surface, flow.device_of(scene))
 
 
-def _start(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:
+def start_shape(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:
     """Points `(3, n)` of a cubic lattice, surface about them, and the spacing at which they have the volume [m]."""
     radius, edge = 0.5 * scene.diameter, scene.volume ** (1.0 / 3.0)
     across = int(np.ceil(2.0 * scene.diameter / scene.spacing)) + 1

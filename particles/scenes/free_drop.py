@@ -15,13 +15,15 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
 from reflowshock.particles.scenes.metrics import Metrics
 from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import FLOW_RECORDS
-from reflowshock.particles.steps.inertial_step import InertialFlow
+from reflowshock.particles.steps.inertial_step import InertialFlow, InertialStep
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.surface_quality import vertex_normals
@@ -80,10 +82,21 @@ class _Swing:
     seconds: float = 0.0
 
     @classmethod
-    def start(cls, flow: InertialFlow, solder: Solder) -> "_Swing":
-        """Start with the drop as it is."""
-        swing = cls(flow, [_sample(flow, solder, 0.0)], [])
+    def start(cls, solder: Solder, amplitude: float) -> "_Swing":
+        """Start with a ball at rest and the velocity a omega/2 (-x, -y, 2 z), on its surface a omega R P2."""
+        radius, spacing = _radius(solder), solder.numerics.spacing
+        shells = round(radius / spacing)
+        if shells < 2:
+            raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
+        body = Body.at_rest(sphere_cloud(solder.volume, shells))
+        settled = InertialFlow(body, _physics(solder), InertialStep(solder.density))
+        omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+        settled.settle(SETTLING_STEP / omega, SETTLING_STEPS)
+        body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
+        swing = cls(settled, [_sample(settled, solder, 0.0)], [])
         swing.snap()
+        if solder.numerics.scheme == "ispg":
+            swing.flow = InertialFlow(body, _physics(solder), IspgStep())
         return swing
 
     def saved(self) -> dict[str, Any]:
@@ -93,7 +106,8 @@ class _Swing:
     @classmethod
     def restored(cls, saved: Mapping[str, Any], solder: Solder) -> "_Swing":
         """Make it again of what `saved` returned."""
-        flow = _flow(saved["flow"]["body"], solder)
+        solver = IspgStep() if solder.numerics.scheme == "ispg" else InertialStep(solder.density)
+        flow = InertialFlow(saved["flow"]["body"], _physics(solder), solver)
         flow.restore(saved["flow"])
         return cls(**{**saved, "flow": flow, "rows": [tuple(row) for row in saved["rows"].tolist()]})
 
@@ -113,7 +127,8 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
 ) -> FreeDrop:
     """Let a drop without walls and gravity swing in its second mode, or rest.
 
-    The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
+    Steps are those on tetrahedra, or of the scheme ispg if `solder.numerics.scheme` says so; triangles are not evened
+    out. The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
     modes of the grid, too, whose phases part in the first period and look like damping.
     The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
 
@@ -130,7 +145,7 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
         SolveFailed: a linear solve failed.
     """
     saved = checkpoint.read(RECORDS) if checkpoint else None
-    swing = _Swing.restored(saved, solder) if saved else _Swing.start(_start(solder, amplitude), solder)
+    swing = _Swing.restored(saved, solder) if saved else _Swing.start(solder, amplitude)
     flow, rows = swing.flow, swing.rows
     period = 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
     steps, time_step = ceil(periods * steps_per_period), period / steps_per_period
@@ -168,25 +183,9 @@ def _radius(solder: Solder) -> float:
     return float(np.cbrt(3.0 * solder.volume / (4.0 * pi)))
 
 
-def _start(solder: Solder, amplitude: float) -> InertialFlow:
-    """Set up the ball at rest and give it the velocity a omega/2 (-x, -y, 2 z), on its surface a omega R P2."""
-    radius, spacing = _radius(solder), solder.numerics.spacing
-    shells = round(radius / spacing)
-    if shells < 2:
-        raise ValueError(f"solder.numerics.spacing = {spacing:.4g} m must be below half the radius {radius:.4g} m")
-    ball = sphere_cloud(solder.volume, shells)
-    body = Body.at_rest(ball)
-    flow = _flow(body, solder)
-    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
-    flow.settle(SETTLING_STEP / omega, SETTLING_STEPS)
-    body.velocity = 0.5 * amplitude * omega * SECOND_MOMENT * body.points
-    return flow
-
-
-def _flow(body: Body, solder: Solder) -> InertialFlow:
-    """Let a body flow."""
-    physics = build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
-    return InertialFlow(body, physics, solder.density)
+def _physics(solder: Solder) -> Physics:
+    """What acts on a free drop."""
+    return build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:

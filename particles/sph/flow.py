@@ -13,6 +13,7 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.simulation import Loops, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
 from reflowshock.particles.sph.threads import ThreadLoops, threads_for
@@ -109,7 +110,7 @@ def run_flow(
         FloatingPointError: a position is not finite.
     """
     run = FlowRun(simulation)
-    saved = checkpoint.read((Picture,)) if checkpoint else None
+    saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
     if saved:
         run.restore(saved)
     else:

@@ -12,24 +12,31 @@ cube of their volume and the cubic spline; it is no parameter of a case, and the
 
 A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
 have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
+Parts that come as near to each other as particles stand, of two drops or of one, become one: the gap between them is
+closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched.
+
+On a solid body (`ground`) the surface stays closed: where it lies on it its tension is -gamma cos(theta) in place of
+gamma, along the ground, which makes the contact angle there as on the wall.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.core.surface_measure import area_gradient, surface_area, volume_and_gradient
+from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between, boundary_loops
-from reflowshock.particles.surface.level_set import Grid, extract_surface, relax, signed_distance
-from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
+from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between, boundary_loops, mirrored
+from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
+from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
 
 # Of the smoothing length: how far below the surface pressure ends.
 DEPTH = 0.187
@@ -37,11 +44,24 @@ DEPTH = 0.187
 EDGE, SKIN = 1.2, 0.5
 # The same: triangles lower than this above the wall are on it; no air is followed that would have to leave.
 TOUCH = 0.3
+# The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
+# tried where contact lines would meet in a point.
+MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
 # Steps after which triangles are evened out.
 CARE = 10
 # Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
 AREAS, LOWEST_QUALITY = (0.5, 2.0), 0.1
 WALL = Plate.horizontal(0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Liquids that merged or parted: the step, parts of the surface before and after, change of surface energy [J]."""
+
+    step: int
+    before: int
+    after: int
+    energy: float
 
 
 class SurfaceLost(ArithmeticError):
@@ -61,6 +81,9 @@ class LiquidSurface:
         rings: contact lines, anticlockwise about liquid, as vertices `(k,)`; found where triangles end.
         moves: number of steps.
         rebuilds: how often it was made anew.
+        ground: distance to solid bodies on which it may lie, negative in them; None where there are none.
+        wetness: `(m,)` how much of each vertex is on them, 0 to 1; and their normals there, `(m, 3)`.
+        meetings: liquids that merged or parted.
     """
 
     points: Floats
@@ -71,6 +94,9 @@ class LiquidSurface:
     rings: tuple[Indices, ...] = field(init=False)
     moves: int = 0
     rebuilds: int = 0
+    ground: LevelSet | None = None
+    wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
+    meetings: list[Meeting] = field(default_factory=list)
     _built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
     _lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     _shares: Floats = field(default_factory=lambda: np.empty((2, 0)))
@@ -83,6 +109,7 @@ class LiquidSurface:
         return {
             "points": self.points, "triangles": self.triangles, "rings": list(self.rings), "moves": self.moves,
             "rebuilds": self.rebuilds, "built_at": self._built_at, "shares": self._shares,
+            "meetings": list(self.meetings),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -90,6 +117,8 @@ class LiquidSurface:
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
         self.moves, self.rebuilds = saved["moves"], saved["rebuilds"]
         self._built_at, self._shares = saved["built_at"], saved["shares"]
+        self.meetings = saved["meetings"]
+        self._find_wetness()
         self._list(self._built_at)
 
     @property
@@ -105,27 +134,81 @@ class LiquidSurface:
     @property
     def energy(self) -> float:
         """E [J], of the triangles themselves."""
-        return self.tension * (surface_area(self.points, self.triangles) - self.cosine * self.wetted_area)
+        area, wet = surface_area(self.points, self.triangles), self.wetted_area
+        if self.ground is not None:
+            grounded = float(triangle_areas(self.points, self.triangles) @ self._wet_shares())
+            area, wet = area - grounded, wet + grounded
+        return self.tension * (area - self.cosine * wet)
 
-    def add_to(self, rates: Floats, fields: Fields, fluids: int) -> None:
-        """Add the accelerations that it gives the particles to rows 1 to 3 of their rates `(10, n)`.
+    def _wet_shares(self) -> Floats:
+        """How much of each triangle lies on the ground `(t,)`: what its highest vertex does."""
+        return self.wetness[0][self.triangles].min(axis=1)
+
+    def _find_wetness(self) -> None:
+        """Find what lies on the ground, none of it below."""
+        if self.ground is None or not len(self.points):
+            return
+        near = TOUCH * self.law.spacing
+        distance = self.ground.at(self.points, 1)
+        share = np.clip(2.0 - distance / near, 0.0, 1.0)
+        normals, close = np.zeros_like(self.points), share > 0.0
+        normals[close] = self.ground.gradient(self.points[close], 1)
+        normals[close] /= np.maximum(np.linalg.norm(normals[close], axis=1), 1e-300)[:, None]
+        away = (vertex_normals(self.points, self.triangles, len(self.points)) * normals).sum(axis=1) > 0.0
+        down = (distance < near) & ~away | (distance < 0.0)
+        self.points[down] -= distance[down, None] * normals[down]
+        share[away] = 0.0
+        self.wetness = share, normals
+
+    def add(self, points: Floats, triangles: Indices) -> None:
+        """Add the surface of more liquid, apart from this one: `(k, 3)` [m], `(t, 3)`."""
+        triangles = np.concatenate((self.triangles, triangles + len(self.points)))
+        self._take(np.concatenate((self.points, points)), triangles)
+
+    def take_out(self, vertices: NDArray[np.bool_]) -> tuple[Floats, Indices]:
+        """Give away connected parts, those of vertices `(m,)`: points and triangles."""
+        theirs = vertices[self.triangles[:, 0]]
+        used, numbers = np.unique(self.triangles[theirs], return_inverse=True)
+        found = self.points[used], numbers.reshape(-1, 3).astype(np.int32)
+        self._take(self.points, self.triangles[~theirs])
+        return found
+
+    def lie_on(self, ground: LevelSet | None) -> None:
+        """Lie from now on on this ground; the particles that carry it may be others, too."""
+        self.ground = ground
+        self._take(self.points, self.triangles)
+
+    def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
+        """Add the accelerations that it gives particles to rows 1 to 3 of their rates `(10, n)`.
+
+        Args:
+            rates: of the liquid.
+            fields: of all particles.
+            carriers: how many of them, the liquid's the first, carry the surface.
 
         Raises:
             SurfaceLost: there are no particles beside a vertex.
         """
-        self._update_lists(np.array(fields[:3])[:, :fluids])
+        self._update_lists(np.array(fields[:3])[:, :carriers])
         self._shares = np.empty((2, len(self._lists[1])))
         surface_loops.find_shares(self.points, self._lists, fields, self.law, self._shares)
         starts = self._lists[0][:-1]
         if (np.diff(self._lists[0]) == 0).any() or not np.add.reduceat(self._shares[0], starts).all():
             raise SurfaceLost("the liquid has left its surface")
-        surface_loops.share_forces(self._lists, self._shares, self.forces(), fields.mass, rates)
+        pushes = np.zeros((3, carriers))
+        surface_loops.share_forces(self._lists, self._shares, self.forces(), fields.mass, pushes)
+        rates[1:4] += pushes[:, : rates.shape[1]]
 
     def forces(self) -> Floats:
         """Forces -dE/dx on the vertices `(m, 3)` [N]; those of contact lines along the wall, which holds them."""
-        steep = area_gradient(self.points, self.triangles)
+        wet = None if self.ground is None else self._wet_shares()
+        steep = area_gradient(self.points, self.triangles, None if wet is None else 1.0 - wet)
         tension = self.tension * (1.0 - DEPTH * self.law.length * self._mean_curvature(steep))
         result = -tension * steep
+        if wet is not None:
+            share, normals = self.wetness
+            result += self.tension * self.cosine * area_gradient(self.points, self.triangles, wet)
+            result -= (share * (result * normals).sum(axis=1))[:, None] * normals
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
             pull = 0.5 * self.tension * self.cosine
@@ -141,7 +224,8 @@ class LiquidSurface:
             outward[ring] = 0.0
         area = np.linalg.norm(outward, axis=1)
         normals = outward / np.maximum(area, 1e-300)[:, None]
-        return float((steep * normals).sum() / area.sum())
+        free = area if self.ground is None else area * (1.0 - self.wetness[0])
+        return float((steep * normals).sum() / free.sum())
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
         """Move with the velocities of the particles `(3, n)` [m/s] over a time step [s].
@@ -157,9 +241,12 @@ class LiquidSurface:
             self._wet()
         if self.moves % CARE == 0:
             self._even_out()
-            if self._is_worn():
+            if self._meets():
+                self._make_anew(CLOSED)
+            elif self._is_worn():
                 self._make_anew()
             self.enclose(volume)
+        self._find_wetness()
 
     def _update_lists(self, liquid: Floats) -> None:
         """Find the particles beside each vertex again when either has moved half the skin."""
@@ -200,6 +287,7 @@ class LiquidSurface:
             self.points[ring, 2] = 0.0
         self._built_at = np.empty((0, 3))
         self._lists = np.zeros(len(self.points) + 1, np.int32), np.empty(0, np.int32)
+        self._find_wetness()
         return True
 
     def _even_out(self) -> None:
@@ -212,36 +300,41 @@ class LiquidSurface:
         """Whether triangles are too small, too large or slivers."""
         corner = self.points[self.triangles]
         square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
-        area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+        area = triangle_areas(self.points, self.triangles)
         even = np.sqrt(3.0) / 4.0 * (EDGE * self.law.spacing) ** 2
         low, high = AREAS
         return not low * even < area.mean() < high * even or bool(
             (4.0 * np.sqrt(3.0) * area / square).min() < LOWEST_QUALITY
         )
 
-    def _make_anew(self) -> None:
-        """Triangulate the same surface anew."""
-        self.rebuilds += 1
-        points, triangles = self._closed()
-        level = signed_distance(points, triangles, Grid.around(points, EDGE * self.law.spacing))
-        points, triangles = extract_surface(level)
-        if self.law.mirror:
-            points, triangles = between(points, triangles, (WALL,), 1e-6 * self.law.spacing)
-        try:
-            rings = boundary_loops(triangles)
-        except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
-            return
-        self._take(*relax(level, points, triangles, rings))
+    def _meets(self) -> bool:
+        """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
+        spacing, normals = self.law.spacing, vertex_normals(self.points, self.triangles, len(self.points))
+        for ring in self.rings:  # where it meets its image
+            normals[ring, 2] = 0.0
+            normals[ring] /= np.linalg.norm(normals[ring], axis=1)[:, None]
+        return narrowest_gap(self.points, normals, MEETING * spacing, spacing) < MEETING * spacing
 
-    def _closed(self) -> tuple[Floats, Indices]:
-        """The surface with its image behind the wall."""
-        if not self.law.mirror:
-            return self.points, self.triangles
-        image = len(self.points) + np.arange(len(self.points), dtype=np.int32)
-        for ring in self.rings:
-            image[ring] = ring
-        points = np.concatenate((self.points, self.points * np.array([1.0, 1.0, -1.0])))
-        return points, np.concatenate((self.triangles, image[self.triangles][:, ::-1]))
+    def _make_anew(self, gaps: Sequence[float] = (0.0,)) -> None:
+        """Triangulate the same surface anew, without gaps narrower than the first of `gaps` [spacings] that it can."""
+        self.rebuilds += 1
+        before, energy = parts_of(self.triangles), self.energy
+        closed = mirrored(self.points, self.triangles) if self.law.mirror else (self.points, self.triangles)
+        distance = signed_distance(*closed, Grid.around(closed[0], EDGE * self.law.spacing))
+        for gap in gaps:
+            level = closed_level(distance, gap * self.law.spacing) if gap else distance
+            points, triangles = extract_surface(level)
+            if self.law.mirror:
+                points, triangles = between(points, triangles, (WALL,), 1e-6 * self.law.spacing)
+            try:
+                rings = boundary_loops(triangles)
+            except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
+                continue
+            self._take(*relax(level, points, triangles, rings))
+            after = parts_of(self.triangles)
+            if gap or after != before:
+                self.meetings.append(Meeting(self.moves, before, after, self.energy - energy))
+            return
 
     def enclose(self, volume: float) -> None:
         """Move along the normals by one distance, contact lines along the wall, to enclose a volume [m^3]."""

@@ -88,6 +88,7 @@ class Simulation:
         law: what acts between two particles.
         surface: with tension; None where none acts.
         device: makes the loops of a law.
+        held: how many particles next to the liquid's stand still as walls do, but carry its surface.
         rows: neighbours.
         rates: `(10, n)` of the last positions, as `rates_of` returns them.
         time: [s].
@@ -99,6 +100,7 @@ class Simulation:
     law: Law
     surface: LiquidSurface | None = None
     device: Callable[[Law], Loops] = ThreadLoops
+    held: int = 0
     rows: Rows = field(init=False)
     rates: Floats = field(init=False)
     loops: Loops = field(init=False)
@@ -155,8 +157,10 @@ class Simulation:
             place += time_step * middle[axis]
             speed += time_step * rates[1 + axis]
         if self.surface:
-            volume = float((fields.mass[liquid] / fields.density[liquid]).sum())
-            self.surface.move(np.array(middle), time_step, volume)
+            carriers = slice(self.fluids + self.held)
+            volume = float((fields.mass[carriers] / fields.density[carriers]).sum())
+            velocity = np.pad(np.array(middle), ((0, 0), (0, self.held)))
+            self.surface.move(velocity, time_step, volume)
         if self.law.mirror:
             self._reflect(middle)
         density = fields.density[liquid] + half * rates[0]
@@ -184,7 +188,7 @@ class Simulation:
         self.loops.find_rates(self.fluids, self.rows.lists, fields, self.rates)
         self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
         if self.surface:
-            self.surface.add_to(self.rates, fields, self.fluids)
+            self.surface.add_to(self.rates, fields, self.fluids + self.held)
         for axis in range(3):
             fields[9 + axis][liquid] = self.rates[4 + axis]
 

@@ -68,13 +68,13 @@ def carry(lists, shares, velocity, time_step, points):
 
 
 @njit(cache=True)
-def share_forces(lists, shares, forces, mass, rates):
-    """Add the accelerations by forces on vertices `(m, 3)` to those of the particles, rows 1 to 3 of ``rates``."""
+def share_forces(lists, shares, forces, mass, pushes):
+    """Add the accelerations by forces on vertices `(m, 3)` to those of the particles, ``pushes`` `(3, n)`."""
     offsets, indices = lists
     for v in range(forces.shape[0]):
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
             along, across = shares[0, k] / mass[j], shares[1, k] / mass[j]
-            rates[1, j] += along * forces[v, 0]
-            rates[2, j] += along * forces[v, 1]
-            rates[3, j] += across * forces[v, 2]
+            pushes[0, j] += along * forces[v, 0]
+            pushes[1, j] += along * forces[v, 1]
+            pushes[2, j] += across * forces[v, 2]

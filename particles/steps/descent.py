@@ -8,6 +8,7 @@ the forces are the gradient of, the energy of the triangles.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,12 +79,12 @@ class Evening:
     """How the triangles are evened out.
 
     Attributes:
-        passes: of smoothing.
+        passes: of smoothing; of the last, the part that is left of a whole number is done.
         flips: whether edges are flipped, too.
         highest: energy that the body may have afterwards [J].
     """
 
-    passes: int
+    passes: float
     flips: bool
     highest: float
 
@@ -176,13 +177,13 @@ def _largest_share(excess: Callable[[float], float], below: float, above: float)
     return low
 
 
-def _offset(body: Body, physics: Physics, passes: int) -> Floats:
+def _offset(body: Body, physics: Physics, passes: float) -> Floats:
     """Displacement `(n, 3)` [m] of some passes of smoothing, as walls, planes and edges allow it."""
     cloud, surface = body.cloud, body.surface()
     count, planes = cloud.surface_count, surface_planes(cloud)
-    for _ in range(passes):
+    for done in range(ceil(passes)):
         offset = smoothing_offsets(surface.points, surface.triangles, count, cloud.rings, planes)
-        surface.points = surface.points + physics.admit(surface, offset)
+        surface.points = surface.points + min(1.0, passes - done) * physics.admit(surface, offset)
     result = np.zeros_like(body.points)
     result[:count] = surface.points - body.points[:count]
     return result

@@ -9,7 +9,7 @@ Moving least squares was tried first; its transpose scatters the force of the su
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,13 @@ from reflowshock.particles.physics.operators import Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base, stepped
 from reflowshock.particles.steps.step_equations import StepEquations
-from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.step_solver import Motion, StepSolver
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
 # Shift of a particle that calls for new tetrahedra, in spacings.
 SHIFT_TOLERANCE = 1e-6
+NO_NEIGHBOURS = NeighbourList(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,18 +230,29 @@ class PreparedInertialStep:
         return velocity if way <= bound else bound / way * velocity
 
 
-class InertialFlow:
-    """A body without walls and its steps."""
+class HasMass(StepSolver, Protocol):
+    """A step solver whose particles carry momentum."""
 
-    def __init__(self, body: Body, physics: Physics, density: float) -> None:
+    @property
+    def mass(self) -> sparse.csr_matrix:
+        """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
+
+    def stop(self, body: Body) -> None:
+        """Bring the body to rest."""
+
+
+class InertialFlow:
+    """A body without walls and its steps; triangles and particles are left as they move."""
+
+    def __init__(self, body: Body, physics: Physics, solver: HasMass) -> None:
         """Remember the volume to keep.
 
         Args:
             body: the liquid body; changed in place.
             physics: what acts on it.
-            density: of the liquid [kg/m^3].
+            solver: of the motion in a step; it needs no list of neighbours.
         """
-        self.body, self.physics, self.solver = body, physics, InertialStep(density)
+        self.body, self.physics, self.solver = body, physics, solver
         self.volume = body.volume()[0]
 
     def saved(self) -> dict[str, Any]:
@@ -270,7 +282,7 @@ class InertialFlow:
             SolveFailed: the linear solve failed.
         """
         body = self.body
-        motion = self.solver.start(body, self.physics).solve(time_step, self.volume)
+        motion = self.solver.prepare(body, self.physics, NO_NEIGHBOURS).solve(time_step, self.volume)
         body.velocity, body.pressure = motion.velocity, motion.pressure
         body.surface_pressure = motion.surface_pressure
         body.move(time_step, motion.transport, motion.twists)

@@ -57,8 +57,8 @@ class StepSolver(Protocol):
         """Radius of the neighbour list that it needs, in spacings."""
 
     @property
-    def smoothing_passes(self) -> int:
-        """How often the triangles are evened out after a step."""
+    def smoothing_passes(self) -> float:
+        """How often the triangles are evened out after a step; less than once where it is done in part."""
 
     @property
     def descends(self) -> bool:

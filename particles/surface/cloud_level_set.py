@@ -57,6 +57,14 @@ def between(points: Floats, triangles: Indices, walls: Sequence[Plate], toleranc
     return points[used], renumbered.reshape(-1, 3).astype(np.int32)
 
 
+def mirrored(points: Floats, triangles: Indices) -> tuple[Floats, Indices]:
+    """Return a surface that ends on the wall z = 0 with its image behind it: a closed one."""
+    image = len(points) + np.arange(len(points), dtype=np.int32)
+    for loop in boundary_loops(triangles):
+        image[loop] = loop
+    return np.concatenate((points, points * [1.0, 1.0, -1.0])), np.concatenate((triangles, image[triangles][:, ::-1]))
+
+
 def _loops(points: Floats, triangles: Indices, plate: Plate) -> list[Indices]:
     """The contact lines on a plate, those around liquid counter-clockwise seen from +z."""
     loops = boundary_loops(triangles)

@@ -66,16 +66,16 @@ class LevelSet:
     grid: Grid
     values: Floats
 
-    def at(self, points: Floats) -> Floats:
-        """Values at points `(n, 3)` by cubic splines, `(n,)` [m]."""
+    def at(self, points: Floats, order: int = 3) -> Floats:
+        """Values at points `(n, 3)` by splines, `(n,)` [m]; those of order 1 do without the whole grid's."""
         place = ((points - self.grid.origin) / self.grid.spacing).T
-        return map_coordinates(self.values, place, order=3, mode="nearest")
+        return map_coordinates(self.values, place, order=order, mode="nearest")
 
-    def gradient(self, points: Floats) -> Floats:
+    def gradient(self, points: Floats, order: int = 3) -> Floats:
         """Gradient at points, by central differences over a node spacing, `(n, 3)`."""
         reach = 0.5 * self.grid.spacing
-        steps = reach * np.eye(3)
-        return np.stack([(self.at(points + step) - self.at(points - step)) / (2.0 * reach) for step in steps], axis=1)
+        ends = [(self.at(points + step, order), self.at(points - step, order)) for step in reach * np.eye(3)]
+        return np.stack([(after - before) / (2.0 * reach) for after, before in ends], axis=1)
 
 
 def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:

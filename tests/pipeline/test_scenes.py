@@ -196,6 +196,15 @@ def test_a_droplet_goes_from_case_file_to_report(tmp_path, name, metrics):
     assert "<h2>Flow</h2>" in (tmp_path / "run/report.html").read_text()
 
 
+def test_drops_are_printed_from_case_file_to_report(tmp_path):
+    one = ("printing.columns=1", "printing.rows=1", "printing.layers=1", "scale=full")
+    ended = run("printing", tmp_path / "run", *one)
+    assert "report: " in ended.stdout, ended.stderr
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert {"drops", "volume_error", "connected_parts_max", "roughness_sa", "volume_drift"} <= summary["metrics"].keys()
+    assert {"part.stl", "height_map.png"} <= {path.name for path in (tmp_path / "run/particles").iterdir()}
+
+
 @pytest.mark.parametrize(
     ("name", "settings", "metrics"),
     [

@@ -8,6 +8,8 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
+from reflowshock.fem.division import path_levels
+from reflowshock.fem.division.path_levels import opaque_ratio
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.materials.roles import Materials
@@ -41,6 +43,20 @@ def test_window_with_levels_does_not_grow_where_it_has_turned_and_flows(name):
     coupled = flowing_pair(NESTED[name], SCHEMES["held_velocity, levels auto"])
     assert len(coupled.meso.motion.body.schedule) > 1
     assert coupled.spectral_radius() <= 1.0 + GROWTH
+
+
+def test_one_layer_is_as_good_as_two_that_just_take_the_larger_step():
+    just = 0.5 * np.pi / FRACTION
+    assert np.arccosh(opaque_ratio(FRACTION) * just) == pytest.approx(2.0 * np.arccosh(just), rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio, grows", [(None, False), (0.0, True)], ids=["as divided", "one layer of any elements"])
+def test_one_layer_that_just_takes_the_larger_step_lets_a_resonance_through(monkeypatch, ratio, grows):
+    pair, held = Pair(3, 1.0, 8 / 3, height=6, thinnest=0.25), SCHEMES["held_velocity, levels auto"]
+    if ratio is not None:
+        monkeypatch.setattr(path_levels, "opaque_ratio", lambda _: ratio)
+    growth = pair.coupled(held, 0.95).spectral_radius() - 1.0
+    assert growth > 1e-5 if grows else growth <= GROWTH
 
 
 def free_joint(pace: int) -> ExplicitMotion:

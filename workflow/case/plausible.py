@@ -42,6 +42,7 @@ BY_DIMENSION = {
     "stiffness per area": Range("1 N/m^3", "1e20 N/m^3"),
     "force": Range("1 pN", "1 MN"),
     "frequency": Range("1e-6 Hz", "1e12 Hz"),
+    "irradiance": Range("1e-3 W/m^2", "1e12 W/m^2"),
     "angle": Range("1e-9 rad", "1 turn"),
 }
 # By the last name of a key, where that says more than the dimension.
@@ -49,6 +50,7 @@ BY_NAME = {
     "young_modulus*": Range("1 kPa", "10 TPa"),
     "shear_modulus*": Range("1 Pa", "10 TPa"),
     "stiffness_coefficient": Range("1e-18 s", "1 s"),
+    "dose": Range("1e-3 J/m^2", "1e7 J/m^2"),
     "explicit_step": Range("1e-15 s", "1 s"),
     "implicit_step": Range("1e-15 s", "1e3 s"),
 }

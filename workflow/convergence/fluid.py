@@ -5,15 +5,16 @@ from math import ceil
 
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun
 from reflowshock.workflow.convergence.solder import of_metrics
-from reflowshock.workflow.fluid.case import DropletCase, FlowCase
+from reflowshock.workflow.fluid.case import DropletCase, FlowCase, PrintingCase
 
 ACROSS = {
     "dam_break": (20, 28, 40, 56), "poiseuille": (10, 14, 20, 28), "taylor_green": (16, 24, 32, 48),
-    "droplet": (10, 12, 16, 20),
+    "droplet": (10, 12, 16, 20), "printing": (8, 9, 10, 12),
 }  # fmt: skip
 SMOOTHING = (1.2, 1.5, 2.0)
 MEASURES = {
     "dam_break": ("", {"plateau_mean": "pressure of the plateau", "impact_onset": "time of the impact"}),
+    "printing": ("", {"roughness_sa": "roughness Sa", "height_max": "height of the part"}),
     "poiseuille": ("starting channel", {"profile_error_at_end": "speeds across the channel"}),
     "taylor_green": ("Taylor & Green", {"decay_rate_error": "rate of decay", "speed_error": "largest speed"}),
 }
@@ -27,7 +28,7 @@ def flow_study(case: FlowCase) -> ConvergenceStudy:
     """Particles across the scene; and at the coarsest of them the smoothing length."""
     exact, errors = measures(case)
     key, coarse = f"{case.kind}.numerics", ACROSS[case.kind][0]
-    across = "particles_per_diameter" if isinstance(case, DropletCase) else "particles_across"
+    across = "particles_per_diameter" if isinstance(case, DropletCase | PrintingCase) else "particles_across"
 
     def at(value: float) -> StudyRun:
         count = max(8, ceil(1.0 / value - ROUNDING))

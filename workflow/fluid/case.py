@@ -5,18 +5,21 @@ from typing import Any
 
 from reflowshock.particles.parameters.droplets import LEAST_SOUND_SPEED, Droplet
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphFlow, TaylorGreen
+from reflowshock.particles.parameters.printing import Printing
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 
+LEAST_PITCH = 0.25  # over the diameter of a drop: less is no pattern, but a pile
 FEWEST_ACROSS = 8.0  # particles across a droplet: fewer resolve no surface
 LARGEST_REYNOLDS = 1000.0  # of vortices and channels: beyond they are turbulent, and no exact solution holds
 
 
-def _flow_of(scene: str) -> Pipeline:
-    """The flow of one scene, and its report."""
-    particles = Stage("particles", (scene,), (), ("particles/flow.h5", "particles/particles.vtu"))
+def _flow_of(scene: str, *products: str) -> Pipeline:
+    """The flow of one scene with its products, and its report."""
+    files = ("flow.h5", "particles.vtu", *products)
+    particles = Stage("particles", (scene,), (), tuple(f"particles/{name}" for name in files))
     return Pipeline((particles, report_of("particles")))
 
 
@@ -65,10 +68,36 @@ class DropletCase(FlowCase):
     droplet: Droplet
 
 
+class PrintingCase(FlowCase):
+    """Drops of ink are printed on a plate and on each other."""
+
+    kind = "printing"
+    stages = _flow_of("printing", "part.stl", "height_map.npy", "height_map.csv", "height_map.png", "layers.csv")
+
+    printing: Printing
+
+
+def of_printing(case: PrintingCase) -> list[Problem]:
+    """Find drops on top of each other, particles that are too large, sound that is too slow, too short delays."""
+    scene = case.printing
+    found, numerics = _of_particles("printing", scene.drop), scene.numerics
+    least = LEAST_PITCH * scene.length
+    if scene.pitch < least:
+        allowed = f">= {micrometres(least)}, {LEAST_PITCH:g} diameters of a drop"
+        found.append(Problem("printing.pitch", "drops would land on each other", micrometres(scene.pitch), allowed))
+    if scene.delay < scene.length / scene.speed:
+        allowed = f">= {from_si(scene.length / scene.speed, 'us', digits=3)}, in which a drop goes its diameter"
+        delay = from_si(scene.delay, "us", digits=3)
+        found.append(Problem("printing.delay", "a drop would land in the one before", delay, allowed))
+    if numerics.device != "cpu":
+        found.append(Problem("printing.numerics.device", "prints on the processor only", numerics.device, "cpu"))
+    return found
+
+
 def of_droplet(case: DropletCase) -> list[Problem]:
     """Find what is said twice or half, sound that is too slow for the impact, and particles that are too large."""
     drop, found = case.droplet, []
-    numerics, given = drop.numerics, drop.model_fields_set
+    given = drop.model_fields_set
     if drop.weber is not None and drop.speed is not None:
         weber = drop.density * drop.speed**2 * drop.diameter / drop.surface_tension
         allowed = f"speed or weber; this speed makes the Weber number {weber:.4g}"
@@ -79,21 +108,28 @@ def of_droplet(case: DropletCase) -> list[Problem]:
     if drop.reynolds is not None and not drop.impact_speed:
         allowed = "together with droplet.speed or droplet.weber"
         found.append(Problem("droplet.reynolds", "says nothing without an impact", drop.reynolds, allowed))
+    found += _of_particles("droplet", drop)
+    if drop.has_wall and drop.start != "sphere":
+        found.append(Problem("droplet.start", "only a free drop starts as a cube", drop.start, "sphere"))
+    return found
+
+
+def _of_particles(kind: str, drop: Droplet) -> list[Problem]:
+    """Find a spacing said twice, particles that are too large for a drop, and sound that is too slow."""
+    found, numerics = [], drop.numerics
     if numerics.spacing is not None and numerics.particles_per_diameter is not None:
         allowed = "numerics.spacing or numerics.particles_per_diameter"
         message = "the particles per diameter are given, too"
-        found.append(Problem("droplet.numerics.spacing", message, micrometres(numerics.spacing), allowed))
+        found.append(Problem(f"{kind}.numerics.spacing", message, micrometres(numerics.spacing), allowed))
     if drop.spacing > drop.diameter / FEWEST_ACROSS:
         allowed = f"<= {micrometres(drop.diameter / FEWEST_ACROSS)}, {FEWEST_ACROSS:g} particles across the drop"
         message = "is too large for this drop"
-        found.append(Problem("droplet.numerics.spacing", message, micrometres(drop.spacing), allowed))
+        found.append(Problem(f"{kind}.numerics.spacing", message, micrometres(drop.spacing), allowed))
     if numerics.sound_speed < LEAST_SOUND_SPEED:
         change, least = 100.0 / numerics.sound_speed**2, ceil(LEAST_SOUND_SPEED)
         message = f"sound is too slow for {drop.fastest:.3g} m/s: densities would change by {change:.2g} %"
         allowed = f">= {least}, {from_si(least * drop.fastest, 'm/s', digits=3)}"
-        found.append(Problem("droplet.numerics.sound_speed", message, numerics.sound_speed, allowed))
-    if drop.has_wall and drop.start != "sphere":
-        found.append(Problem("droplet.start", "only a free drop starts as a cube", drop.start, "sphere"))
+        found.append(Problem(f"{kind}.numerics.sound_speed", message, numerics.sound_speed, allowed))
     return found
 
 

@@ -11,16 +11,18 @@ from rich.table import Table
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen, largest_time_step
+from reflowshock.particles.parameters.printing import Printing
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.text import short
-from reflowshock.workflow.fluid.case import FlowCase
+from reflowshock.workflow.fluid.case import FlowCase, micrometres
 from reflowshock.workflow.process.terminal import new_table
 
 # On one core of an AMD EPYC, in a plane: of a step and of each of its particles; processor times of cases/dam_break.
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
 # In space, with a surface: of a step of each particle, and of each of its triangles, cases/drop_impact.
 SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.5e-3, 3.4e-6
+LIQUID_AND_BESIDE = 2.0  # of a drop's particles: what a step of printing costs, with the cured ones beside it
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
 
@@ -52,18 +54,17 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     effects = decide_flow(scene)
     step = time_step(scene, effects["flow_viscosity"]["on"])
     steps = ceil(scene.until / step)
-    in_space = isinstance(scene, Droplet)
+    in_space = isinstance(scene, Droplet | Printing)
     each = SECONDS_PER_PARTICLE_IN_SPACE if in_space else SECONDS_PER_PARTICLE
-    seconds = SECONDS_TO_START + steps * (
-        (SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * scene.particles
-    )
+    moving = LIQUID_AND_BESIDE * scene.drop.particles if isinstance(scene, Printing) else scene.particles
+    seconds = SECONDS_TO_START + steps * ((SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * moving)
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})
 
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:
     """Return the time step that a flow is expected to take [s]."""
     length, viscosity = scene.numerics.smoothing_length * scene.spacing, scene.liquid_viscosity if is_viscous else 0.0
-    tension = scene.surface_tension if isinstance(scene, Droplet) else 0.0
+    tension = scene.surface_tension if isinstance(scene, Droplet | Printing) else 0.0
     return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity, tension)
 
 
@@ -77,7 +78,7 @@ def flow_tables(case: FlowCase, outlook: FlowForecast) -> Iterator[RenderableTyp
     """Yield particles, speeds and time steps."""
     scene: SphFlow = case.scene
     table = new_table("\nFlow", "what", "value", "remark")
-    unit = "um" if isinstance(scene, Droplet) else "mm"
+    unit = "um" if isinstance(scene, Droplet | Printing) else "mm"
     spacing = f"{from_si(outlook.spacing, unit, digits=3)} spacing at the start"
     table.add_row("particles", f"{outlook.particles}", spacing)
     numbers = f"of {from_si(scene.length, unit, digits=3)} and {from_si(scene.fastest, 'm/s', digits=3)}"
@@ -87,6 +88,9 @@ def flow_tables(case: FlowCase, outlook: FlowForecast) -> Iterator[RenderableTyp
     table.add_row("time step", short(outlook.time_step), f"{outlook.steps} steps for {short(scene.until)}")
     if isinstance(scene, Droplet):
         _add_droplet(table, scene)
+    if isinstance(scene, Printing):
+        _add_droplet(table, scene.drop)
+        _add_printing(table, scene)
     if isinstance(scene, DamBreak):
         table.add_row("unit of time", short(scene.unit_of_time), "sqrt(H / g)")
     if isinstance(scene, TaylorGreen):
@@ -106,3 +110,14 @@ def _add_droplet(table: Table, scene: Droplet) -> None:
         table.add_row("cap at rest", f"{base:.3f} x {height:.3f} D", "width on the wall and height, without weight")
     else:
         table.add_row("pressure at rest", from_si(scene.laplace_pressure, "Pa", digits=4), "4 gamma / D")
+
+
+def _add_printing(table: Table, scene: Printing) -> None:
+    """Add what is printed, and how it cures."""
+    pattern = f"{scene.columns} x {scene.rows} in {scene.layers} layer{'s' if scene.layers > 1 else ''}"
+    table.add_row("drops", f"{scene.drops}", pattern)
+    base = f"{scene.pitch / scene.base:.3g} times the width of a drop on the plate, {micrometres(scene.base)}"
+    table.add_row("pitch", micrometres(scene.pitch), base)
+    wet = "before the next drop lands" if scene.cure_time <= scene.delay else "after the next drop has landed"
+    table.add_row("cured after", short(scene.cure_time), wet)
+    table.add_row("followed", short(scene.followed), "of each drop; what is then liquid rests until it is cured")

@@ -11,7 +11,7 @@ from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.reference.dam_break import measured_pressure
 from reflowshock.particles.reference.viscous_flows import starting_channel
 from reflowshock.workflow.case.text import number, percent, quantity, short
-from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase
+from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, PrintingCase
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.scene import Field, Group, Scene
@@ -24,7 +24,8 @@ IN_PLANE, IN_SPACE = (0.0, -1.0, 0.0), (0.3, -1.0, 0.25)  # where the viewer loo
 NO_FACES = np.zeros((0, 3), dtype=int)
 HEADLINE = (
     "spread_max", "time_of_spread_max", "mean_pressure", "pressure_error", "roundness", "base_over_diameter",
-    "height_over_diameter", "capillary_number",
+    "height_over_diameter", "capillary_number", "drops", "volume_error", "connected_parts_max", "roughness_sa",
+    "height_max", "voids",
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
     "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip
@@ -33,6 +34,7 @@ CAPTIONS = {
     "dam_break": "Pressure at the sensor; front of the liquid; energies.",
     "poiseuille": "Speeds at the end, and the exact ones; largest speed in time.",
     "droplet": "Shape of the drop; pressure in it; its largest speed and its energies, in time.",
+    "printing": "Height of what is printed; kinetic and surface energy of what is liquid; particles after drops.",
     "taylor_green": "The largest speed in time, and the exact one; kinetic energy.",
 }
 
@@ -51,6 +53,8 @@ def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> 
     elif isinstance(case, PoiseuilleCase):
         end = result.pictures[-1]
         context["curves"]["flow"] = channel_curves(case, end.time, end.points, end.velocity, result.history)
+    elif isinstance(case, PrintingCase):
+        context["curves"]["flow"] = printing_curves(case, result.history)
     elif isinstance(case, DropletCase):
         context["curves"]["flow"] = droplet_curves(case, result.history)
     else:
@@ -146,20 +150,33 @@ def droplet_curves(case: DropletCase, history: Mapping[str, Floats]) -> list[Cha
     ]
 
 
+def printing_curves(case: PrintingCase, history: Mapping[str, Floats]) -> list[Chart]:
+    """Return the height of the part, and energies of what is liquid, over the drops that have landed."""
+    scene = case.printing
+    drops, axis = history["drops"], Axis("drops that have landed")
+    unit = np.pi * scene.length**2 * scene.surface_tension
+    energies = [
+        Series("kinetic", drops, history["kinetic_energy"] / unit, ORANGE, line="none", marks=True),
+        Series("surface and wetting", drops, history["surface_energy"] / unit, line="none", marks=True),
+    ]
+    return [
+        Chart(axis, Axis("height [um]"), [Series("highest point", drops, 1e6 * history["height"])]),
+        Chart(axis, Axis("energy over that of a sphere's surface"), energies),
+    ]
+
+
 def flow_scene(result: "FlowResult", case: FlowCase) -> Scene:
     """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
-    in_space = isinstance(case, DropletCase)
+    in_space = isinstance(case, DropletCase | PrintingCase)
     frames = [short(one.time) if in_space else f"{1e3 * one.time:.4g} ms" for one in result.pictures]
     speeds = [np.sqrt((one.velocity**2).sum(axis=1)) for one in result.pictures]
     highest = max(float(np.quantile(one, 0.99)) for one in speeds)
     pressures = np.concatenate([one.pressure for one in result.pictures])
     low, high = (float(value) for value in np.quantile(pressures, (0.02, 0.98)))
-    points = result.pictures[0].points
     size = 0.9 * case.scene.spacing
-    part = np.zeros(len(points), dtype=int)
     groups = [
         Group(
-            "liquid", one.points, NO_FACES, part, "#5f86ad", only=frame, size=size,
+            "liquid", one.points, NO_FACES, np.zeros(len(one.points), dtype=int), "#5f86ad", only=frame, size=size,
             values={"speed": speed[None], "pressure": one.pressure[None]},
         )
         for frame, (one, speed) in enumerate(zip(result.pictures, speeds, strict=True))

@@ -7,7 +7,14 @@ from typing import Any
 
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.workflow.case.run import Findings, Run, at_most, metric
-from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, TaylorGreenCase
+from reflowshock.workflow.fluid.case import (
+    DamBreakCase,
+    DropletCase,
+    FlowCase,
+    PoiseuilleCase,
+    PrintingCase,
+    TaylorGreenCase,
+)
 from reflowshock.workflow.process.terminal import progress_bar
 
 VOLUME_DRIFT = 0.02  # of the liquid, which is weakly compressible: densities stay within about 1 %
@@ -21,6 +28,7 @@ VORTEX_LIMITS = {"volume_drift": VOLUME_DRIFT, "decay_rate_error": DECAY_ERROR}
 # Of a droplet: what its surface encloses, over the volume at the start; and where the exact shape at rest is known, its
 # pressure, roundness, width and height.
 DROPLET_LIMITS = {"volume_drift": VOLUME_DRIFT, "surface_volume_drift": 0.02}
+PART_LIMITS = {"volume_drift": 0.01, "volume_error": 0.01}  # of what particles and solid bodies have of the ink
 REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "height_error": 0.02}
 
 
@@ -31,6 +39,21 @@ def flow_droplet(run: Run[DropletCase], folder: Path) -> Findings:
     known = rest_metrics(run.case.droplet)
     limits = DROPLET_LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
     return _flow(run, folder, solve_droplet, limits)
+
+
+def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:
+    """Print drops on a plate and on each other."""
+    from reflowshock.particles.printing.part_files import write_part
+    from reflowshock.particles.printing.printing import solve_printing
+    from reflowshock.workflow.fluid.height_map import draw_heights
+
+    def solve(*arguments: Any) -> Any:
+        result, part = solve_printing(*arguments)
+        write_part(folder, part)
+        draw_heights(folder / "height_map.png", part.x, part.y, part.heights)
+        return result
+
+    return _flow(run, folder, solve, PART_LIMITS)
 
 
 def flow_dam_break(run: Run[DamBreakCase], folder: Path) -> Findings:

@@ -101,21 +101,22 @@ def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, 
 
 def _of_oscillation(case: OscillationCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_oscillation
-    from reflowshock.particles.parameters.estimate import inertial_seconds
+    from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
     from reflowshock.particles.parameters.scenes import rayleigh_period
     from reflowshock.particles.steps.time_step import capillary_limit
 
     scene, solder = case.oscillation, case.molten
     spacing = solder.numerics.spacing
     steps = ceil(scene.periods * scene.steps_per_period)
+    seconds = ispg_seconds if scene.scheme == "ispg" else inertial_seconds
     return SolderForecast(
         effects=decide_oscillation(solder),
         particles=scene.particles,
-        scheme="inertia",
+        scheme=scene.scheme,
         spacing=spacing,
         capillary_limit=capillary_limit(solder.density, spacing, solder.surface_tension),
         largest_step=rayleigh_period(scene, solder) / scene.steps_per_period,
-        seconds={"reflow": SECONDS_TO_START + inertial_seconds(scene.particles, steps)},
+        seconds={"reflow": SECONDS_TO_START + seconds(scene.particles, steps)},
     )
 
 

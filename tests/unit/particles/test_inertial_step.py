@@ -10,7 +10,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.steps.inertial_step import InertialFlow
+from reflowshock.particles.steps.inertial_step import InertialFlow, InertialStep
 
 
 def test_a_plate_arrives_exactly_and_rests():
@@ -18,7 +18,9 @@ def test_a_plate_arrives_exactly_and_rests():
     density, speed, time_step, target = 3.0, 0.5, 0.02, Plate.horizontal(1.045, side=1.0)
     body = Body.at_rest(joint_cloud(JointGeometry(1.0, 0.5, 0.5), 0.7, 0.25))
     travel = Travel(1, target, speed, lever=0.5)
-    flow = InertialFlow(body, Physics((), (Mass(density),), (Inertia(density),), (), (), (travel,)), density)
+    flow = InertialFlow(
+        body, Physics((), (Mass(density),), (Inertia(density),), (), (), (travel,)), InertialStep(density)
+    )
     heights = []
     for _ in range(7):
         flow.step(time_step)

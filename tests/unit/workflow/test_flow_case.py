@@ -11,6 +11,7 @@ from reflowshock.workflow.pipeline.reader import read_case
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 DAM, CHANNEL, VORTICES = (CASES / name / "case.toml" for name in ("dam_break", "poiseuille", "taylor_green"))
+PRINTING = CASES / "printing/case.toml"
 FREE, CAP, IMPACT = (CASES / name / "case.toml" for name in ("young_laplace", "static_caps", "drop_impact"))
 BAD_VALUES = {
     "no room": (DAM, "dam_break.width=3.3 m", ["dam_break.tank_length", '"3.22 m"', "> dam_break.width = 3.3 m"]),
@@ -45,6 +46,10 @@ BAD_VALUES = {
     "a length for a tension": (FREE, "droplet.surface_tension=1 m", ["droplet.surface_tension", "N/m"]),
     "a diametre": (FREE, "droplet.diametre=1 um", ["droplet.diametre", "unknown key", "diameter"]),
     "a drop of few particles": (FREE, "droplet.numerics.particles_per_diameter=4", ["particles_per_diameter", ">= 8"]),
+    "no pitch": (PRINTING, "printing.pitch=-1 um", ["printing.pitch", "> 0"]),
+    "drops on each other": (PRINTING, "printing.pitch=2 um", ["printing.pitch", "on each other", ">= 5.75 um"]),
+    "drops in each other": (PRINTING, "printing.delay=2 us", ["printing.delay", "in the one before", ">= 7.67 us"]),
+    "no order": (PRINTING, "printing.order=rastr", ["one of raster, serpentine, interleaved", "did you mean raster?"]),
     "unknown key": (VORTICES, "taylor_green.sides=1 mm", ["taylor_green.sides", "unknown key", "side"]),
 }
 

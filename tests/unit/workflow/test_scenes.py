@@ -204,7 +204,7 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop.pad_radius=0.5 mm", "pads"),
         ("drop.symmetry=half", "planes of symmetry"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
-        ("solder.wall=no-slip", "free slip only"),
+        ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),

@@ -1,0 +1,24 @@
+"""Files of a printed part: its surface, height map and layers."""
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from reflowshock.particles.printing.part import Part
+
+LAYERS = "layer,drops,parts_of_layer,parts_so_far,mean_top_um,highest_um"
+
+
+def write_part(folder: Path, part: Part) -> None:
+    """Write `part.stl` [mm], `height_map.npy` [m], `height_map.csv` and `layers.csv` [um].
+
+    The first row and column of `height_map.csv` are y and x; `height_map.npy` has a row for each x.
+    """
+    meshio.Mesh(1e3 * part.points, [("triangle", part.triangles)]).write(folder / "part.stl", file_format="stl")
+    np.save(folder / "height_map.npy", part.heights)
+    table = np.zeros((len(part.x) + 1, len(part.y) + 1))
+    table[1:, 0], table[0, 1:], table[1:, 1:] = 1e6 * part.x, 1e6 * part.y, 1e6 * part.heights
+    np.savetxt(folder / "height_map.csv", table, fmt="%.3f", delimiter=",", header="um: x down, y across")
+    rows = part.layers * [1.0, 1.0, 1.0, 1.0, 1e6, 1e6]
+    np.savetxt(folder / "layers.csv", rows, fmt=("%d", "%d", "%d", "%d", "%.3f", "%.3f"), delimiter=",", header=LAYERS)

@@ -1,0 +1,53 @@
+"""Gaps in a liquid's surface, and the surface that closes them: liquids that meet become one."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, signed_distance
+
+# Cosine of the angle between the normals of vertices that face each other, at most.
+FACING = -0.5
+
+
+def narrowest_gap(points: Floats, normals: Floats, gap: float, aside: float) -> float:
+    """Return the narrowest gap outside a surface between vertices that face each other [m]; inf where none is found.
+
+    Args:
+        points: `(m, 3)` [m].
+        normals: `(m, 3)`, outward.
+        gap: only narrower ones are looked for [m].
+        aside: how far beside the mean normal of two vertices they may be [m].
+    """
+    first, second = cKDTree(points).query_pairs(float(np.hypot(gap, aside)), output_type="ndarray").T
+    facing = (normals[first] * normals[second]).sum(axis=1) < FACING
+    first, second = first[facing], second[facing]
+    normal = normals[first] - normals[second]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    between = points[second] - points[first]
+    height = (between * normal).sum(axis=1)
+    beside = np.linalg.norm(between - height[:, None] * normal, axis=1)
+    return float(height[(height > 0.0) & (height < gap) & (beside < aside)].min(initial=np.inf))
+
+
+def closed_level(level: LevelSet, gap: float) -> LevelSet:
+    """Return a level set whose gaps narrower than ``gap`` [m] are filled.
+
+    What is within half of it is added, and what is then within half of it of the outside is taken away again.
+    """
+    wider = signed_distance(*extract_surface(LevelSet(level.grid, level.values - 0.5 * gap)), level.grid)
+    return LevelSet(level.grid, np.minimum(level.values, wider.values + 0.5 * gap))
+
+
+def part_of_vertex(triangles: Indices, count: int) -> Indices:
+    """Return to which connected part of a surface each of its vertices `(count,)` belongs, from 0 on."""
+    rows, columns = triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
+    return connected_components(graph, directed=False)[1]
+
+
+def parts_of(triangles: Indices) -> int:
+    """Number of connected parts of a surface whose vertices all have triangles."""
+    return int(part_of_vertex(triangles, int(triangles.max()) + 1).max()) + 1

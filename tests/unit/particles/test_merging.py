@@ -1,0 +1,102 @@
+"""Drops that meet in delta-SPH: gaps of a surface, its level set without them, drops that become one."""
+
+import numba
+import numpy as np
+import pytest
+
+from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.liquid_surface import EDGE, Meeting
+from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.surface.closing import closed_level, narrowest_gap, part_of_vertex, parts_of
+from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface
+
+INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0, "gravity": 0.0}
+
+
+def two_drops(viscosity=0.5, **changes):
+    """Two drops that fly at each other along x, or come down on a wall beside each other."""
+    numerics = DropletNumerics(particles_per_diameter=8)
+    scene = Droplet(**INK | {"viscosity": viscosity, "numerics": numerics} | changes)
+    one = droplet(scene)
+    points, aside = np.array(one.fields[:3]), np.array([0.5 + 0.5 * EDGE * one.law.spacing, 0.0, 0.0])
+    both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
+    pressure = np.full(both.shape[1], scene.laplace_pressure)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), pressure, one.law)
+    fields.u[:] = 0.3 * np.sign(-both[0])
+    fields.w[:] = -scene.impact_speed
+    surface = one.surface
+    corners, triangles = surface.points.copy(), surface.triangles.copy()
+    surface.points = corners - aside
+    surface.add(corners + aside, triangles)
+    return Simulation(fields, both.shape[1], one.law, surface), 2.0 * scene.volume
+
+
+def go(simulation, until):
+    while simulation.time < until:
+        simulation.step(simulation.time_step())
+    return simulation
+
+
+def test_a_gap_between_faces_is_found_and_a_film_is_not():
+    normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    points = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]])
+    assert narrowest_gap(points, normals, 0.5, 0.5) == pytest.approx(0.3)
+    assert narrowest_gap(points, normals, 0.2, 0.5) == np.inf
+    assert narrowest_gap(points, normals, 0.5, 0.05) == np.inf
+    assert narrowest_gap(points, -normals, 0.5, 0.5) == np.inf  # liquid is between them
+    assert narrowest_gap(points, np.abs(normals), 0.5, 0.5) == np.inf
+
+
+def test_narrow_gaps_close_and_wide_ones_stay():
+    for distance, parts in ((2.1, 1), (2.6, 2)):
+        grid = Grid.around(np.array([[-2.5, -1.0, -1.0], [2.5, 1.0, 1.0]]), 0.15)
+        x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
+        values = np.hypot(np.hypot(np.abs(x) - 0.5 * distance, y), z) - 1.0
+        points, triangles = extract_surface(closed_level(LevelSet(grid, values), 0.3))
+        assert parts_of(triangles) == parts
+        assert len(np.unique(part_of_vertex(triangles, len(points)))) == parts
+        far = points[np.abs(points[:, 0]) > 0.5 * distance]
+        off = np.hypot(np.hypot(np.abs(far[:, 0]) - 0.5 * distance, far[:, 1]), far[:, 2]) - 1.0
+        assert np.abs(off).max() < 0.1 * 0.15
+
+
+def test_drops_that_meet_become_one_and_keep_volume_and_momentum():
+    simulation, volume = two_drops()
+    surface = simulation.surface
+    assert parts_of(surface.triangles) == 2
+    before = surface.energy
+    go(simulation, 0.1)
+    (meeting,) = surface.meetings
+    assert (meeting.before, meeting.after) == (2, 1)
+    assert -0.05 * before < meeting.energy < 0.0
+    assert surface.volume == pytest.approx(volume, rel=0.005)
+    fields = simulation.fields
+    speeds = np.array(fields[3:6])
+    assert np.abs(speeds @ fields.mass).max() < 1e-12 * (np.abs(speeds) @ fields.mass).max()
+
+
+def test_drops_beside_each_other_on_a_wall_become_one():
+    simulation, volume = two_drops(viscosity=0.2, speed=1.0, contact_angle=np.pi / 3.0)
+    surface = go(simulation, 0.3).surface
+    assert any((one.before, one.after) == (2, 1) for one in surface.meetings)
+    assert len(surface.rings) == 1
+    assert surface.volume == pytest.approx(volume, rel=0.01)
+
+
+def test_threads_and_a_restart_change_no_merging(every_thread):
+    found = []
+    for threads in (1, every_thread):
+        numba.set_num_threads(threads)
+        simulation, _ = two_drops()
+        go(simulation, 0.08)
+        found.append(np.concatenate((np.array(simulation.fields[:8]).ravel(), simulation.surface.points.ravel())))
+    simulation, _ = two_drops()
+    saved = go(simulation, 0.05).saved()
+    again, _ = two_drops()
+    again.restore(saved)
+    go(again, 0.08)
+    assert again.surface.meetings and isinstance(again.surface.meetings[0], Meeting)
+    found.append(np.concatenate((np.array(again.fields[:8]).ravel(), again.surface.points.ravel())))
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])

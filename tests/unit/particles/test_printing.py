@@ -1,0 +1,86 @@
+"""Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
+
+import meshio
+import numpy as np
+import pytest
+
+from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.parameters.droplets import DropletNumerics
+from reflowshock.particles.parameters.printing import Cure, Printing, PrintingNumerics
+from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
+from reflowshock.particles.printing.part_files import write_part
+from reflowshock.particles.printing.printing import solve_printing
+
+INK = {
+    "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
+    "pitch": 23.2e-6, "columns": 2, "rows": 1,
+}  # fmt: skip
+BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: a second has to land on what is cured
+
+
+def printing(**changes):
+    return Printing(**INK | {"numerics": BRIEF} | changes)
+
+
+def test_orders_of_drops():
+    scene = printing(columns=2, rows=2, pitch=2.0)
+    assert scene.places() == [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+    assert scene.model_copy(update={"order": "serpentine"}).places()[2:] == [(1.0, 1.0), (-1.0, 1.0)]
+    assert scene.model_copy(update={"order": "interleaved"}).places()[:2] == [(-1.0, -1.0), (1.0, 1.0)]
+    assert scene.drops == 4 and isinstance(scene.drop.numerics, DropletNumerics)
+    assert printing(substrate_angle=0.1).velocity[0] == pytest.approx(3.0 * np.sin(0.1))
+
+
+def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
+    scene = printing(cure=Cure(depth=10e-6))
+    deposit = Deposit(scene)
+    deposit.add_drop((0.0, 0.0))
+    top = deposit.points[:, 2]
+    deposit.expose(deposit.cures_in())
+    assert deposit.cure()
+    held = deposit.state == HELD
+    assert held.any() and (deposit.state == LIQUID).any()
+    assert top[held].mean() > top[~held].mean()  # light comes from above
+    before = deposit.points[held].copy()
+    for _ in range(3):
+        deposit.step(1.0)
+    deposit.update()
+    assert np.array_equal(deposit.points[held], before)
+    deposit.expose(1.0)
+    assert deposit.cure()
+    assert (deposit.state == SOLID).all() and deposit.simulation is None and len(deposit.bodies) == 1
+    deposit.add_drop((0.0, 0.0))
+    below, above = deposit.points[deposit.drop == 0], deposit.points[deposit.drop == 1]
+    gaps = np.linalg.norm(below[:, None] - above, axis=2)
+    assert gaps.min() > scene.spacing
+
+
+def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
+    scene, calls = printing(), []
+
+    class Killed(Exception):
+        pass
+
+    def kill(done):
+        calls.append(done)
+        if done >= 0.5 and len(calls) > 300:
+            raise Killed
+
+    whole, part = solve_printing(scene)
+    with pytest.raises(Killed):
+        solve_printing(scene, kill, Checkpoint(tmp_path / "part", (scene,), interval=0.0))
+    again = Checkpoint(tmp_path / "part", (scene,), interval=0.0)
+    continued, same = solve_printing(scene, None, again)
+    assert again.continued
+    for name, column in whole.history.items():
+        assert np.array_equal(column, continued.history[name]), name
+    assert np.array_equal(whole.pictures[-1].points, continued.pictures[-1].points)
+    assert np.array_equal(part.heights, same.heights)
+    metrics = {name: value for name, (value, _) in whole.metrics.items()}
+    assert metrics["drops"] == 2 and abs(metrics["volume_error"]) < 0.01 and abs(metrics["volume_drift"]) < 0.01
+    assert metrics["roughness_sa"] > 0.0 and metrics["connected_parts_max"] in (1.0, 2.0)
+    assert metrics["height_max"] == pytest.approx(part.heights.max())
+    assert 0.5 * scene.length < part.heights.max() < scene.length
+    write_part(tmp_path, part)
+    assert len(meshio.read(tmp_path / "part.stl").cells[0].data) == len(part.triangles)
+    assert (tmp_path / "layers.csv").read_text().splitlines()[1].startswith("1,2,")
