@@ -103,7 +103,7 @@ def in_unit(value: float, unit: str) -> float:
 def _with_its_base(unit: str) -> "tuple[pint.Unit, pint.Unit]":
     """Return a unit, and that of its dimension in SI base units."""
     parsed = registry().Unit(unit)
-    return parsed, registry().get_base_units(parsed)[1]
+    return parsed, registry().Unit(registry().get_base_units(parsed)[1])
 
 
 @lru_cache(maxsize=1024)
