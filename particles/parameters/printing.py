@@ -12,6 +12,8 @@ from reflowshock.quantity import Quantity
 
 # sqrt(rho D^3 / gamma) that a drop is followed at most after it has landed, if it does not cure before.
 SETTLING = 2.0
+# Beside liquid, in diameters: how far it may get before the next drop lands or cures.
+WITHIN_REACH = 1.0
 
 
 class Cure(Parameters):

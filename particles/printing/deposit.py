@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.particles.scenes.droplet import start_shape
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
@@ -29,8 +29,6 @@ from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_dista
 LIQUID, HELD, SOLID = 0, 1, 2
 # In spacings: how far the surface of a new drop is from particles below it.
 CLEARANCE = 1.1
-# Beside liquid, in diameters: how far it may get before the next drop lands or cures.
-WITHIN_REACH = 1.0
 ROUNDING = 1e-9
 # In spacings of the particles: nodes of the level set of the ground; in these, how far about a body it is told.
 NODES, MARGIN = 0.75, 4

@@ -11,7 +11,7 @@ from rich.table import Table
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen, largest_time_step
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.text import short
@@ -22,7 +22,8 @@ from reflowshock.workflow.process.terminal import new_table
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
 # In space, with a surface: of a step of each particle, and of each of its triangles, cases/drop_impact.
 SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.5e-3, 3.4e-6
-LIQUID_AND_BESIDE = 2.0  # of a drop's particles: what a step of printing costs, with the cured ones beside it
+# What a solid particle within reach of the liquid costs, over a liquid one: cases/printing, 64 drops.
+SOLID_SHARE = 0.65
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
 
@@ -56,9 +57,17 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     steps = ceil(scene.until / step)
     in_space = isinstance(scene, Droplet | Printing)
     each = SECONDS_PER_PARTICLE_IN_SPACE if in_space else SECONDS_PER_PARTICLE
-    moving = LIQUID_AND_BESIDE * scene.drop.particles if isinstance(scene, Printing) else scene.particles
+    moving = _in_the_loops(scene) if isinstance(scene, Printing) else scene.particles
     seconds = SECONDS_TO_START + steps * ((SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * moving)
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})
+
+
+def _in_the_loops(scene: Printing) -> float:
+    """Return what a step of printing costs on average, in liquid particles: a drop, and solid ones within reach."""
+    support = 2.0 * scene.numerics.smoothing_length * scene.spacing
+    reach = 0.5 * scene.base + WITHIN_REACH * scene.length + support
+    columns, rows = (min(count, 2.0 * reach / scene.pitch) for count in (scene.columns, scene.rows))
+    return scene.drop.particles * (1.0 + SOLID_SHARE * 0.5 * scene.layers * columns * rows)
 
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:
