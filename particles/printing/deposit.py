@@ -14,9 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
-from reflowshock.particles.scenes.droplet import start_shape
+from reflowshock.particles.scenes.droplet import liquid_of, start_shape
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
@@ -72,12 +71,9 @@ class Deposit:
         drop = self.scene.drop
         points, surface, spacing = start_shape(drop)
         self.start = points, surface, spacing
-        weight = -drop.gravity if decide_flow(drop)["droplet_gravity"]["on"] else 0.0
-        law = flow.law_of(drop, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
-        self.law = flow.in_space(law, spacing, mirror=True, no_slip=True)
+        self.law, tension = liquid_of(drop, spacing)
         self.ground = _far_from_all(self.scene, spacing)
         self.fields = flow.liquid_and_walls(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
-        tension = drop.surface_tension if decide_flow(drop)["droplet_tension"]["on"] else 0.0
         none = np.empty((0, 3)), np.empty((0, 3), np.int32)
         self.surface = LiquidSurface(*none, tension, cos(drop.angle), self.law)
 

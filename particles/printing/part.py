@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import label
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
@@ -13,7 +11,7 @@ from reflowshock.particles.core.surface_measure import volume_and_gradient
 from reflowshock.particles.parameters.printing import Printing
 from reflowshock.particles.printing.deposit import Deposit
 from reflowshock.particles.sph.flow import Metrics
-from reflowshock.particles.surface.closing import closed_level
+from reflowshock.particles.surface.closing import closed_level, groups
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 
 # In spacings of the particles: gaps of the part that are none; particles whose drops touch are not farther apart.
@@ -90,8 +88,7 @@ def _layers(scene: Printing, deposit: Deposit) -> Floats:
 def _parts(points: Floats, reach: float) -> int:
     """Number of groups of points `(n, 3)` that are no farther than a reach from each other [m]."""
     first, second = cKDTree(points).query_pairs(reach, output_type="ndarray").T
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(points),) * 2)
-    return int(connected_components(graph, directed=False)[0])
+    return int(groups(first, second, len(points)).max()) + 1
 
 
 def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:

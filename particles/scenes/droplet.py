@@ -13,6 +13,7 @@ from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.flow import FlowResult, Metrics
+from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
@@ -57,11 +58,7 @@ def solve_droplet(
 def droplet(scene: Droplet) -> Simulation:
     """Set up the particles under the pressure of surface tension, and the surface about them."""
     points, triangles, spacing = start_shape(scene)
-    effects = decide_flow(scene)
-    weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
-    law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
-    law = flow.in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
-    tension = scene.surface_tension if effects["droplet_tension"]["on"] else 0.0
+    law, tension = liquid_of(scene, spacing)
     pressure = np.full(points.shape[1], scene.laplace_pressure if tension else 0.0)
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), pressure, law)
     fields.w[:] = -scene.impact_speed
@@ -69,6 +66,15 @@ def droplet(scene: Droplet) -> Simulation:
     for _ in range(ENCLOSURES):
         surface.enclose(scene.volume)
     return Simulation(fields, points.shape[1], law, surface, flow.device_of(scene))
+
+
+def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
+    """What acts between particles of a droplet that are a spacing apart [m], and its surface tension [N/m]."""
+    effects = decide_flow(scene)
+    weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
+    law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
+    law = flow.in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
+    return law, scene.surface_tension if effects["droplet_tension"]["on"] else 0.0
 
 
 def start_shape(scene: Droplet) -> tuple[Floats, tuple[Floats, Indices], float]:

@@ -2,7 +2,6 @@
 
 Formula, loop, data and orchestration stand apart. `smoothing.py` and `pair_terms.py` are functions of one pair of
 particles; `particle_rates.py` sums them over the neighbours of one particle; `threads.py` has the loops over particles,
-`cuda_loops.py` the same on a GPU,
-`fluid_state.py` the arrays, `simulation.py` the steps with time, `flow.py` a run from scene to result. Surface tension
-is `liquid_surface.py`, with its loops in `surface_loops.py`.
+`cuda_loops.py` the same on a GPU, `fluid_state.py` the arrays, `simulation.py` the steps with time, `flow.py` a run
+from scene to result. Surface tension is `liquid_surface.py`, with its loops in `surface_loops.py`.
 """

@@ -43,8 +43,12 @@ def closed_level(level: LevelSet, gap: float) -> LevelSet:
 
 def part_of_vertex(triangles: Indices, count: int) -> Indices:
     """Return to which connected part of a surface each of its vertices `(count,)` belongs, from 0 on."""
-    rows, columns = triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
+    return groups(triangles.ravel(), np.roll(triangles, 1, axis=1).ravel(), count)
+
+
+def groups(first: Indices, second: Indices, count: int) -> Indices:
+    """Return to which group each of ``count`` things belongs, from 0 on, where the pairs of two lists hang together."""
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     return connected_components(graph, directed=False)[1]
 
 

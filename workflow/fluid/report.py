@@ -160,7 +160,7 @@ def printing_curves(case: PrintingCase, history: Mapping[str, Floats]) -> list[C
         Series("surface and wetting", drops, history["surface_energy"] / unit, line="none", marks=True),
     ]
     return [
-        Chart(axis, Axis("height [um]"), [Series("highest point", drops, 1e6 * history["height"])]),
+        Chart(axis, Axis("height [µm]"), [Series("highest point", drops, 1e6 * history["height"])]),
         Chart(axis, Axis("energy over that of a sphere's surface"), energies),
     ]
 
