@@ -20,7 +20,7 @@ from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
 from reflowshock.particles.surface.closing import part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import mirrored
 from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance
@@ -140,7 +140,10 @@ class Deposit:
         liquid, held = self.liquid, np.flatnonzero(self.state == HELD)
         near = self._within_reach(np.concatenate((liquid, held)))
         self.order = np.concatenate((liquid, held, near))
-        fields = Fields(*(one[self.order] for one in self.fields[:12]), *np.zeros((3, len(held) + len(near))))
+        walls = np.zeros((5, len(held) + len(near)))
+        fields = Fields(*(one[self.order] for one in self.fields[:12]), *walls)
+        depth = -self.ground.at(self.points[near], 1) / self.law.length
+        fields.wall_room[len(held) :] = beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
         self.surface.lie_on(self.ground if self.bodies else None)
         self.simulation = Simulation(
             fields, len(liquid), self.law, self.surface, flow.device_of(self.scene), len(held)

@@ -1,6 +1,7 @@
 """Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
 
 import meshio
+import numba
 import numpy as np
 import pytest
 
@@ -53,6 +54,24 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     below, above = deposit.points[deposit.drop == 0], deposit.points[deposit.drop == 1]
     gaps = np.linalg.norm(below[:, None] - above, axis=2)
     assert gaps.min() > scene.spacing
+
+
+def test_one_thread_and_two_print_the_same_bits():
+    found = []
+    for threads in (1, 2):
+        deposit = Deposit(printing())
+        deposit.add_drop((0.0, 0.0))
+        deposit.expose(1.0)
+        deposit.cure()
+        deposit.add_drop((5e-6, 0.0))
+        numba.set_num_threads(threads)
+        for _ in range(150):
+            deposit.step(1.0)
+        deposit.update()
+        found.append((deposit.points, deposit.surface.points, deposit.fields.density))
+    assert (deposit.surface.wetness[0] > 0.0).any()
+    for one, two in zip(*found, strict=True):
+        assert np.array_equal(one, two)
 
 
 def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
