@@ -17,6 +17,8 @@ from reflowshock.fem.kernels.levels import (
     Interface,
     PacedForces,
     StepArrays,
+    forces_of,
+    paced_forces_of,
     take_steps,
 )
 from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
@@ -90,7 +92,7 @@ class StepsAtOnce:
             return None
         entries = [{name: term.arrays[name] for name, term in alike.items()} for alike in found.values()]
         rest = PACES - len(found)
-        arrays = (*(NOTHING._replace(**own) for own in entries), *(NOTHING,) * rest)
+        arrays = tuple(forces_of(NOTHING._replace(**own)) for own in [*entries, *[{}] * rest])
         slowest = np.full(len(body.mass), max(found, default=1))
         if len(body.element_paces):
             np.minimum.at(slowest, body.elements.cells, body.element_paces[:, None])
@@ -98,7 +100,7 @@ class StepsAtOnce:
         moved = np.sum(own[:, None] <= every, axis=0)
         order, tie = np.argsort(own, kind="stable"), body.tie
         tied = tie.slave[order], tie.master[order], tie.weight[order]
-        return cls(PacedForces(arrays, every), order, tied, moved, list(found.values()))
+        return cls(paced_forces_of(arrays, every), order, tied, moved, list(found.values()))
 
     def take(
         self, motion: Motion, state: tuple[np.ndarray, np.ndarray], interface: Interface, accelerations: np.ndarray

@@ -7,7 +7,8 @@ force [N], weighted sum of forces [N].
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.experimental import structref
 from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.box_rotation import add_turned_block_forces, add_turned_row_forces
@@ -48,16 +49,43 @@ class ForceArrays(NamedTuple):
     path: Path
 
 
-class PacedForces(NamedTuple):
+@structref.register
+class ForcesType(types.StructRef):
+    """Type of ``Forces``."""
+
+
+@structref.register
+class PacedForcesType(types.StructRef):
+    """Type of ``PacedForces``."""
+
+
+class Forces(structref.StructRefProxy):
+    """``ForceArrays`` behind one pointer: by value, each array is seven arguments of each function it goes through."""
+
+
+class PacedForces(structref.StructRefProxy):
     """Force terms by the steps in which they act.
 
     Attributes:
-        arrays: ``PACES`` of them; there is one compiled program for all numbers of paces.
+        arrays: ``PACES`` times ``Forces``; there is one compiled program for all numbers of paces.
         every: ``(PACES,)`` in how many steps each of them acts once; 0 where there is none.
     """
 
-    arrays: tuple[ForceArrays, ...]
-    every: NDArray[np.int64]
+
+structref.define_proxy(Forces, ForcesType, list(ForceArrays._fields))
+structref.define_proxy(PacedForces, PacedForcesType, ["arrays", "every"])
+
+
+@njit(cache=True)
+def forces_of(arrays):
+    """Return the ``Forces`` of ``ForceArrays``: the class itself, called by the interpreter, is compiled every time."""
+    return Forces(*arrays)
+
+
+@njit(cache=True)
+def paced_forces_of(arrays, every):
+    """Return the ``PacedForces`` with these attributes."""
+    return PacedForces(arrays, every)
 
 
 class StepArrays(NamedTuple):
@@ -104,7 +132,7 @@ class Interface(NamedTuple):
     impulses: NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit(inline="always")  # compiled once, inside ``take_steps``
 def add_forces(arrays, displacement, force):
     """Subtract the internal force of all terms, as their ``add`` does.
 
@@ -207,7 +235,7 @@ def slaves_moved(motion, forces, substep):
     return moved
 
 
-@njit(cache=True)
+@njit(inline="always")
 def add_paced_forces(motion, forces, substep, pushed):
     """Put the forces that act after a step into those of a motion; ``pushed (n, 3)`` is zero between calls.
 

@@ -19,13 +19,15 @@ class FlowNumerics(Parameters):
     The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme ispg is the
     paper's method in a form that holds, for a drop with inertia on a uniform wall. The scheme gripc is what Hu et al.
     print, for comparison: time steps end at the capillary limit, and drops break up.
+
+    Where max_steps is not given, it is 1000; with ispg as many more as the slowest swing of the solder dies away in.
     """
 
     scheme: Literal["energy", "ispg", "gripc"] = "energy"
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)
-    max_steps: int = Field(1000, ge=1)
+    max_steps: int | None = Field(None, ge=1)
 
 
 class SolderNumerics(FlowNumerics):

@@ -24,7 +24,6 @@ from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, de
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Acting, Physics
-from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -33,14 +32,12 @@ from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.particles.steps.step_solver import StepSolver
-from reflowshock.particles.steps.time_step import TimeStep, capillary_limit
+from reflowshock.particles.steps.time_step import TimeStep, capillary_limit, largest_step, most_steps
 from reflowshock.particles.surface.contact_line import ContactLine
 
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
 
 CALM_CAPILLARY_TIMES = 20.0
-# Longest step of the scheme ispg, in periods of the drop's swing: with a quarter of one a swing hardly dies away.
-LONGEST_OF_SWING = 1.0 / 16.0
 FEWEST_PER_EDGE = 5
 
 
@@ -142,19 +139,10 @@ def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
 
 def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
     """Set up a flow from rest, with only the effects that are on."""
-    limit = capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
-    largest, bound = solder.numerics.time_step_limit * limit, "capillary multiple"
-    if solder.numerics.scheme == "ispg" and largest > LONGEST_OF_SWING * swing_period(solder):
-        largest, bound = LONGEST_OF_SWING * swing_period(solder), "swing"
+    largest, bound = largest_step(solder, cloud.spacing)
     time_step = TimeStep(largest, cloud.spacing, largest, bound, bound)
     physics, solver = build_physics(solder, effects, lines), step_solver(solder, effects)
     return LiquidFlow(Body.at_rest(cloud), physics, time_step, solver)
-
-
-def swing_period(solder: Solder) -> float:
-    """Period of the slowest mode of a free drop of all the solder [s]."""
-    radius = float(np.cbrt(0.75 * solder.volume / np.pi))
-    return 2.0 * np.pi / rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
 
 
 def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
@@ -172,7 +160,7 @@ def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRul
     """When a reflow ends: at rest, or with inertia at the end of the process at the latest."""
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     end_time = solder.process_time if effects["inertia"] else float("inf")
-    return StopRule(solder.numerics.max_steps, solder.numerics.tolerance, calm_time, end_time)
+    return StopRule(most_steps(solder, cloud.spacing), solder.numerics.tolerance, calm_time, end_time)
 
 
 def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:

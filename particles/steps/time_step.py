@@ -1,8 +1,12 @@
 """Adaptive time step: bounded by the displacement in a step, the energy, and a multiple of the capillary limit."""
 
 from dataclasses import dataclass
+from math import ceil, pi
 
 import numpy as np
+
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
 
 LARGEST_DISPLACEMENT = 0.25
 GROWTH = 1.15
@@ -11,6 +15,11 @@ SAFETY = 0.8
 AIM = 0.9
 # Share of the largest step below which no smaller one is tried.
 SMALLEST_SHARE = 1e-9
+# Longest step of the scheme ispg, in periods of the drop's swing: with a quarter of one a swing hardly dies away.
+LONGEST_OF_SWING = 1.0 / 16.0
+# Steps to rest, where a case does not say how many at most; with ispg, besides, those in which a free drop's swing
+# would decay by exp(-40).
+MOST_STEPS, DECAYS = 1000, 40.0
 
 
 class StepCollapsed(RuntimeError):
@@ -20,6 +29,36 @@ class StepCollapsed(RuntimeError):
 def capillary_limit(density: float, spacing: float, surface_tension: float) -> float:
     """Largest stable step of an explicit surface tension, 0.25 sqrt(rho h^3 / (2 pi gamma)) [s]."""
     return float(0.25 * np.sqrt(density * spacing**3 / (2.0 * np.pi * surface_tension)))
+
+
+def swing_period(solder: Solder) -> float:
+    """Period of the slowest mode of a free drop of all the solder [s]."""
+    return 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
+
+
+def largest_step(solder: Solder, spacing: float) -> tuple[float, str]:
+    """Upper bound of the time step [s] of particles at a spacing [m], and what it is."""
+    largest = solder.numerics.time_step_limit * capillary_limit(solder.density, spacing, solder.surface_tension)
+    of_swing = LONGEST_OF_SWING * swing_period(solder)
+    if solder.numerics.scheme == "ispg" and largest > of_swing:
+        return of_swing, "swing"
+    return largest, "capillary multiple"
+
+
+def most_steps(solder: Solder, spacing: float) -> int:
+    """Steps after which a run to rest has failed: what the case says, else what the scheme may need."""
+    numerics = solder.numerics
+    if numerics.max_steps is not None:
+        return numerics.max_steps
+    if numerics.scheme != "ispg":
+        return MOST_STEPS
+    decay = DECAYS / lamb_decay_rate(2, _radius(solder), solder.density, solder.viscosity)
+    return MOST_STEPS + ceil(min(decay, solder.process_time) / largest_step(solder, spacing)[0])
+
+
+def _radius(solder: Solder) -> float:
+    """Radius of a free drop of all the solder [m]."""
+    return float(np.cbrt(0.75 * solder.volume / pi))
 
 
 @dataclass(slots=True)

@@ -83,14 +83,14 @@ def _of_drops(case: DropsCase) -> SolderForecast:
 
 def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SolderForecast:
     from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
-    from reflowshock.particles.steps.time_step import capillary_limit
+    from reflowshock.particles.steps.time_step import capillary_limit, largest_step, most_steps
 
     solder = case.molten
     numerics = solder.numerics
     limit = capillary_limit(solder.density, numerics.spacing, solder.surface_tension)
-    largest = numerics.time_step_limit * limit
+    largest, _ = largest_step(solder, numerics.spacing)
     scheme: str = numerics.scheme
-    steps = min(numerics.max_steps, ceil(solder.process_time / largest))
+    steps = min(most_steps(solder, numerics.spacing), ceil(solder.process_time / largest))
     if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
         scheme, seconds = "inertia", inertial_seconds(particles, steps)
     if scheme == "ispg":

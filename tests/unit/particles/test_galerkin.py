@@ -63,12 +63,26 @@ def test_loads_are_the_transposed(body, space):
 
 
 def test_volumes_have_the_moments_of_the_body(body, space):
+    """Those of inertia are soft: next to nothing is missing where particles fill a body well."""
     volume, first, second = body_moments(body)
     assert volume == pytest.approx(body.volume()[0])
     assert space.volumes.sum() == pytest.approx(volume)
     assert space.volumes @ body.points == pytest.approx(first)
-    assert (body.points * space.volumes[:, None]).T @ body.points == pytest.approx(second)
+    soft = 0.02 * volume * body.cloud.spacing**2
+    assert (body.points * space.volumes[:, None]).T @ body.points == pytest.approx(second, abs=soft)
     assert space.volumes.min() > 0.0
+
+
+def test_particles_of_a_thin_film_keep_their_volumes():
+    """One spacing thick, its inner particles near its surfaces: with exact moments 4e-4 of the mean are left."""
+    film = Body.at_rest(box_cloud(1.0, 6))
+    inner = (film.cloud.wall < 0) & (np.arange(len(film.points)) >= film.cloud.surface_count)
+    above = film.points[:, 2] > 0.5
+    film.points = film.points * [1.0, 1.0, 0.2]
+    film.points[inner, 2] = 0.1 + np.where(above, 0.072, -0.072)[inner]
+    volumes = Galerkin.of(film).volumes
+    assert volumes.min() > 0.2 * volumes.mean()
+    assert volumes @ film.points == pytest.approx(body_moments(film)[1])
 
 
 def test_a_uniform_pressure_pushes_the_surface_only(body):
@@ -78,10 +92,12 @@ def test_a_uniform_pressure_pushes_the_surface_only(body):
 
 
 def test_linear_velocities_have_the_energy_of_the_body(body):
-    """A stretch: sum of m v v, exact by the moments."""
+    """A stretch: sum of m v v, by the moments, which are soft."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     second = np.diag(body_moments(body)[2])
-    assert equations.kinetic(body.points * [1.0, 1.0, -2.0]) == pytest.approx(0.5 * (second @ [1.0, 1.0, 4.0]))
+    assert equations.kinetic(body.points * [1.0, 1.0, -2.0]) == pytest.approx(
+        0.5 * (second @ [1.0, 1.0, 4.0]), rel=2e-3
+    )
 
 
 def test_the_projection_keeps_the_volumes(ball):

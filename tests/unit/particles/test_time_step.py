@@ -1,6 +1,9 @@
+from math import ceil
+
 import pytest
 
-from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep, largest_step, most_steps
 
 
 def test_a_flow_that_no_step_can_follow_is_an_error():
@@ -38,3 +41,28 @@ def test_a_step_at_its_bound_goes_on_as_far_as_the_spacing_allows_and_the_next_o
     assert (step.size, step.binding) == (1.0, "capillary multiple")
     step.cut_for_energy()
     assert step.steps_within_reach(speed=1e-4) == 1.0
+
+
+def test_ispg_may_take_as_many_steps_as_its_slowest_swing_needs_to_die_away():
+    """Values of the paper: a swing decays at 5 mu / (rho R^2) and has 16 steps a period, 2334 steps in all."""
+    numerics = SolderNumerics(scheme="ispg", time_step_limit=100.0)
+    solder = Solder(volume=1e-9, surface_tension=4.985, viscosity=0.227, numerics=numerics)
+    size, bound = largest_step(solder, 1e-4)
+    assert bound == "swing"
+    assert size == pytest.approx(1.43e-3 / 16.0, rel=0.02)
+    assert (most_steps(solder, 1e-4) - 1000) * size == pytest.approx(
+        40.0 * 8930.0 * 6.2e-4**2 / (5.0 * 0.227), rel=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "steps"), [({}, 1000), ({"max_steps": 7}, 7), ({"scheme": "ispg", "max_steps": 7}, 7)]
+)
+def test_the_case_says_how_many_steps_else_a_thousand(settings, steps):
+    assert most_steps(Solder(volume=1e-9, numerics=SolderNumerics(**settings)), 1e-4) == steps
+
+
+def test_ispg_takes_no_more_steps_than_the_process():
+    """Without viscosity a swing never dies away."""
+    solder = Solder(volume=1e-9, viscosity=1e-9, process_time=0.1, numerics=SolderNumerics(scheme="ispg"))
+    assert most_steps(solder, 1e-4) == 1000 + ceil(0.1 / largest_step(solder, 1e-4)[0])
