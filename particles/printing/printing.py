@@ -157,7 +157,7 @@ def _sample(run: PrintRun) -> None:
     deposit = run.deposit
     if deposit.simulation is None:
         return
-    top = max([float(deposit.surface.points[:, 2].max()), *(float(points[:, 2].max()) for points, _ in deposit.bodies)])
+    top = max([float(deposit.surface.points[:, 2].max()), *(float(body.points[:, 2].max()) for body in deposit.bodies)])
     fastest, kinetic = deposit.simulation.fastest, deposit.simulation.kinetic_energy
     run.rows.append((deposit.time, float(run.landed), fastest, kinetic, deposit.surface.energy, top))
 

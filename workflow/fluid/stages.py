@@ -45,7 +45,7 @@ def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:
     """Print drops on a plate and on each other."""
     from reflowshock.particles.printing.part_files import write_part
     from reflowshock.particles.printing.printing import solve_printing
-    from reflowshock.workflow.fluid.height_map import draw_heights
+    from reflowshock.workflow.fluid.printed_part import draw_heights
 
     def solve(*arguments: Any) -> Any:
         result, part = solve_printing(*arguments)

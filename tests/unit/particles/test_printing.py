@@ -11,6 +11,7 @@ from reflowshock.particles.parameters.printing import Cure, Printing, PrintingNu
 from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
 from reflowshock.particles.printing.part_files import write_part
 from reflowshock.particles.printing.printing import solve_printing
+from reflowshock.workflow.fluid.printed_part import layer_table, part_scene
 
 INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
@@ -102,4 +103,12 @@ def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
     assert 0.5 * scene.length < part.heights.max() < scene.length
     write_part(tmp_path, part)
     assert len(meshio.read(tmp_path / "part.stl").cells[0].data) == len(part.triangles)
-    assert (tmp_path / "layers.csv").read_text().splitlines()[1].startswith("1,2,")
+    (layer,) = part.layers
+    assert layer.volume == pytest.approx((1.0 + metrics["volume_error"]) * 2 * scene.drop_volume)
+    assert layer.roughness_sa == metrics["roughness_sa"] and layer.roughness_sz == metrics["roughness_sz"]
+    table = layer_table(tmp_path / "layers.csv")
+    assert table["head"][:3] == ["layer", "height [µm]", "Sa [µm]"]
+    assert [row[0] for row in table["rows"]] == ["1"] and float(table["rows"][0][4]) == pytest.approx(12.74, rel=0.01)
+    scene_3d = part_scene(tmp_path / "part.stl")
+    assert scene_3d.fields[0].high == pytest.approx(1e6 * part.points[:, 2].max(), rel=1e-5)
+    assert len(scene_3d.groups[0].points) == len(part.points)
