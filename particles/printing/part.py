@@ -68,6 +68,16 @@ class Part:
     layers: list[Layer]
     voids: Floats
 
+    @property
+    def outcome(self) -> str:
+        """What became of the drops beside each other: merged, with voids or not, partly so, or separate."""
+        parts, drops = self.layers[-1].parts_so_far, self.layers[0].drops
+        if len(self.voids):
+            return "voids"
+        if parts >= drops:
+            return "separate"
+        return "merged" if parts == 1 else "partly merged"
+
 
 def part_of(scene: Printing, deposit: Deposit) -> Part:
     """Return the part that solid bodies make."""

@@ -9,6 +9,7 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.droplets import DropletNumerics
 from reflowshock.particles.parameters.printing import Cure, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
+from reflowshock.particles.printing.part import Layer, Part
 from reflowshock.particles.printing.part_files import write_part
 from reflowshock.particles.printing.printing import solve_printing
 from reflowshock.workflow.fluid.printed_part import layer_table, part_scene
@@ -73,6 +74,16 @@ def test_one_thread_and_two_print_the_same_bits():
     assert (deposit.surface.wetness[0] > 0.0).any()
     for one, two in zip(*found, strict=True):
         assert np.array_equal(one, two)
+
+
+@pytest.mark.parametrize(
+    ("parts", "voids", "outcome"),
+    [(1, 0, "merged"), (4, 0, "separate"), (2, 0, "partly merged"), (1, 2, "voids"), (4, 1, "voids")],
+)
+def test_a_part_says_what_became_of_its_drops(parts, voids, outcome):
+    nothing = np.empty(0)
+    layers = [Layer(k, 4, 4, parts, 1.0, 1.0, 1.0, 1.0, 1.0, voids) for k in (1, 2)]
+    assert Part(nothing, nothing, nothing, nothing, nothing, layers, np.ones(voids)).outcome == outcome
 
 
 def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
