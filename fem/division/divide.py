@@ -83,7 +83,9 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
 def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Give the models the cells that ``by_buffer`` gives them, and the meso model levels where nothing else acts."""
     division = by_buffer(whole, survey, rules)
-    return division if rules.pushed else with_path_levels(whole, survey, division, rules)
+    meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
+    pushed = rules.pushed or meso[list(rules.shaken)].any()
+    return division if pushed else with_path_levels(whole, survey, division, rules)
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:

@@ -1,5 +1,6 @@
 """How the cells of a whole mesh are divided: by which rules and scheme, into which models and levels of steps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,6 +30,7 @@ class Rules:
         sprung: Whether supports have springs.
         pushed: Whether more than body accelerations and elements act in the meso model: damping, springs, stress at
             rest.
+        shaken: ``(k,)`` nodes on which a large mass acts.
     """
 
     coupling: Coupling
@@ -41,6 +43,7 @@ class Rules:
     copy: NDArray[np.bool_] | None = None
     sprung: bool = False
     pushed: bool = True
+    shaken: Sequence[int] | NDArray[np.int32] = ()
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
         """Return the windows that follow from two critical steps [s]."""

@@ -17,6 +17,30 @@ from reflowshock.fem.parallel.portable import Rows, State
 MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
 
 
+@dataclass(frozen=True)
+class ShakenBase(Load):
+    """The frame of results of a model that has no node of the large mass: it follows time and acts on nothing.
+
+    The large mass of the other model takes steps of a window; from these integrals it is a part of (pi w / tau)^2 / 12
+    away, with w the window and tau the pulse: below 1e-6 where a pulse has a thousand windows.
+
+    Attributes:
+        direction: ``(3,)`` unit vector against which the base moves.
+        pulse: Acceleration [m/s^2].
+    """
+
+    direction: NDArray[np.float64]
+    pulse: Pulse
+
+    def base_displacement(self, time: float) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the base."""
+        return -self.direction * self.pulse.double_integral(time)
+
+    def base_velocity(self, time: float) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of the base."""
+        return -self.direction * self.pulse.integral(time)
+
+
 @dataclass
 class LargeMass(Load):
     """Input-G by a large mass on the support nodes and the force that moves it; displacements are absolute.
@@ -82,12 +106,12 @@ class LargeMass(Load):
         """Return also the force at its nodes."""
         return {**super().state(body), "_force": Rows(body.local.nodes[self.nodes], self._force)}
 
-    def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps."""
+    def base_displacement(self, time: float) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps up to its time."""
         return -self.direction * self._base[0]
 
-    def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of the base, integrated in the motion's own steps."""
+    def base_velocity(self, time: float) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of the base, integrated in the motion's own steps up to its time."""
         return -self.direction * self._base[1]
 
     def begin(self, motion: Loaded) -> None:

@@ -71,11 +71,11 @@ class Loaded(ABC):
 
     def base_displacement(self) -> NDArray[np.float64]:
         """Return the displacement ``(3,)`` [m] of the frame in which results are given; zero but with a large mass."""
-        return sum((load.base_displacement() for load in self._loads), np.zeros(3))
+        return sum((load.base_displacement(self.time) for load in self._loads), np.zeros(3))
 
     def base_velocity(self) -> NDArray[np.float64]:
         """Return the velocity ``(3,)`` [m/s] of that frame."""
-        return sum((load.base_velocity() for load in self._loads), np.zeros(3))
+        return sum((load.base_velocity(self.time) for load in self._loads), np.zeros(3))
 
     def internal_energy(self) -> Energy:
         """Return the energies [J] of this rank's elements."""
@@ -99,12 +99,12 @@ class Load:
         """Return the acceleration ``(3,)`` [m/s^2] that acts on every kilogram at a time [s]."""
         return np.zeros(3)
 
-    def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are given."""
+    def base_displacement(self, time: float) -> NDArray[np.float64]:
+        """Return the displacement ``(3,)`` [m] of the frame in which results are given, at the motion's time [s]."""
         return np.zeros(3)
 
-    def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of the frame in which results are given."""
+    def base_velocity(self, time: float) -> NDArray[np.float64]:
+        """Return the velocity ``(3,)`` [m/s] of that frame, at the motion's time [s]."""
         return np.zeros(3)
 
     def begin(self, motion: Loaded) -> None:

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable
 
-import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.errors import LoadError
 from reflowshock.fem.loads.damping import RayleighDamping
-from reflowshock.fem.loads.large_mass import LargeMass
+from reflowshock.fem.loads.large_mass import LargeMass, ShakenBase
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Constant
 from reflowshock.fem.loads.shock_pulse import shock_pulse
@@ -29,7 +28,7 @@ def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:
 def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, shock: Shock) -> list[Load]:
     """Return the loads and the damping of one model on this rank; collective over the model.
 
-    A model without holes for a large mass to act on only tells its results from that frame.
+    A model without holes for a large mass to act on tells its results from that frame, and has no load at nodes.
 
     Args:
         comm: Communicator of the model.
@@ -43,7 +42,7 @@ def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, sh
     if shock.method == "direct":
         made.append(BodyAcceleration(DOWN, chosen.pulse))
     elif not len(tables.shaken):
-        made.append(LargeMass(np.empty(0, np.int32), np.empty(0), DOWN, chosen.pulse))
+        made.append(ShakenBase(DOWN, chosen.pulse))
     else:
         made.append(LargeMass.build(comm, body, tables.shaken, (DOWN, chosen.pulse), mass))
     if any(shock.damping.coefficients):

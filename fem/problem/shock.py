@@ -58,8 +58,9 @@ class Coupling(Parameters):
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
     velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
     model, which takes nothing back. ``levels`` are those of the meso model's steps below the window; with held velocity
-    there are three at most, and one under damping, springs, a large mass or stress of cooling. ``buffer_layers`` of
-    board elements lie between joints and an interface of held velocity; between its levels ``path_levels`` has them.
+    there are three at most, and one under damping, springs, stress of cooling or a large mass on nodes of the meso
+    model. ``buffer_layers`` of board elements lie between joints and an interface of held velocity; ``path_levels`` has
+    those between levels.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"

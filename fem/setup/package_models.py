@@ -57,10 +57,8 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
         duration=shock.decided_duration,
         samples=numerics.history_samples,
         sprung=bool(fitted and fitted.bedded),
-        pushed=shock.method == "large_mass"
-        or bool(fitted and fitted.bedded)
-        or bool(request.cooling)
-        or any(shock.damping.coefficients),
+        pushed=bool(fitted and fitted.bedded) or bool(request.cooling) or any(shock.damping.coefficients),
+        shaken=whole.mesh.facet_nodes("mounting_holes") if shock.method == "large_mass" else (),
         **(dict(zip(("copied", "copy"), copied_joints(whole.mesh), strict=True)) if request.one_way else {}),
     )
     division = divide(whole, found, rules)

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from reflowshock.fem.division.whole import Treatment, survey
 from reflowshock.fem.errors import MeshError, StepError
 from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.roles import Materials
-from reflowshock.fem.mesh.mesh import append, boundary_facets
+from reflowshock.fem.mesh import column
+from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
 from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
 from tests.unit.meshing.test_column import MM, standing
 from tests.unit.meshing.test_tied_column import hollow
@@ -28,6 +30,25 @@ def test_columns_take_the_place_of_boxes(whole):
     assert whole.moved < 1e-15
     assert len(mesh.facets_of("board_bottom")) == 128
     assert not any(name.startswith(("column_", "board_bottom@")) for name in mesh.facets)
+
+
+def test_facets_that_no_cell_has_any_more_go_in_one_search(whole, monkeypatch):
+    stay, empty = whole.mesh.part % 2 == 0, {"empty": np.empty((0, 4), np.int32)}
+    searched = []
+
+    def search(cells, facets):
+        searched.append(len(facets))
+        return cells_of_facets(cells, facets)
+
+    monkeypatch.setattr(column, "cells_of_facets", search)
+    left = replace(whole.mesh, cells=whole.mesh.cells[stay], part=whole.mesh.part[stay])
+    mesh = replace(left, facets=left.facets | empty)
+    found = column.without_stale_facets(mesh).facets
+    assert searched == [sum(len(some) for some in mesh.facets.values())]
+    assert list(found) == list(mesh.facets)
+    one_by_one = {name: some[cells_of_facets(mesh.cells, some) >= 0] for name, some in mesh.facets.items()}
+    assert all(np.array_equal(found[name], one_by_one[name]) for name in found)
+    assert 0 < sum(len(some) for some in found.values()) < searched[0]
 
 
 def test_a_constant_strain_passes_the_ties_of_a_column(whole):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reflowshock.cases.hard.trials.coupled import surveyed
+from reflowshock.cases.hard.trials.coupled import MANY, surveyed
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide, grown, scheme_for
 from reflowshock.fem.division.split import interface_between, part_of
@@ -68,6 +68,17 @@ def test_layers_grow_by_nodes():
     seeds = np.array([True, False, False, False, False])
     assert grown(cells, seeds, np.ones(4, bool), 2).tolist() == [True, True, False, False]
     assert grown(cells, seeds, np.array([True, False, True, True]), 4).tolist() == [True, False, False, False]
+
+
+def test_large_mass_leaves_levels_along_a_path_where_the_meso_model_has_none_of_its_nodes(mesh):
+    whole, found, rules = scene(mesh, YIELDING, scheme="held_velocity")
+    dear = replace(found, cost=found.cost * MANY)
+    free = divide(whole, dear, rules)
+    assert len(free.ratios) > 1
+    inside = np.unique(whole.mesh.cells[free.meso])
+    outside = np.setdiff1d(whole.mesh.cells[free.macro], inside)
+    assert divide(whole, dear, replace(rules, shaken=outside)).ratios == free.ratios
+    assert len(divide(whole, dear, replace(rules, shaken=inside[:1])).ratios) == 1
 
 
 def test_levels_of_the_program_are_integer_parts_of_the_window(mesh):

@@ -7,11 +7,14 @@ from pydantic import ValidationError
 
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
+from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.energy_balance import SUMS, EnergyBalance
+from reflowshock.fem.dynamics.steps_at_once import acts_at_nodes
 from reflowshock.fem.errors import EnergyError, LoadError
-from reflowshock.fem.loads.large_mass import LargeMass
+from reflowshock.fem.loads.large_mass import LargeMass, ShakenBase
 from reflowshock.fem.loads.load import BodyAcceleration, PrescribedVelocity
-from reflowshock.fem.loads.pulse import Constant
+from reflowshock.fem.loads.pulse import Constant, HalfSine
+from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
@@ -114,6 +117,27 @@ def test_weight_of_the_large_mass_does_not_move_the_base():
     base = motion.displacement[body.local.locate(low), 0]
     assert base == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-4)
     assert motion.base_displacement()[0] == pytest.approx(-0.5 * 1e3 * motion.time**2, rel=1e-10)
+
+
+def test_model_without_holes_has_no_load_at_nodes():
+    mesh, body = box(held=True)
+    tables = prepare(mesh, "dns")["dns"].tables
+    (load,) = shock_loads(MPI.COMM_SELF, 1.0, body, tables, shock(method="large_mass"))
+    assert isinstance(load, ShakenBase)
+    assert not acts_at_nodes(load)
+
+
+def test_base_that_follows_time_moves_as_the_large_mass_does():
+    mesh, body = box(held=False)
+    along, pulse = np.array([1.0, 0.0, 0.0]), HalfSine(1500 * G, 4e-6)
+    motion = motion_of(body, 1e-8, [LargeMass.build(MPI.COMM_SELF, body, mesh.facet_nodes("low"), (along, pulse))])
+    base = ShakenBase(along, pulse)
+    for _ in range(600):  # beyond the pulse
+        motion.advance()
+        motion.update_force()
+    near = (np.pi * motion.step / pulse.duration) ** 2  # what trapezoids miss of it, twelvefold
+    assert base.base_velocity(motion.time) == pytest.approx(motion.base_velocity(), rel=near)
+    assert base.base_displacement(motion.time) == pytest.approx(motion.base_displacement(), rel=near)
 
 
 def test_ledger_says_what_grew_and_which_step_it_was():
