@@ -9,16 +9,18 @@ from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration
 from reflowshock.workflow.board_drop.duration import longest_duration
-from reflowshock.workflow.board_drop.shock_effects import shock_effects
-from reflowshock.workflow.board_drop.shock_forecast import (
+from reflowshock.workflow.board_drop.part_forecast import (
     PartForecast,
-    ShockForecast,
     coarse_parts,
     forecast_parts,
+    two_scale_parts,
+)
+from reflowshock.workflow.board_drop.shock_effects import shock_effects
+from reflowshock.workflow.board_drop.shock_forecast import (
+    ShockForecast,
     forecast_shock,
     seconds_around,
     shorter_than_window,
-    two_scale_parts,
 )
 from reflowshock.workflow.case.forecast import (
     BYTES_OF_ELEMENT,
