@@ -5,6 +5,7 @@
 Parts, each by itself where it is named; figures of earlier calls stay:
 - ``forces``: the cube of 40^3 boxes in finite rotation, alone and in whole steps; solder that yields, one-point and
   with incompatible modes, on 12^3 distorted elements that stay in the cache; Akantu's linear loop, if pip installs it.
+- ``against_peers``: whole steps of those elements, turned by 0.3, in Akantu (elastic) and Kratos (elastic, J2).
 - ``bending``: the moment of a plastic hinge of four elements over its height, and the elastic stiffness of a distorted
   one-point element over that of the element with incompatible modes: what the faster element gives up.
 - ``effects``: windows of bga_drop (held velocity, one fine joint, copper at its true mass) in finite rotation and with
@@ -52,6 +53,8 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
+from reflowshock.fem.materials.parameters import JohnsonCook, Material
+from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, make_body
 from reflowshock.fem.output.compare import compare_histories
 from tests.support.fem_tangent import flowing_pair
@@ -79,6 +82,15 @@ DRIFTING = {
     "gravouil_combescure": Pair(3, 3.0),
 }
 ROUNDS = 5
+TURN = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.0], [0.0, 0.0, 1.0]])
+STRETCHED = np.array([[1.0, 0.3, 0.0], [0.3, -0.36, 0.0], [0.0, 0.0, -0.36]])
+ELASTIC_SOLDER = SOLDER.model_copy(update={"plasticity": None})
+IDEAL_SOLDER = SOLDER.model_copy(update={"plasticity": JohnsonCook(A=SOLDER.plasticity.A)})
+PEERS = {  # law -> material, strain, peers that have it, elements of this program
+    "finite": (ELASTIC_SOLDER, 1e-4, ("akantu", "kratos"), ("incompatible_modes",)),
+    "plastic": (IDEAL_SOLDER, 3e-3, ("kratos",), ("one_point", "incompatible_modes")),
+}
+PEER_BAR, SAME_FORCES = 20.0, 1e-3  # of J2 and of Green's strain instead of the stretch: of the order of the strain
 NOT_MEASURED = {
     "default case, answer complete": "its run folder tells: reflowshock run cases/jedec_bga/case.toml",
     "hu_bga_drop, full size, finite + J2, two scales": "its run folder tells: --set scale=physical",
@@ -131,6 +143,38 @@ def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
     """Return Akantu with the linear cube; None where pip cannot install it."""
     peers.FOLDER.mkdir(parents=True, exist_ok=True)
     return peers.Peer("akantu", peers.write_problem(mesh, displacement, 1e-8)) if "akantu" in peers.install() else None
+
+
+def against_peers() -> tuple[Bars, dict]:
+    """Return whole steps in finite rotation over those of peers, from places where all must have the same forces."""
+    mesh, found = cube(distorted=True, edge=12), peers.install()
+    bars, rest = {}, {}
+    for law, (material, strain, names, kinds) in PEERS.items():
+        displacement = mesh.points @ (TURN @ (np.eye(3) + strain * STRETCHED) - np.eye(3)).T
+        motions = {kind: moved_body(mesh, material, kind, displacement) for kind in kinds}
+        given = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, law)
+        running = {name: peers.Peer(name, given) for name in names if name in found}
+        force = np.zeros_like(displacement)
+        force[motions[kinds[0]].body.local.nodes] = motions[kinds[0]].force
+        batches = {kind: turns.batch(partial(motion.take_steps, 1)) for kind, motion in motions.items()}
+        seconds = turns.in_turns(batches | {name: partial(peer.ask, "step") for name, peer in running.items()})
+        rest[law] = turns.rates(seconds, dict.fromkeys(seconds, len(mesh.cells)))
+        for name, peer in running.items():
+            peer.end()
+            difference = float(np.abs(peer.force - force).max() / np.abs(force).max())
+            bars[f"{law}: forces of {name} against ours"] = turns.bar(difference, SAME_FORCES, False)
+            for kind in kinds:
+                bars[f"{law}: steps, {kind} over {name}"] = turns.bar(turns.ratio(seconds, kind, name), PEER_BAR)
+    return bars, {"steps, updates_per_second": rest}
+
+
+def moved_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
+    """Return a body of a material in finite rotation at a displacement ``(n, 3)`` [m], with its force there."""
+    step = 0.5 * nonlinear_body(mesh, material, ForceOptions("corotational"), kind)[1]
+    motion = motion_of(nonlinear_body(mesh, material, ForceOptions("corotational", step), kind)[0], step)
+    motion.displacement[:] = displacement[motion.body.local.nodes]
+    motion.update_force()
+    return motion
 
 
 def bending() -> tuple[Bars, dict]:
@@ -272,7 +316,10 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
 
 
-PARTS = {part.__name__: part for part in (forces, bending, effects, interpreter, two_scales, errors, drift, growth)}
+PARTS = {
+    part.__name__: part
+    for part in (forces, against_peers, bending, effects, interpreter, two_scales, errors, drift, growth)
+}
 PARTS |= {f"{part.__name__}_of_modes": partial(part, formulation="incompatible_modes") for part in (errors, growth)}
 
 

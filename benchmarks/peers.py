@@ -24,13 +24,17 @@ from benchmarks.support.cube import STEEL, cube, elements_of
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
+from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.mesh import MeshData
 
 FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "venv" / "bin" / "python"
 PACKAGES = {
     "akantu": ["akantu==5.0.7.*"],
-    "kratos": ["KratosMultiphysics==10.4.4", "KratosStructuralMechanicsApplication==10.4.4"],
+    "kratos": [
+        f"Kratos{name}==10.4.4"
+        for name in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLawsApplication")
+    ],
 }
 WORKS = {"akantu": ("force", "step"), "kratos": ("step",)}
 CYCLIC = [0, 1, 3, 2, 4, 5, 7, 6]
@@ -44,7 +48,7 @@ class Peer:
 
     def __init__(self, name: str, given: Path) -> None:
         """Start it and wait until it has written its ``force``."""
-        self._force = FOLDER / f"{name}.npy"
+        self._force = given.with_suffix(f".{name}.npy")
         script = Path(__file__).parent / "support" / f"peer_{name}.py"
         self._process = subprocess.Popen(
             [str(PYTHON), str(script), str(given), str(self._force)],
@@ -88,10 +92,25 @@ def install() -> list[str]:
     return found
 
 
-def write_problem(mesh: MeshData, displacement: np.ndarray, step: float) -> Path:
-    path = FOLDER / "problem.npz"
-    constants = {name: getattr(STEEL, name) for name in ("density", "young_modulus", "poisson_ratio")}
-    np.savez(path, points=mesh.points, cells=mesh.cells[:, CYCLIC], displacement=displacement, step=step, **constants)
+def write_problem(
+    mesh: MeshData, displacement: np.ndarray, step: float, material: Isotropic = STEEL, law: str = "linear"
+) -> Path:
+    """Write what a peer starts from; return the file.
+
+    Args:
+        mesh: Of hexahedra.
+        displacement: ``(n, 3)`` [m].
+        step: [s].
+        material: Of all of it.
+        law: ``linear``; ``finite``, its stresses linear in Green's strain; or ``plastic``, J2 without hardening in
+            finite rotation.
+    """
+    path = FOLDER / f"{law}.npz"
+    constants = {name: getattr(material, name) for name in ("density", "young_modulus", "poisson_ratio")}
+    if material.plasticity:
+        constants["yield_stress"] = material.plasticity.A
+    cells = mesh.cells[:, CYCLIC]
+    np.savez(path, points=mesh.points, cells=cells, displacement=displacement, step=step, law=law, **constants)
     return path
 
 

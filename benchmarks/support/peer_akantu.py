@@ -1,15 +1,20 @@
-"""Akantu's side of ``peers.py``: internal forces and explicit steps of small-strain linear hexahedra."""
+"""Akantu's side of ``peers.py`` and ``nonlinear.py``: internal forces and explicit steps of elastic hexahedra.
+
+Its J2 material is left out: with ``finite_deformation``, a rotation alone gives it stress (Akantu 5.0.7).
+"""
 
 import tempfile
 
 import akantu
 from peer_loop import problem, serve
 
-MATERIAL = "material elastic [\n name = steel\n rho = {density}\n E = {young_modulus}\n nu = {poisson_ratio}\n]\n"
+CONSTANTS = {"rho": "density", "E": "young_modulus", "nu": "poisson_ratio"}
 
 given = problem()
+lines = [f"{key} = {float(given[name])}" for key, name in CONSTANTS.items()]
+lines.append(f"finite_deformation = {'true' if given['law'] == 'finite' else 'false'}")
 with tempfile.NamedTemporaryFile("w", suffix=".dat") as file:
-    file.write(MATERIAL.format(**{name: float(given[name]) for name in ("density", "young_modulus", "poisson_ratio")}))
+    file.write("\n".join(["material elastic [", "name = cube", *lines, "]", ""]))
     file.flush()
     akantu.parseInput(file.name)
 mesh = akantu.Mesh(3)

@@ -1,6 +1,7 @@
-"""Kratos' side of ``peers.py``: explicit steps of small-strain linear hexahedra; it offers no force alone."""
+"""Kratos' side of ``peers.py`` and ``nonlinear.py``: explicit steps of hexahedra; it offers no force alone."""
 
 import KratosMultiphysics as Kratos
+import KratosMultiphysics.ConstitutiveLawsApplication as Laws
 import KratosMultiphysics.StructuralMechanicsApplication as Structural
 import numpy as np
 from peer_loop import problem, serve
@@ -17,6 +18,13 @@ STEP_VARIABLES = (
     Structural.MIDDLE_VELOCITY,
     Structural.FRACTIONAL_ACCELERATION,
 )
+ELEMENTS = {"linear": "SmallDisplacementElement3D8N"}
+LAWS = {
+    "linear": Structural.LinearElastic3DLaw,
+    "finite": Laws.KirchhoffSaintVenant3DLaw,
+    "plastic": Laws.FiniteStrainIsotropicPlasticity3DVonMisesVonMises,
+}
+NO_HARDENING, NEVER = 3, 1e12  # of Kratos' curves; fracture energy [J/m^2]
 
 
 def cube_of(given: dict[str, np.ndarray], cube: Kratos.ModelPart) -> None:
@@ -27,11 +35,15 @@ def cube_of(given: dict[str, np.ndarray], cube: Kratos.ModelPart) -> None:
     material[Kratos.YOUNG_MODULUS] = float(given["young_modulus"])
     material[Kratos.POISSON_RATIO] = float(given["poisson_ratio"])
     material[Kratos.DENSITY] = float(given["density"])
-    material[Kratos.CONSTITUTIVE_LAW] = Structural.LinearElastic3DLaw()
+    law = str(given["law"])
+    material[Kratos.CONSTITUTIVE_LAW] = LAWS[law]()
+    if law == "plastic":
+        material[Kratos.YIELD_STRESS] = float(given["yield_stress"])
+        material[Laws.HARDENING_CURVE], material[Kratos.FRACTURE_ENERGY] = NO_HARDENING, NEVER
     for number, point in enumerate(given["points"].tolist(), start=1):
         cube.CreateNewNode(number, *point)
     for number, nodes in enumerate((given["cells"] + 1).tolist(), start=1):
-        cube.CreateNewElement("SmallDisplacementElement3D8N", number, nodes, material)
+        cube.CreateNewElement(ELEMENTS.get(law, "TotalLagrangianElement3D8N"), number, nodes, material)
     for axis in "XYZ":
         pair = [Kratos.KratosGlobals.GetVariable(f"{name}_{axis}") for name in ("DISPLACEMENT", "REACTION")]
         Kratos.VariableUtils().AddDof(*pair, cube)
@@ -49,12 +61,14 @@ cube_of(given, cube)
 step = float(given["step"])
 information[Kratos.DELTA_TIME] = step
 scheme = Structural.ExplicitCentralDifferencesScheme(1.0, 1.0 / 3.0, 0)
-strategy = Structural.MechanicalExplicitStrategy(cube, scheme, False, False, False)
+strategy = Structural.MechanicalExplicitStrategy(cube, scheme, False, False, bool(given["law"] != "linear"))
 strategy.SetEchoLevel(0)
 strategy.SetRebuildLevel(0)
 strategy.Initialize()
 for node, value in zip(cube.Nodes, given["displacement"].tolist(), strict=True):
     node.SetSolutionStepValue(Kratos.DISPLACEMENT, Kratos.Array3(value))
+    if given["law"] != "linear":  # its elements of finite strain look at the places
+        node.X, node.Y, node.Z = node.X0 + value[0], node.Y0 + value[1], node.Z0 + value[2]
 
 
 def advance() -> None:

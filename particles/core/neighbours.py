@@ -39,7 +39,7 @@ def _sort_into_cells(points, origin, size, shape):
 @njit(cache=True)
 def _visit_row(i, points, radius, cells, found):
     """Write the neighbours of point i into found (unless it is empty) and return their number."""
-    start, order, cell, shape = cells
+    start, order, cell, shape, movers = cells
     count = 0
     for cx in range(max(cell[i, 0] - REACH, 0), min(cell[i, 0] + REACH + 1, shape[0])):
         for cy in range(max(cell[i, 1] - REACH, 0), min(cell[i, 1] + REACH + 1, shape[1])):
@@ -50,7 +50,7 @@ def _visit_row(i, points, radius, cells, found):
                     dx = points[i, 0] - points[j, 0]
                     dy = points[i, 1] - points[j, 1]
                     dz = points[i, 2] - points[j, 2]
-                    if j != i and dx * dx + dy * dy + dz * dz < radius * radius:
+                    if j != i and (i < movers or j < movers) and dx * dx + dy * dy + dz * dz < radius * radius:
                         if found.shape[0] > 0:
                             found[count] = j
                         count += 1
@@ -73,12 +73,13 @@ def _rows(points, radius, cells):
     return offsets, indices
 
 
-def find_neighbours(points: Points, radius: float) -> tuple[Indices, Indices]:
+def find_neighbours(points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:
     """Find all pairs closer than a radius.
 
     Args:
         points: `(n, 3)` [m], finite.
         radius: search radius [m].
+        movers: how many points, the first ones, move; pairs of two others are left out. All where it is None.
 
     Returns:
         offsets `(n + 1,)` and indices: row i lists the neighbours of point i, itself left out.
@@ -91,8 +92,8 @@ def find_neighbours(points: Points, radius: float) -> tuple[Indices, Indices]:
     origin = points.min(axis=0)
     size = radius / REACH
     shape = np.maximum(((points.max(axis=0) - origin) / size).astype(np.int64) + 1, 1)
-    cells = (*_sort_into_cells(points, origin, size, shape), shape)
-    return _rows(points, radius, cells)
+    moving = len(points) if movers is None else movers
+    return _rows(points, radius, (*_sort_into_cells(points, origin, size, shape), shape, moving))
 
 
 class NeighbourList:

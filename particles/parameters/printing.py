@@ -1,5 +1,6 @@
 """Parameters of a printed part in SI floats: drops of ink, one after the other, layer on layer, and how they cure."""
 
+from functools import lru_cache
 from math import cos, pi, sin
 from typing import Annotated, Literal
 
@@ -63,12 +64,7 @@ class Printing(SphFlow):
     @property
     def drop(self) -> Droplet:
         """One of its drops, as if it were alone."""
-        return Droplet(
-            diameter=(6.0 * self.drop_volume / pi) ** (1.0 / 3.0), density=self.density, viscosity=self.viscosity,
-            surface_tension=self.surface_tension, speed=self.speed, contact_angle=self.contact_angle,
-            gravity=self.gravity, duration=self.delay, effects=self.effects,
-            numerics=DropletNumerics(**self.numerics.model_dump(exclude={"settling"})),
-        )  # fmt: skip
+        return _drop_of(self)
 
     @property
     def drops(self) -> int:
@@ -140,3 +136,13 @@ class Printing(SphFlow):
             grid.sort(key=lambda place: (place[0] + place[1]) % 2)
         middle = 0.5 * (self.columns - 1), 0.5 * (self.rows - 1)
         return [((column - middle[0]) * self.pitch, (row - middle[1]) * self.pitch) for column, row in grid]
+
+
+@lru_cache(maxsize=8)  # asked for in every step
+def _drop_of(scene: Printing) -> Droplet:
+    return Droplet(
+        diameter=(6.0 * scene.drop_volume / pi) ** (1.0 / 3.0), density=scene.density, viscosity=scene.viscosity,
+        surface_tension=scene.surface_tension, speed=scene.speed, contact_angle=scene.contact_angle,
+        gravity=scene.gravity, duration=scene.delay, effects=scene.effects,
+        numerics=DropletNumerics(**scene.numerics.model_dump(exclude={"settling"})),
+    )  # fmt: skip

@@ -8,7 +8,7 @@ loops, but for particles that liquid can reach, which are its walls.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import cos
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,7 +20,7 @@ from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
 from reflowshock.particles.surface.closing import part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import mirrored
 from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance
@@ -32,7 +32,13 @@ ROUNDING = 1e-9
 # In spacings of the particles: nodes of the level set of the ground; in these, how far about a body it is told.
 NODES, MARGIN = 0.75, 4
 
-Body = tuple[Floats, Indices]
+
+class Body(NamedTuple):
+    """A solid body: surface of points `(m, 3)` [m] and triangles, which ends on the plate; the last of its drops."""
+
+    points: Floats
+    triangles: Indices
+    drop: int
 
 
 @dataclass(slots=True)
@@ -45,7 +51,7 @@ class Deposit:
         state: `(n,)` `LIQUID`, `HELD` or `SOLID`.
         dose: `(n,)` of light that each has got [J/m^2].
         drop: `(n,)` number of each one's drop.
-        bodies: surfaces of what is solid, points `(m, 3)` [m] and triangles; they end on the plate.
+        bodies: what is solid, in the order in which it cured.
         ground: distance to the bodies, on a grid about all that will be printed.
         surface: of what is liquid, and held with it; empty where all is solid.
         simulation: of what is liquid; None where nothing is.
@@ -65,14 +71,14 @@ class Deposit:
     order: Indices = field(default_factory=lambda: np.empty(0, np.int64))
     time: float = 0.0
     law: Law = field(init=False)
-    start: tuple[Floats, Body, float] = field(init=False)
+    start: tuple[Floats, tuple[Floats, Indices], float] = field(init=False)
 
     def __post_init__(self) -> None:
         drop = self.scene.drop
         points, surface, spacing = start_shape(drop)
         self.start = points, surface, spacing
         self.law, tension = liquid_of(drop, spacing)
-        self.ground = _far_from_all(self.scene, spacing)
+        self.ground = nothing_of(self.scene, spacing)
         self.fields = flow.liquid_and_walls(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
         none = np.empty((0, 3)), np.empty((0, 3), np.int32)
         self.surface = LiquidSurface(*none, tension, cos(drop.angle), self.law)
@@ -82,7 +88,7 @@ class Deposit:
         self.update()
         return {
             "fields": self.fields._asdict(), "state": self.state, "dose": self.dose, "drop": self.drop,
-            "bodies": [{"points": points, "triangles": triangles} for points, triangles in self.bodies],
+            "bodies": [body._asdict() for body in self.bodies],
             "surface": self.surface.saved(), "order": self.order, "time": self.time,
             "simulation": self.simulation.saved() if self.simulation else None,
         }  # fmt: skip
@@ -92,7 +98,7 @@ class Deposit:
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
         for body in saved["bodies"]:
-            self._add_body((body["points"], body["triangles"]))
+            self._add_body(Body(**body))
         self.surface.restore(saved["surface"])
         if saved["simulation"]:
             self._begin()
@@ -140,24 +146,19 @@ class Deposit:
         liquid, held = self.liquid, np.flatnonzero(self.state == HELD)
         near = self._within_reach(np.concatenate((liquid, held)))
         self.order = np.concatenate((liquid, held, near))
-        fields = Fields(*(one[self.order] for one in self.fields[:12]), *np.zeros((3, len(held) + len(near))))
+        walls = np.zeros((5, len(held) + len(near)))
+        fields = Fields(*(one[self.order] for one in self.fields[:12]), *walls)
+        depth = -self.ground.at(self.points[near], 1) / self.law.length
+        fields.wall_room[len(held) :] = beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
         self.surface.lie_on(self.ground if self.bodies else None)
         self.simulation = Simulation(
             fields, len(liquid), self.law, self.surface, flow.device_of(self.scene), len(held)
         )  # fmt: skip
 
     def _add_body(self, body: Body) -> None:
-        """Add a solid body to the ground, with its image behind the plate."""
+        """Add a solid body to the ground."""
         self.bodies.append(body)
-        points, triangles = mirrored(*body)
-        grid, spacing = self.ground.grid, self.ground.grid.spacing
-        low = np.floor((points.min(axis=0) - grid.origin) / spacing).astype(int) - MARGIN
-        high = np.ceil((points.max(axis=0) - grid.origin) / spacing).astype(int) + MARGIN + 1
-        low, high = np.maximum(low, 0), np.minimum(high, grid.counts)
-        box = tuple(slice(first, last) for first, last in zip(low, high, strict=True))
-        x, y, z = (int(count) for count in high - low)
-        own = signed_distance(points, triangles, Grid(grid.origin + spacing * low, spacing, (x, y, z)))
-        self.ground.values[box] = np.minimum(self.ground.values[box], own.values)
+        join(self.ground, body)
 
     def _within_reach(self, carriers: Indices) -> Indices:
         """Solid particles that liquid may come to touch."""
@@ -219,14 +220,28 @@ class Deposit:
         is_liquid = np.bincount(body[self.state[unsolid] == LIQUID], minlength=part.max() + 1) > 0
         self.state[unsolid[~is_liquid[body]]] = SOLID
         if not is_liquid.all():
-            self._add_body(self.surface.take_out(~is_liquid[part]))
+            last = int(self.drop[unsolid[~is_liquid[body]]].max(initial=0))
+            self._add_body(Body(*self.surface.take_out(~is_liquid[part]), last))
         self.simulation = None
         if is_liquid.any():
             self._begin()
         return True
 
 
-def _far_from_all(scene: Printing, spacing: float) -> LevelSet:
+def join(ground: LevelSet, body: Body) -> None:
+    """Add a solid body to a level set, with its image behind the plate."""
+    points, triangles = mirrored(body.points, body.triangles)
+    grid, spacing = ground.grid, ground.grid.spacing
+    low = np.floor((points.min(axis=0) - grid.origin) / spacing).astype(int) - MARGIN
+    high = np.ceil((points.max(axis=0) - grid.origin) / spacing).astype(int) + MARGIN + 1
+    low, high = np.maximum(low, 0), np.minimum(high, grid.counts)
+    box = tuple(slice(first, last) for first, last in zip(low, high, strict=True))
+    x, y, z = (int(count) for count in high - low)
+    own = signed_distance(points, triangles, Grid(grid.origin + spacing * low, spacing, (x, y, z)))
+    ground.values[box] = np.minimum(ground.values[box], own.values)
+
+
+def nothing_of(scene: Printing, spacing: float) -> LevelSet:
     """Return the level set of nothing about all that will be printed, for particles a spacing apart [m]."""
     places = np.array(scene.places())
     aside = scene.length * (1.0 + WITHIN_REACH)

@@ -7,11 +7,12 @@ import numpy as np
 
 from reflowshock.particles.printing.part import Part
 
-LAYERS = "layer,drops,parts_of_layer,parts_so_far,mean_top_um,highest_um"
+LAYERS = "layer,drops,parts_of_layer,parts_so_far,mean_top_um,height_um,roughness_sa_um,roughness_sz_um,volume_pl,voids"
+FACTORS = np.array([1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 1e6, 1e6, 1e15, 1.0])  # from SI
 
 
 def write_part(folder: Path, part: Part) -> None:
-    """Write `part.stl` [mm], `height_map.npy` [m], `height_map.csv` and `layers.csv` [um].
+    """Write `part.stl` [mm], `height_map.npy` [m], `height_map.csv` [um] and `layers.csv` [um, pL].
 
     The first row and column of `height_map.csv` are y and x; `height_map.npy` has a row for each x.
     """
@@ -20,5 +21,5 @@ def write_part(folder: Path, part: Part) -> None:
     table = np.zeros((len(part.x) + 1, len(part.y) + 1))
     table[1:, 0], table[0, 1:], table[1:, 1:] = 1e6 * part.x, 1e6 * part.y, 1e6 * part.heights
     np.savetxt(folder / "height_map.csv", table, fmt="%.3f", delimiter=",", header="um: x down, y across")
-    rows = part.layers * [1.0, 1.0, 1.0, 1.0, 1e6, 1e6]
-    np.savetxt(folder / "layers.csv", rows, fmt=("%d", "%d", "%d", "%d", "%.3f", "%.3f"), delimiter=",", header=LAYERS)
+    rows, formats = np.array(part.layers) * FACTORS, ["%d"] * 4 + ["%.3f"] * 5 + ["%d"]
+    np.savetxt(folder / "layers.csv", rows, fmt=formats, delimiter=",", header=LAYERS, comments="")

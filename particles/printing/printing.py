@@ -19,6 +19,7 @@ from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
 from reflowshock.particles.sph.flow import PICTURES, FlowResult, Metrics, Picture
 from reflowshock.particles.sph.liquid_surface import Meeting, SurfaceLost
+from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.threads import threads_for
 
 COLUMNS = ("time", "drops", "largest_speed", "kinetic_energy", "surface_energy", "height")
@@ -116,11 +117,11 @@ def _go_on(run: PrintRun, scene: Printing) -> None:
         _sample(run)
     elif deposit.simulation is None:
         deposit.time = arrival
-    elif _rests(run, scene):
+    elif _rests(run, deposit.simulation, scene):
         _shine(run)
         if deposit.simulation is None:
             return
-        run.left = max(run.left, _kinetic(deposit) / _unit_of_energy(scene))
+        run.left = max(run.left, deposit.simulation.kinetic_energy / _unit_of_energy(scene))
         _picture(run, scene)
         pause = min(arrival - deposit.time, deposit.cures_in())
         deposit.expose(pause)
@@ -142,11 +143,9 @@ def _shine(run: PrintRun) -> None:
     run.deposit.cure()
 
 
-def _rests(run: PrintRun, scene: Printing) -> bool:
-    deposit = run.deposit
-    return (
-        deposit.time - run.since >= scene.settling_time or _kinetic(deposit) < REST * _unit_of_energy(scene)
-    )  # fmt: skip
+def _rests(run: PrintRun, simulation: Simulation, scene: Printing) -> bool:
+    is_old = run.deposit.time - run.since >= scene.settling_time
+    return is_old or simulation.kinetic_energy < REST * _unit_of_energy(scene)
 
 
 def _unit_of_energy(scene: Printing) -> float:
@@ -154,22 +153,13 @@ def _unit_of_energy(scene: Printing) -> float:
     return pi * scene.length**2 * scene.surface_tension
 
 
-def _kinetic(deposit: Deposit) -> float:
-    """Kinetic energy of the liquid [J]."""
-    assert deposit.simulation is not None
-    fields, liquid = deposit.simulation.fields, slice(deposit.simulation.fluids)
-    squares = fields.u[liquid] ** 2 + fields.v[liquid] ** 2 + fields.w[liquid] ** 2
-    return 0.5 * float(fields.mass[liquid] @ squares)
-
-
 def _sample(run: PrintRun) -> None:
     deposit = run.deposit
     if deposit.simulation is None:
         return
-    top = max([float(deposit.surface.points[:, 2].max()), *(float(points[:, 2].max()) for points, _ in deposit.bodies)])
-    run.rows.append(
-        (deposit.time, float(run.landed), deposit.simulation.fastest, _kinetic(deposit), deposit.surface.energy, top)
-    )
+    top = max([float(deposit.surface.points[:, 2].max()), *(float(body.points[:, 2].max()) for body in deposit.bodies)])
+    fastest, kinetic = deposit.simulation.fastest, deposit.simulation.kinetic_energy
+    run.rows.append((deposit.time, float(run.landed), fastest, kinetic, deposit.surface.energy, top))
 
 
 def _picture(run: PrintRun, scene: Printing) -> None:

@@ -61,11 +61,11 @@ def _sample(scene: DamBreak, simulation: Simulation) -> tuple[float, ...]:
     """One row of the history."""
     liquid, fields = slice(simulation.fluids), simulation.fields
     x, z, mass = fields.x[liquid], fields.z[liquid], fields.mass[liquid]
-    kinetic = 0.5 * float(mass @ (fields.u[liquid] ** 2 + fields.w[liquid] ** 2))
     potential = scene.gravity * float(mass @ z)
     squeezed = fields.density[liquid] / scene.density
     elastic = scene.sound**2 * float(mass @ (np.log(squeezed) + 1.0 / squeezed - 1.0))
-    return simulation.time, _pressure_at(scene, simulation), float(x.max()), kinetic, potential, elastic
+    pressure, kinetic = _pressure_at(scene, simulation), simulation.kinetic_energy
+    return simulation.time, pressure, float(x.max()), kinetic, potential, elastic
 
 
 def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:

@@ -146,13 +146,12 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     radius = np.linalg.norm(points.T - centre, axis=1)
     core = radius < CORE * 0.5 * scene.diameter
     distance = np.linalg.norm(surface.points - centre, axis=1)
-    squares = fields.u**2 + fields.v**2 + fields.w**2
     pressure = float((fields.pressure[core] if core.any() else fields.pressure).mean())
     return (
         simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
-        _height(scene, surface.points) / scene.diameter, float(np.sqrt(squares.max())),
-        0.5 * float(fields.mass @ squares), surface.energy, surface.volume / scene.volume,
+        _height(scene, surface.points) / scene.diameter, simulation.fastest,
+        simulation.kinetic_energy, surface.energy, surface.volume / scene.volume,
     )  # fmt: skip
 
 

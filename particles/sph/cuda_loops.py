@@ -59,7 +59,7 @@ class CudaLoops:
         self._run(_find_rates[_blocks(fluids), THREADS_PER_BLOCK], (fluids, self._on_device(lists)), fields, rates)
 
     def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
-        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(4, m)`."""
+        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(5, m)`."""
         if found.size:
             kernel = _find_wall_values[_blocks(found.shape[1]), THREADS_PER_BLOCK]
             self._run(kernel, (fluids, self._on_device(lists)), fields, found)

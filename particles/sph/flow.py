@@ -220,8 +220,8 @@ def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) 
     mass = density * law.spacing**law.dimension
     places = {name: points[axis].copy() for axis, name in enumerate("xyz")}
     still = {name: np.zeros(count) for name in ("u", "v", "w", "pressure", "slope_x", "slope_y", "slope_z")}
-    walls_at_rest = {name: np.zeros(fixed) for name in ("wall_u", "wall_v", "wall_w")}
-    return Fields(**places, **still, density=density, mass=mass, **walls_at_rest)
+    walls_at_rest = {name: np.zeros(fixed) for name in ("wall_u", "wall_v", "wall_w", "wall_room")}
+    return Fields(**places, **still, density=density, mass=mass, **walls_at_rest, wall_share=np.ones(fixed))
 
 
 def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> FlowResult:

@@ -66,6 +66,10 @@ class Fields(NamedTuple):
         mass: [kg].
         slope_x, slope_y, slope_z: renormalised gradient of the density, of the last step [kg/m^4].
         wall_u, wall_v, wall_w: velocities of the particles of walls [m/s], whose u, v, w are what viscosity sees.
+        wall_room: share of the kernel about each of them that liquid fills where it covers the wall; 0 for walls that
+            are layers of particles as they stand.
+        wall_share: how much of each counts: the liquid that it sees over that room, at most one. So a wall of cured
+            ink ends with the liquid, at the contact line, as a mirror does.
     """
 
     x: Floats
@@ -83,3 +87,5 @@ class Fields(NamedTuple):
     wall_u: Floats
     wall_v: Floats
     wall_w: Floats
+    wall_room: Floats
+    wall_share: Floats

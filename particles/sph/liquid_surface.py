@@ -291,10 +291,24 @@ class LiquidSurface:
         return True
 
     def _even_out(self) -> None:
-        self.points += smoothing_offsets(self.points, self.triangles, len(self.points), self.rings)
+        try:
+            lines = self.rings + self._lines_on_ground()
+        except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
+            return
+        self.points += smoothing_offsets(self.points, self.triangles, len(self.points), lines)
         for ring in self.rings:
             self.points[ring, 2] = 0.0
-        self.triangles, _ = flip_to_delaunay(self.points, self.triangles, self.rings)
+        self.triangles, _ = flip_to_delaunay(self.points, self.triangles, lines)
+
+    def _lines_on_ground(self) -> tuple[Indices, ...]:
+        """Contact lines on the ground: the surface has an edge there, which evening out would round off.
+
+        Raises:
+            CannotRebuild: they meet in a point.
+        """
+        if self.ground is None:
+            return ()
+        return boundary_loops(self.triangles[self._wet_shares() > 0.5])
 
     def _is_worn(self) -> bool:
         """Whether triangles are too small, too large or slivers."""

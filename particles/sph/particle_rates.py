@@ -39,6 +39,14 @@ def seen(n, i, neighbours, mirror):
 
 
 @njit(cache=True, error_model="numpy")
+def closing_in(k, velocity, d, fields):
+    """Return (u_i - u_j) . d for the k-th particle of walls; what comes near one with a share meets its image."""
+    u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
+    closing = u * d[0] + v * d[1] + w * d[2]
+    return 2.0 * closing if fields.wall_room[k] > 0.0 else closing
+
+
+@njit(cache=True, error_model="numpy")
 def rates_of(i, fluids, neighbours, fields, law):
     """Return what a particle of the liquid is told by its neighbours.
 
@@ -81,8 +89,8 @@ def rates_of(i, fluids, neighbours, fields, law):
         approach = (u - hold * fields.u[j]) * dx + (v - hold * fields.v[j]) * dy + (w - side * fields.w[j]) * dz
         closing = approach + (hold - 1.0) * (fields.u[j] * dx + fields.v[j] * dy)
         if not liquid:
-            k = j - fluids
-            closing = (u - fields.wall_u[k]) * dx + (v - fields.wall_v[k]) * dy + (w - fields.wall_w[k]) * dz
+            closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
+            volume *= fields.wall_share[j - fluids]
         rate += pair_terms.continuity(closing, steep, volume, density)
         own = positive(pressure) if law.has_surface and not liquid else pressure  # walls do not pull
         other = fields.pressure[j] + (side - 1.0) * law.gravity_z * fields.z[j] * beside  # an image has more weight
@@ -153,31 +161,39 @@ def solved(moments, sums, dimension):
 
 @njit(cache=True, error_model="numpy")
 def wall_values(i, fluids, neighbours, fields, law):
-    """Return pressure and velocity (3) of a particle of a wall, from the liquid beside it (Adami et al. 2012).
+    """Return pressure, velocity (3) and share of a particle of a wall, from the liquid beside it (Adami et al. 2012).
 
     The pressure is that of the liquid, with its weight; where the liquid has a free surface a wall does not pull at
     what leaves it. The velocity is the wall's less that of the liquid against it: at the wall's face it is the wall's.
+    The share is how much of it counts; see `Fields`.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1
     inverse = 1.0 / law.length
-    total = pressure = u = v = w = 0.0
-    for j in neighbours:
+    total = liquid = pressure = u = v = w = 0.0
+    mirror = law.mirror if z < 2.0 * law.length else 0
+    for n in range((1 + mirror) * len(neighbours)):
+        j, side = seen(n, i, neighbours, mirror)
         if j >= fluids:
             continue
+        hold = side if law.no_slip else 1.0
         dx = across(x - fields.x[j], law.period_x)
         dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - fields.z[j], law.period_z)
+        dz = across(z - side * fields.z[j], law.period_z)
         weight = shape(law.kernel, line, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
         total += weight
-        fall = law.gravity_x * dx + law.gravity_y * dy + law.gravity_z * dz
+        liquid += weight * fields.mass[j] / fields.density[j]
+        fall = law.gravity_x * dx + law.gravity_y * dy + law.gravity_z * (z - fields.z[j])
         pressure += weight * (fields.pressure[j] + fields.density[j] * fall)
-        u += weight * fields.u[j]
-        v += weight * fields.v[j]
-        w += weight * fields.w[j]
+        u += weight * hold * fields.u[j]
+        v += weight * hold * fields.v[j]
+        w += weight * side * fields.w[j]
     k = i - fluids
     if total <= 0.0:
-        return 0.0, fields.wall_u[k], fields.wall_v[k], fields.wall_w[k]
+        return 0.0, fields.wall_u[k], fields.wall_v[k], fields.wall_w[k], 0.0
     u, v, w = 2.0 * fields.wall_u[k] - u / total, 2.0 * fields.wall_v[k] - v / total, 2.0 * fields.wall_w[k] - w / total
     pressure /= total
-    return positive(pressure) if law.has_surface else pressure, u, v, w
+    room, share = fields.wall_room[k], 1.0
+    if room > law.norm * liquid:
+        share = law.norm * liquid / room
+    return positive(pressure) if law.has_surface else pressure, u, v, w, share

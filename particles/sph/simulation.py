@@ -16,7 +16,8 @@ from reflowshock.particles.sph.threads import ThreadLoops
 
 # Of the smoothing length: how far beyond their support particles are listed.
 SKIN = 0.3
-RATES = 10
+# What is found of a particle of the liquid, and of one of a wall.
+RATES, WALL_VALUES = 10, 5
 
 
 @dataclass(slots=True)
@@ -25,12 +26,14 @@ class Rows:
 
     Attributes:
         law: says support and periods.
+        fluids: number of particles that are liquid; those of walls list them alone.
         built_at: `(3, n)` positions when they were found [m].
         lists: offsets `(n + 1,)`, indices.
         builds: how often they were found.
     """
 
     law: Law
+    fluids: int
     built_at: Floats = field(default_factory=lambda: np.empty((3, 0)))
     lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     builds: int = 0
@@ -44,8 +47,9 @@ class Rows:
                 return
         reach = SUPPORT * self.law.length + skin
         images, source = self._images(points, reach)
-        offsets, indices = find_neighbours(images.T, reach)
         count = points.shape[1]
+        alone = images.shape[1] == count  # images are numbered behind the walls
+        offsets, indices = find_neighbours(images.T, reach, self.fluids if alone else None)
         offsets = offsets[: count + 1]
         self.lists = offsets, source[indices[: offsets[-1]]]
         self.built_at = points.copy()
@@ -75,7 +79,7 @@ class Loops(Protocol):
         """Write the rates `(10, n)` of the liquid."""
 
     def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
-        """Write pressures and velocities `(4, m)` of walls."""
+        """Write pressures, velocities and shares `(5, m)` of walls."""
 
 
 @dataclass(slots=True)
@@ -108,10 +112,16 @@ class Simulation:
     steps: int = 0
 
     def __post_init__(self) -> None:
-        self.rows = Rows(self.law)
+        self.rows = Rows(self.law, self.fluids)
         self.rates = np.zeros((RATES, self.fluids))
         self.loops = self.device(self.law)
         self._find_rates()
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Of the liquid [J]."""
+        u, v, w = (speed[: self.fluids] for speed in (self.fields.u, self.fields.v, self.fields.w))
+        return 0.5 * float(self.fields.mass[: self.fluids] @ (u * u + v * v + w * w))
 
     @property
     def fastest(self) -> float:
@@ -131,7 +141,7 @@ class Simulation:
         """Continue from what `saved` returned."""
         self.fields, self.rates = Fields(**saved["fields"]), saved["rates"]
         self.time, self.steps = saved["time"], saved["steps"]
-        self.rows = Rows(self.law)
+        self.rows = Rows(self.law, self.fluids)
         self.rows.update(saved["built_at"])
         self.rows.builds = saved["builds"]
         if self.surface:
@@ -193,11 +203,11 @@ class Simulation:
             fields[9 + axis][liquid] = self.rates[4 + axis]
 
     def _extend_to_walls(self) -> None:
-        """Give the particles of walls the pressure of the liquid beside them, and the velocity that viscosity sees."""
+        """Give walls the pressure of the liquid beside them, the velocity that viscosity sees, and their shares."""
         fields, law, walls = self.fields, self.law, slice(self.fluids, None)
-        found = np.empty((4, len(fields.x) - self.fluids))
+        found = np.empty((WALL_VALUES, len(fields.x) - self.fluids))
         self.loops.find_wall_values(self.fluids, self.rows.lists, fields, found)
-        fields.pressure[walls], fields.u[walls], fields.v[walls], fields.w[walls] = found
+        fields.pressure[walls], fields.u[walls], fields.v[walls], fields.w[walls], fields.wall_share[:] = found
         fields.density[walls] = law.rest_density + found[0] / law.sound**2
 
     def _shift(self, time_step: float) -> None:

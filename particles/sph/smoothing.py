@@ -3,9 +3,14 @@
 All have the support 2 h. Sources: cubic spline, Monaghan 1992; Wendland C2, Wendland 1995 and Dehnen & Aly 2012.
 """
 
+from functools import lru_cache
 from math import pi
 
+import numpy as np
 from numba import njit
+from scipy.integrate import trapezoid
+
+from reflowshock.arrays import Floats
 
 CUBIC_SPLINE, WENDLAND_C2 = 0, 1
 KERNELS = {"cubic_spline": CUBIC_SPLINE, "wendland": WENDLAND_C2}
@@ -51,3 +56,19 @@ def slope(kernel, line, q):
     if line:
         return -3.0 * rest**2
     return -5.0 * rest**3
+
+
+def beyond_plane(kernel: int, distance: Floats) -> Floats:
+    """Return how much of the integral of W in space lies beyond a plane, at distances over h from it `(n,)`.
+
+    Of a sphere of radius r about the point the area 2 pi r (r - distance) lies there.
+    """
+    return np.interp(distance, *_table_beyond_plane(kernel))
+
+
+@lru_cache
+def _table_beyond_plane(kernel: int) -> tuple[Floats, Floats]:
+    radius = np.linspace(0.0, SUPPORT, 801)
+    level = norm(kernel, 3, 1.0) * np.array([shape(kernel, False, one) for one in radius])
+    area = 2.0 * pi * radius * np.maximum(radius - radius[:, None], 0.0)
+    return radius, trapezoid(level * area, radius, axis=1)

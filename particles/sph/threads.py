@@ -38,7 +38,7 @@ class ThreadLoops:
         _find_rates(fluids, lists, fields, self._law, rates)
 
     def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
-        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(4, m)`."""
+        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(5, m)`."""
         _find_wall_values(fluids, lists, fields, self._law, found)
 
 
@@ -56,5 +56,5 @@ def _find_wall_values(fluids, lists, fields, law, found):
     offsets, indices = lists
     for i in prange(fluids, fields.x.shape[0]):
         values = wall_values(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
-        for k in range(4):
+        for k in range(found.shape[0]):
             found[k, i - fluids] = values[k]

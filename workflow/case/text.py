@@ -7,7 +7,10 @@ CHECK_UNITS = {
     r"standoff_spread_.*": "m",
 }  # fmt: skip
 # Below so much another unit reads better.
-LESS = {"s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "Pa": ((1e4, 1e-3, "kPa"),), "N": ((1.0, 1e3, "mN"),)}
+LESS = {
+    "s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "Pa": ((1e4, 1e-3, "kPa"),), "N": ((1.0, 1e3, "mN"),),
+    "m": ((1e-4, 1e6, "µm"),), "m^3": ((1e-12, 1e15, "pL"),),
+}  # fmt: skip
 SHOWN = {
     "Pa": (1e-6, "MPa"), "m": (1e3, "mm"), "m^3": (1e9, "mm³"), "J": (1e3, "mJ"), "J/m^3": (1e-3, "kJ/m³"),
     "N m": (1e3, "N mm"), "kg": (1e6, "mg"), "B": (1e-9, "GB"),
@@ -15,13 +18,18 @@ SHOWN = {
 
 
 def quantity(metric: dict) -> str:
-    """Text of a metric record: fractions as per cent, stresses in MPa or kPa, lengths in mm, small forces in mN."""
+    """Text of a metric record: fractions as per cent, stresses in MPa or kPa, lengths in mm or µm, small forces mN."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
-    smaller = ((factor, shown) for least, factor, shown in LESS.get(unit, ()) if 0.0 < abs(value) < least)
-    factor, shown = next(smaller, SHOWN.get(unit, (1.0, unit)))
+    factor, shown = readable(unit, abs(value))
     return f"{number(factor * value)} {shown}".strip()
+
+
+def readable(unit: str, size: float) -> tuple[float, str]:
+    """Return by what values of a size in an SI unit are multiplied, and in which unit they then read well."""
+    smaller = ((factor, shown) for least, factor, shown in LESS.get(unit, ()) if 0.0 < size < least)
+    return next(smaller, SHOWN.get(unit, (1.0, unit)))
 
 
 def number(value) -> str:

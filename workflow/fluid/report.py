@@ -12,6 +12,7 @@ from reflowshock.particles.reference.dam_break import measured_pressure
 from reflowshock.particles.reference.viscous_flows import starting_channel
 from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, PrintingCase
+from reflowshock.workflow.fluid.printed_part import add_part
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.scene import Field, Group, Scene
@@ -24,11 +25,12 @@ IN_PLANE, IN_SPACE = (0.0, -1.0, 0.0), (0.3, -1.0, 0.25)  # where the viewer loo
 NO_FACES = np.zeros((0, 3), dtype=int)
 HEADLINE = (
     "spread_max", "time_of_spread_max", "mean_pressure", "pressure_error", "roundness", "base_over_diameter",
-    "height_over_diameter", "capillary_number", "drops", "volume_error", "connected_parts_max", "roughness_sa",
-    "height_max", "voids",
+    "height_over_diameter", "capillary_number", "outcome", "volume_error", "connected_parts_max", "roughness_sa",
+    "height_max", "voids", "drops",
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
     "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip
+INK = {"m": (1e6, "µm"), "m^3": (1e15, "pL")}  # also where it is none
 UNITS = {"sqrt(H/g)": "√(H/g)", "rho g H": "ρgH"}
 CAPTIONS = {
     "dam_break": "Pressure at the sensor; front of the liquid; energies.",
@@ -44,9 +46,9 @@ def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> 
     from reflowshock.particles.scenes.flow_products import read_flow
 
     result = read_flow(run_folder / "particles")
-    metrics = summary["metrics"]
-    context["headline"] = figures_of(HEADLINE, metrics, _text)
-    context["tables"]["flow"] = limited_metrics(metrics, summary["health"], _text)
+    metrics, text = summary["metrics"], _ink_text if isinstance(case, PrintingCase) else _text
+    context["headline"] = figures_of(HEADLINE, metrics, text)
+    context["tables"]["flow"] = limited_metrics(metrics, summary["health"], text)
     context["flow_caption"] = CAPTIONS[case.kind]
     if isinstance(case, DamBreakCase):
         context["curves"]["flow"] = dam_curves(case, result.history)
@@ -55,6 +57,7 @@ def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> 
         context["curves"]["flow"] = channel_curves(case, end.time, end.points, end.velocity, result.history)
     elif isinstance(case, PrintingCase):
         context["curves"]["flow"] = printing_curves(case, result.history)
+        add_part(run_folder / "particles", context)
     elif isinstance(case, DropletCase):
         context["curves"]["flow"] = droplet_curves(case, result.history)
     else:
@@ -187,6 +190,14 @@ def flow_scene(result: "FlowResult", case: FlowCase) -> Scene:
     return Scene(
         groups, ["liquid", "wall"], fields, frames, start=len(frames) - 1, view=IN_SPACE if in_space else IN_PLANE
     )
+
+
+def _ink_text(name: str, metric: dict) -> str:
+    """Write lengths and volumes of printed ink in its units."""
+    if metric["unit"] not in INK:
+        return _text(name, metric)
+    factor, unit = INK[metric["unit"]]
+    return f"{number(factor * metric['value'])} {unit}"
 
 
 def _text(name: str, metric: dict) -> str:

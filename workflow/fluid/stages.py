@@ -45,15 +45,19 @@ def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:
     """Print drops on a plate and on each other."""
     from reflowshock.particles.printing.part_files import write_part
     from reflowshock.particles.printing.printing import solve_printing
-    from reflowshock.workflow.fluid.height_map import draw_heights
+    from reflowshock.workflow.fluid.printed_part import draw_heights
+
+    told = {}
 
     def solve(*arguments: Any) -> Any:
         result, part = solve_printing(*arguments)
+        told["outcome"] = metric(part.outcome, "")
         write_part(folder, part)
         draw_heights(folder / "height_map.png", part.x, part.y, part.heights)
         return result
 
-    return _flow(run, folder, solve, PART_LIMITS)
+    found = _flow(run, folder, solve, PART_LIMITS)
+    return replace(found, metrics=dict(found.metrics) | told)
 
 
 def flow_dam_break(run: Run[DamBreakCase], folder: Path) -> Findings:

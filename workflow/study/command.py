@@ -162,24 +162,39 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
     """Say early which metrics of a study the first point that is complete does not have."""
     show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
-    known = [name for name, metric in row.metrics.items() if is_number(metric["value"])]
+    known = _known(points.study, [row])
     for name in points.study.metrics:
         if name not in known:
             hint = nearest(name, sorted(known))
             suggestion = f"; did you mean {hint}?" if hint else "."
             print_error(
-                f"the first point has no numeric metric {name}{suggestion} Ctrl-C stops the study and keeps results"
+                f"the first point has no {_sort(points.study, name)}metric {name}{suggestion} "
+                "Ctrl-C stops the study and keeps results"
             )
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
-    """Whether the metrics of a study are numbers that its points have; tells those that are not."""
-    known = {name for row in rows for name, metric in row.metrics.items() if is_number(metric["value"])}
+    """Whether points have the metrics of a study, the one that ranks as a number; tells those that they have not."""
+    known = _known(study, rows)
     missing_ones = [name for name in study.metrics if known and name not in known]
     for name in missing_ones:
         hint = nearest(name, sorted(known))
-        print_error(f"no point has a numeric metric {name}" + (f"; did you mean {hint}?" if hint else ""))
+        print_error(f"no point has a {_sort(study, name)}metric {name}" + (f"; did you mean {hint}?" if hint else ""))
     return not missing_ones
+
+
+def _known(study: Study, rows: Sequence[Row]) -> set[str]:
+    """Metrics of points that a study can show: numbers, and words but for the one that ranks."""
+    return {
+        name
+        for row in rows
+        for name, metric in row.metrics.items()
+        if is_number(metric["value"]) or (isinstance(metric["value"], str) and name != study.about.rank_by)
+    }
+
+
+def _sort(study: Study, name: str) -> str:
+    return "numeric " if name == study.about.rank_by else ""
 
 
 def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:

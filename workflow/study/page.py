@@ -1,4 +1,4 @@
-"""study.html, main_effects.png, results.csv and results.parquet of a study, with a panel a metric and factor."""
+"""study.html, main_effects.png, process_map.png, results.csv and results.parquet of a study."""
 
 import base64
 from collections.abc import Sequence
@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.text import SHOWN
+from reflowshock.workflow.case.text import readable
 from reflowshock.workflow.report.drawing import STYLE, pyplot
 from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.main_effects import MainEffect
+from reflowshock.workflow.study.process_map import outcomes, process_map
 from reflowshock.workflow.study.results import HEALTHY, Row, columns, write_csv, write_parquet
 from reflowshock.workflow.study.study_file import Study
 
@@ -32,7 +33,8 @@ def write_results(folder: Path, study: Study, rows: Sequence[Row]) -> None:
     write_csv(folder / "results.csv", table)
     write_parquet(folder / "results.parquet", table)
     found = tables.effects(study, rows)
-    write_page(folder / "study.html", "study.html.j2", _context(study, rows, found) | _picture(folder, found))
+    pictures = {"picture": _picture(folder, found), "map": _map(folder, study, rows)}
+    write_page(folder / "study.html", "study.html.j2", _context(study, rows, found) | pictures)
 
 
 def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
@@ -52,15 +54,23 @@ def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
     }
 
 
-def _picture(folder: Path, found: list) -> dict:
+def _picture(folder: Path, found: list) -> str:
     """Draw main effects into a PNG; return it in base64. Nothing where no point has a metric."""
-    if not found:
-        return {"picture": ""}
-    picture = folder / "main_effects.png"
-    figure = main_effects(found)
-    figure.savefig(picture, dpi=150)
+    return _saved(main_effects(found), folder / "main_effects.png") if found else ""
+
+
+def _map(folder: Path, study: Study, rows: Sequence[Row]) -> str:
+    """Draw a process map where a metric of the study is told in words, as ``_picture``."""
+    metric, told = outcomes(study, rows)
+    figure = process_map(study, metric, told) if told else None
+    return "" if figure is None else _saved(figure, folder / "process_map.png")
+
+
+def _saved(figure: Figure, path: Path) -> str:
+    """Write a figure as PNG, close it and return it in base64."""
+    figure.savefig(path, dpi=150)
     pyplot.close(figure)
-    return {"picture": base64.b64encode(picture.read_bytes()).decode()}
+    return base64.b64encode(path.read_bytes()).decode()
 
 
 def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Figure:
@@ -76,7 +86,7 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
             figsize=(max(2.5 * columns, 4.0), 2.5 * len(effects)),
         )  # fmt: skip
         for row, (metric, unit, own) in zip(axes, effects, strict=True):
-            factor, shown = SHOWN.get(unit, (1.0, unit))
+            factor, shown = readable(unit, max(float(np.abs(effect.metrics).max()) for effect in own))
             row[0].set_ylabel(f"{metric.replace('_', ' ')} [{shown}]" if shown else metric.replace("_", " "))
             for axis, effect in zip(row, own, strict=False):
                 (_samples if effect.factor.continuous and effect.is_ordered else _means)(axis, effect, factor)

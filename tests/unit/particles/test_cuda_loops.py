@@ -24,7 +24,7 @@ law = Law(**{name: kind(given[name]) for name, kind in Law.__annotations__.items
 fields = Fields(**{name: given["field_" + name] for name in Fields._fields})
 lists = given["offsets"], given["indices"]
 loops, fluids = CudaLoops(law), int(given["fluids"])
-rates, walls = np.zeros((10, fluids)), np.zeros((4, len(fields.x) - fluids))
+rates, walls = np.zeros((10, fluids)), np.zeros((5, len(fields.x) - fluids))
 loops.find_rates(fluids, lists, fields, rates)
 loops.find_wall_values(fluids, lists, fields, walls)
 np.savez(sys.argv[2], rates=rates, walls=walls)
@@ -52,7 +52,7 @@ def test_a_gpu_computes_what_threads_compute(scene, tmp_path):
     fields, fluids, (offsets, indices) = simulation.fields, simulation.fluids, simulation.rows.lists
     for speed in (fields.u, fields.w):
         speed[:fluids] += random.normal(size=fluids) * simulation.fastest
-    rates, walls = np.zeros((10, fluids)), np.zeros((4, len(fields.x) - fluids))
+    rates, walls = np.zeros((10, fluids)), np.zeros((5, len(fields.x) - fluids))
     simulation.loops.find_rates(fluids, simulation.rows.lists, fields, rates)
     simulation.loops.find_wall_values(fluids, simulation.rows.lists, fields, walls)
     arrays = {f"field_{name}": array for name, array in fields._asdict().items()}

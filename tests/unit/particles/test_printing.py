@@ -1,6 +1,7 @@
 """Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
 
 import meshio
+import numba
 import numpy as np
 import pytest
 
@@ -8,8 +9,10 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.droplets import DropletNumerics
 from reflowshock.particles.parameters.printing import Cure, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
+from reflowshock.particles.printing.part import Layer, Part
 from reflowshock.particles.printing.part_files import write_part
 from reflowshock.particles.printing.printing import solve_printing
+from reflowshock.workflow.fluid.printed_part import layer_table, part_scene
 
 INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
@@ -55,6 +58,34 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     assert gaps.min() > scene.spacing
 
 
+def test_one_thread_and_two_print_the_same_bits():
+    found = []
+    for threads in (1, 2):
+        deposit = Deposit(printing())
+        deposit.add_drop((0.0, 0.0))
+        deposit.expose(1.0)
+        deposit.cure()
+        deposit.add_drop((5e-6, 0.0))
+        numba.set_num_threads(threads)
+        for _ in range(150):
+            deposit.step(1.0)
+        deposit.update()
+        found.append((deposit.points, deposit.surface.points, deposit.fields.density))
+    assert (deposit.surface.wetness[0] > 0.0).any()
+    for one, two in zip(*found, strict=True):
+        assert np.array_equal(one, two)
+
+
+@pytest.mark.parametrize(
+    ("parts", "voids", "outcome"),
+    [(1, 0, "merged"), (4, 0, "separate"), (2, 0, "partly merged"), (1, 2, "voids"), (4, 1, "voids")],
+)
+def test_a_part_says_what_became_of_its_drops(parts, voids, outcome):
+    nothing = np.empty(0)
+    layers = [Layer(k, 4, 4, parts, 1.0, 1.0, 1.0, 1.0, 1.0, voids) for k in (1, 2)]
+    assert Part(nothing, nothing, nothing, nothing, nothing, layers, np.ones(voids)).outcome == outcome
+
+
 def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
     scene, calls = printing(), []
 
@@ -83,4 +114,12 @@ def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
     assert 0.5 * scene.length < part.heights.max() < scene.length
     write_part(tmp_path, part)
     assert len(meshio.read(tmp_path / "part.stl").cells[0].data) == len(part.triangles)
-    assert (tmp_path / "layers.csv").read_text().splitlines()[1].startswith("1,2,")
+    (layer,) = part.layers
+    assert layer.volume == pytest.approx((1.0 + metrics["volume_error"]) * 2 * scene.drop_volume)
+    assert layer.roughness_sa == metrics["roughness_sa"] and layer.roughness_sz == metrics["roughness_sz"]
+    table = layer_table(tmp_path / "layers.csv")
+    assert table["head"][:3] == ["layer", "height [µm]", "Sa [µm]"]
+    assert [row[0] for row in table["rows"]] == ["1"] and float(table["rows"][0][4]) == pytest.approx(12.74, rel=0.01)
+    scene_3d = part_scene(tmp_path / "part.stl")
+    assert scene_3d.fields[0].high == pytest.approx(1e6 * part.points[:, 2].max(), rel=1e-5)
+    assert len(scene_3d.groups[0].points) == len(part.points)

@@ -16,7 +16,7 @@ from reflowshock.particles.scenes.flow_products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.particle_rates import rates_of, solved
 from reflowshock.particles.sph.simulation import Rows, Simulation
-from reflowshock.particles.sph.smoothing import KERNELS, norm, shape, slope
+from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
 
 AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.pi * q * q}
 
@@ -42,10 +42,33 @@ def test_kernels_integrate_to_one_and_their_slope_is_their_derivative(kernel, di
     assert shape(kernel, line, 1.0 - 1e-9) == pytest.approx(shape(kernel, line, 1.0 + 1e-9), abs=1e-8)
 
 
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS.keys())
+def test_the_kernel_beyond_a_plane_is_that_of_a_lattice_behind_it(kernel):
+    line = (np.arange(-40, 40) + 0.5) / 20.0
+    x, y, z = np.meshgrid(line, line, line, indexing="ij")
+    radius = np.sqrt(x * x + y * y + z * z).ravel()
+    levels = norm(kernel, 3, 1.0) / 20.0**3 * np.array([shape(kernel, False, one) for one in radius[radius < 2.0]])
+    planes = np.array([0.0, 0.2, 0.7, 1.5, 2.0])
+    sums = [levels[z.ravel()[radius < 2.0] > plane].sum() for plane in planes]
+    assert beyond_plane(kernel, planes) == pytest.approx(sums, abs=2e-3)
+    assert beyond_plane(kernel, planes[[0, -1]]) == pytest.approx([0.5, 0.0], abs=1e-5)
+
+
+def test_walls_list_the_liquid_alone_and_the_liquid_all():
+    law = dam(small_dam()).law
+    points, fluids = np.random.default_rng(5).uniform(0.0, 6.0 * law.length, (3, 300)), 100
+    one, all_ = Rows(law, fluids), Rows(law, 300)
+    one.update(points)
+    all_.update(points)
+    for i in range(300):
+        mine, every = (rows.lists[1][rows.lists[0][i] : rows.lists[0][i + 1]] for rows in (one, all_))
+        assert np.array_equal(mine, every if i < fluids else every[every < fluids])
+
+
 def test_periodic_neighbours_are_those_of_a_tree_of_the_torus():
     law = vortices(TaylorGreen(side=1.0, speed=1.0, viscosity=10.0, numerics=SphNumerics(particles_across=12))).law
     points = np.random.default_rng(3).uniform(-1.0, 2.0, (3, 400)) * np.array([[1.0], [0.0], [1.0]])
-    rows = Rows(law)
+    rows = Rows(law, 400)
     rows.update(points)
     offsets, indices = rows.lists
     reach = 2.3 * law.length
@@ -90,7 +113,7 @@ def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
         quiet[:] = 0.0
     fields.density[:] = 1.0 + 0.01 * fields.x - 0.02 * fields.z
     fields.slope_x[:], fields.slope_z[:] = 0.01, -0.02
-    rows = Rows(law)
+    rows = Rows(law, simulation.fluids)
     rows.update(np.array(fields[:3]))
     offsets, indices = rows.lists
     inner = np.flatnonzero((np.abs(fields.x - 0.5) < 0.3) & (np.abs(fields.z - 0.5) < 0.3))

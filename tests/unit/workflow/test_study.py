@@ -12,9 +12,10 @@ from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.pipeline.points import PointsError
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study import tables
-from reflowshock.workflow.study.command import read_points_of, results, run_study
+from reflowshock.workflow.study.command import has_metrics, read_points_of, results, run_study
 from reflowshock.workflow.study.designs import Factor, Hypercube, as_text, between
 from reflowshock.workflow.study.main_effects import effect_of, ranked
+from reflowshock.workflow.study.process_map import outcomes, process_map
 from reflowshock.workflow.study.progress import outlook, seconds_left
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
 from reflowshock.workflow.study.study_file import read_study
@@ -204,6 +205,38 @@ def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
     assert "1 of 5 points failed a check" in tables.imbalance([*ROWS, row(5, 1.0, 0.08, 1.0, UNHEALTHY)])
     assert (tmp_path / "main_effects.png").stat().st_size > 10_000
     assert [line[1] for line in tables.ranking(study, rows)["rows"]] == ["key1", "key3", "key2", "key4"]
+
+
+def told(number: int, settings: dict[str, str], word: str) -> Row:
+    metrics = {"outcome": {"value": word, "unit": ""}, "stress": {"value": 4e-6 * number, "unit": "m"}}
+    return Row(number, f"key{number}", settings, HEALTHY, seconds=1.0, metrics=metrics)
+
+
+def test_a_metric_in_words_is_a_map_over_two_factors(write, tmp_path):
+    from reflowshock.workflow.study.page import main_effects, write_results
+
+    study = read_study(write(GRID, HEAD + 'metrics = ["outcome"]\n'))
+    rows = [told(one.number, dict(one.settings), "merged" if one.number < 3 else "separate") for one in ROWS]
+    assert outcomes(study, rows) == ("outcome", rows) and outcomes(study, ROWS) == ("", [])
+    axis = process_map(study, "outcome", rows).axes[0]
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("pitch [mm]", "volume [mm^3]")
+    drawn = {one.get_label(): one.get_offsets().tolist() for one in axis.collections}
+    assert drawn == {"merged": [[0.9, 0.07], [0.9, 0.0724]], "separate": [[1.0, 0.07], [1.0, 0.0724]]}
+    assert has_metrics(study, rows) and not has_metrics(
+        read_study(write(GRID, HEAD.replace("stress", "outcome"))), rows
+    )
+    write_results(tmp_path, study, rows)
+    assert (tmp_path / "process_map.png").exists() and "Process map" in (tmp_path / "study.html").read_text()
+    figure = main_effects(tables.effects(study, rows))
+    assert figure.axes[0].get_ylabel() == "stress [µm]"
+
+
+def test_a_metric_in_words_is_a_line_over_one_factor_and_nothing_over_names(write):
+    text = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n'
+    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "0.9 mm"), (2, "1 mm"))]
+    assert process_map(read_study(write(text)), "outcome", rows).axes[0].get_xlabel() == "pitch [mm]"
+    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "fine"), (2, "wide"))]
+    assert process_map(read_study(write(text)), "outcome", rows) is None
 
 
 def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys):

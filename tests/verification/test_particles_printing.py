@@ -1,0 +1,65 @@
+"""Printed ink on cured ink: a drop on a flat cured slab becomes the spherical cap that it becomes on a plate."""
+
+import numpy as np
+import pytest
+import pyvista
+
+from reflowshock.particles.parameters.droplets import cap
+from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
+from reflowshock.particles.printing.deposit import SOLID, Body, Deposit
+from reflowshock.particles.scenes.droplet import base_width
+from reflowshock.particles.sph import flow
+
+LAYERS = 5
+
+
+def on_slab(degrees):
+    """A drop of 23 um, 8 particles across, that lands at 3 m/s on a slab of cured particles; its top [m]."""
+    scene = Printing(
+        drop_volume=6.37e-15, surface_tension=0.072, viscosity=0.0149, speed=3.0, delay=1.0, pitch=23e-6, columns=1,
+        rows=1, layers=3, contact_angle=np.radians(degrees), numerics=PrintingNumerics(particles_per_diameter=8),
+    )  # fmt: skip
+    deposit = Deposit(scene)
+    spacing = deposit.law.spacing
+    half = int(np.ceil(1.3 * scene.length / spacing))
+    across, up = spacing * (np.arange(-half, half) + 0.5), spacing * (np.arange(LAYERS) + 0.5)
+    points = np.stack(np.meshgrid(across, across, up, indexing="ij")).reshape(3, -1)
+    count, top = points.shape[1], LAYERS * spacing
+    deposit.fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(count), deposit.law)
+    deposit.state, deposit.drop = np.full(count, SOLID, np.int32), np.zeros(count, np.int32)
+    deposit.dose = np.zeros(count)
+    deposit._add_body(Body(*open_box(half * spacing, top), 0))
+    deposit.add_drop((0.0, 0.0))
+    return scene, deposit, top
+
+
+def open_box(half, top):
+    """Surface of a box without its bottom, outward oriented."""
+    box = pyvista.Box((-half, half, -half, half, 0.0, top)).triangulate().clean()
+    points, triangles = np.array(box.points, dtype=float), box.faces.reshape(-1, 4)[:, 1:].astype(np.int32)
+    return points, triangles[points[triangles, 2].max(axis=1) > 0.5 * top]
+
+
+def errors_on_slab(degrees, units):
+    """Height and base against the cap after so many sqrt(rho D^3 / gamma)."""
+    scene, deposit, top = on_slab(degrees)
+    unit = np.sqrt(scene.density * scene.length**3 / scene.surface_tension)
+    while deposit.time < units * unit:
+        deposit.step(1.0)
+    points = deposit.surface.points - [0.0, 0.0, top]
+    base, height = cap(scene.contact_angle)
+    widths = base_width(points, deposit.law.spacing) / scene.length
+    assert deposit.simulation.kinetic_energy < 1e-3 * np.pi * scene.length**2 * scene.surface_tension
+    return points[:, 2].max() / scene.length / height - 1.0, widths / base - 1.0
+
+
+def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
+    height, base = errors_on_slab(90.0, 1.5)
+    assert abs(height) < 0.05 and abs(base) < 0.08  # as on the plate; without shares of walls 0.18 and 0.2
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("degrees", "units"), [(60.0, 4.0), (120.0, 3.0)])
+def test_drops_on_cured_ink_that_they_wet_or_not(degrees, units):
+    height, base = errors_on_slab(degrees, units)
+    assert abs(height) < 0.04 and abs(base) < 0.06
