@@ -43,7 +43,7 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 
 
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
-    """Return a plan for scripts: stages, effects as in ``summary.json``, wall times [s]: of compiling kernels, of all."""
+    """Return a plan for scripts: stages, effects as in ``summary.json``, wall times [s] of compilation and of all."""
     stages = planned_stages(store, point)
     once = compilation([name for name, stage in stages.items() if stage.runs])
     return {
