@@ -19,6 +19,7 @@ from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.board_drop.shock_forecast import (
     ShockForecast,
     forecast_shock,
+    mode_seconds,
     seconds_around,
     shorter_than_window,
 )
@@ -106,6 +107,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     cooling, seconds = shock_cooling.forecast(case, parts)
+    once = seconds + mode_seconds(case)
     modes = {
         "two_scale": share * shock.two_scale + seconds_around(case, two_scale_parts(case), share),
         "dns": share * dns + seconds_around(case, parts, share * shock.dns_share),
@@ -119,7 +121,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
         effects=of_reflow.effects | of_shock | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},
+        seconds=of_reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes) + identical + once},
     )
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # histories, of any mesh and an element.
 SECONDS_TO_START, SETUP_SECONDS, SAMPLE_SECONDS = 5.0, 5e-5, 2e-7
 SECONDS_OF_SAMPLE = 5e-3
+FIELD_SECONDS = 1.4e-5  # of an element in one sample of fields
+MODE_SOLUTIONS = 20  # solutions by one factor for each natural mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +119,20 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
 
 def seconds_around(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
     """Predict the wall time [s] of a run outside its windows: start, set-up, samples; ``share`` of all samples."""
-    elements = sum(part.elements for part in parts.values()) / case.shock.ranks.total
-    samples = share * case.shock.numerics.history_samples
-    return SECONDS_TO_START + samples * SECONDS_OF_SAMPLE + elements * (SETUP_SECONDS + samples * SAMPLE_SECONDS)
+    elements, numerics = sum(part.elements for part in parts.values()), case.shock.numerics
+    histories, fields = share * numerics.history_samples, share * numerics.field_samples
+    shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
+    return SECONDS_TO_START + SETUP_SECONDS * elements + histories * SECONDS_OF_SAMPLE + shared
+
+
+def mode_seconds(case: "BoardDropCase") -> float:
+    """Predict the wall time [s] of finding the natural modes, where they are asked for."""
+    from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
+
+    if not case.shock.modes:
+        return 0.0
+    elements = sum(part.elements for part in coarse_parts(case).values())
+    return implicit_cost(plate_nodes(elements), MODE_SOLUTIONS * case.shock.modes).seconds
 
 
 def implicit_seconds(case: "BoardDropCase") -> float | None:

@@ -14,6 +14,7 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     SECONDS_TO_START,
     forecast_shock,
     implicit_seconds,
+    mode_seconds,
     seconds_around,
 )
 from reflowshock.workflow.pipeline.reader import read_case
@@ -142,6 +143,14 @@ def test_what_lies_around_windows_counts():
     parts = forecast_parts(case)
     assert seconds_around(case, parts) > seconds_around(case, parts, share=0.1) > SECONDS_TO_START
     assert forecast(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
+
+
+def test_natural_modes_cost_only_where_they_are_asked_for():
+    assert (
+        mode_seconds(read_case(SMALL_CASE, ["shock.modes=4"]))
+        > mode_seconds(read_case(SMALL_CASE, ["shock.modes=0"]))
+        == 0.0
+    )
 
 
 def test_columns_are_no_boxes():
