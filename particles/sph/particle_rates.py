@@ -47,6 +47,14 @@ def closing_in(k, velocity, d, fields):
 
 
 @njit(cache=True, error_model="numpy")
+def viscosity_between(i, j, fluids, fields, law):
+    """Return the viscosity between two particles [Pa s]; beside a wall it is the liquid's."""
+    if law.rheology == 0 or j >= fluids:
+        return fields.viscosity[i] if law.rheology else law.viscosity
+    return pair_terms.shared_viscosity(fields.viscosity[i], fields.viscosity[j])
+
+
+@njit(cache=True, error_model="numpy")
 def rates_of(i, fluids, neighbours, fields, law):
     """Return what a particle of the liquid is told by its neighbours.
 
@@ -98,7 +106,7 @@ def rates_of(i, fluids, neighbours, fields, law):
         if law.artificial > 0.0 and liquid:
             push += law.artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
         if law.viscosity > 0.0 and (liquid or law.no_slip):
-            softened2, double = distance2 + softening, 2.0 * law.viscosity / density
+            softened2, double = distance2 + softening, 2.0 * viscosity_between(i, j, fluids, fields, law) / density
             if law.has_surface:
                 factor = double * (law.dimension + 2)
                 push += pair_terms.central_viscosity(approach, softened2, steep, volume, factor)

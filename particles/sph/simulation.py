@@ -81,6 +81,9 @@ class Loops(Protocol):
     def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
         """Write pressures, velocities and shares `(5, m)` of walls."""
 
+    def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
+        """Write the viscosities `(1, n)` of the liquid, where they depend on the rate of shear."""
+
 
 @dataclass(slots=True)
 class Simulation:
@@ -150,7 +153,8 @@ class Simulation:
     def time_step(self) -> float:
         """The largest stable step [s]."""
         law, tension = self.law, self.surface.tension if self.surface else 0.0
-        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, law.viscosity, tension)
+        viscosity = float(self.fields.viscosity[: self.fluids].max()) if law.rheology else law.viscosity
+        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, viscosity, tension)
 
     def step(self, time_step: float) -> None:
         """Go on by a time step [s].
@@ -195,6 +199,8 @@ class Simulation:
         self.rows.update(np.array(fields[:3]))
         fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)
         self._extend_to_walls()
+        if law.rheology:
+            self.loops.find_viscosities(self.fluids, self.rows.lists, fields, fields.viscosity[None, liquid])
         self.loops.find_rates(self.fluids, self.rows.lists, fields, self.rates)
         self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
         if self.surface:
