@@ -102,14 +102,14 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        basis = self.basis
+        basis, across = self.basis, self.basis.T
         load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inverse = self.time_step * self._inverse_masses()
         solution, _ = conjugate_gradients(
-            lambda free: basis.T @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
-            basis.T @ load.ravel(),
-            basis.T @ velocity.ravel(),
+            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
+            across @ load.ravel(),
+            across @ velocity.ravel(),
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
@@ -126,15 +126,15 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, basis = self.space, self.basis
-        divergence = self.constraint(start)
+        space, basis, across = self.space, self.basis, self.basis.T
+        divergence, inverse = self.constraint(start), self.time_step * self._inverse_masses()
 
         def accelerated(pressure: Floats) -> Floats:
-            return self.time_step * self._accelerated(self.push(pressure))
+            return (basis @ (inverse * (across @ self.push(pressure).ravel()))).reshape(-1, 3)
 
         def matrix() -> sparse.csr_matrix:
             rows = (sparse.diags(space.volumes) @ space.divergence_rows() @ basis).tocsr()
-            return (rows @ sparse.diags(self.time_step * self._inverse_masses()) @ rows.T).tocsr()
+            return (rows @ sparse.diags(inverse) @ rows.T).tocsr()
 
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
@@ -146,11 +146,6 @@ class GalerkinEquations:
         )
         change = potential - self.fluid.viscosity * divergence / space.volumes
         return start + accelerated(potential), change
-
-    def _accelerated(self, force: Floats) -> Floats:
-        """Accelerations `(n, 3)` [m/s^2] of forces, as far as they are admitted."""
-        basis = self.basis
-        return (basis @ (self._inverse_masses() * (basis.T @ force.ravel()))).reshape(-1, 3)
 
     def _inverse_masses(self) -> Floats:
         """One over the mass of the particle of each admissible velocity, `(d,)` [1/kg]."""
