@@ -183,6 +183,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         no_slip=int(not has_surface),
         mirror=0,
         spacing=spacing,
+        xsph=numerics.xsph,
         shifting=0.0 if has_surface else 1.0,
         period_x=periods[0],
         period_y=periods[1],

@@ -31,6 +31,7 @@ class Law(NamedTuple):
         mirror: 1 where the plane z = 0 is a wall below the liquid: its particles meet their images behind it, which
             costs no particles and ends, with the liquid, at the contact line.
         spacing: of the particles at the start [m].
+        xsph: epsilon of the smoothed velocity that moves particles (Monaghan 1989); 0 is none.
         shifting: share of the shift of particles by Sun et al. (2017); 0 is none.
         period_x, period_y, period_z: of a periodic flow [m]; 0 where it is not.
         gravity_x, gravity_y, gravity_z: [m/s^2].
@@ -54,6 +55,7 @@ class Law(NamedTuple):
     no_slip: int
     mirror: int
     spacing: float
+    xsph: float
     shifting: float
     period_x: float
     period_y: float

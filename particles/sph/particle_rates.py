@@ -144,6 +144,28 @@ def rates_of(i, fluids, neighbours, fields, law):
 
 
 @njit(cache=True, error_model="numpy")
+def drift_of(i, fluids, neighbours, fields, law):
+    """Return the velocity (3) [m/s] that XSPH adds where it moves a particle of the liquid; momentum stays."""
+    x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
+    inverse = 1.0 / law.length
+    fu = fv = fw = 0.0
+    mirror = law.mirror if z < 2.0 * law.length else 0
+    for n in range((1 + mirror) * len(neighbours) + mirror):
+        j, side = seen(n, i, neighbours, mirror)
+        if j >= fluids:
+            continue
+        dx = across(x - fields.x[j], law.period_x)
+        dy = across(y - fields.y[j], law.period_y)
+        dz = across(z - side * fields.z[j], law.period_z)
+        level = law.norm * shape(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+        weight = law.xsph * pair_terms.xsph(level, fields.mass[j], fields.density[i], fields.density[j])
+        fu += weight * (fields.u[j] - u)
+        fv += weight * (fields.v[j] - v)
+        fw += weight * (side * fields.w[j] - w)
+    return fu, fv, fw
+
+
+@njit(cache=True, error_model="numpy")
 def solved(moments, sums, dimension):
     """Return the gradient `moments^-1 sums`, in a plane that of x and z; zero where neighbours do not resolve it."""
     xx, yy, zz, xy, yz, xz = moments

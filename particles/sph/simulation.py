@@ -84,6 +84,9 @@ class Loops(Protocol):
     def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
         """Write the viscosities `(1, n)` of the liquid, where they depend on the rate of shear."""
 
+    def find_drifts(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
+        """Write the velocities `(3, n)` by which XSPH moves the liquid."""
+
 
 @dataclass(slots=True)
 class Simulation:
@@ -164,16 +167,18 @@ class Simulation:
         """
         liquid, half = slice(self.fluids), 0.5 * time_step
         fields, rates = self.fields, self.rates
-        middle = []
+        middle, drift = [], np.zeros((3, self.fluids))
+        if self.law.xsph:
+            self.loops.find_drifts(self.fluids, self.rows.lists, fields, drift)
         for axis in range(3):
             place, speed = fields[axis][liquid], fields[3 + axis][liquid]
             middle.append(speed + half * rates[1 + axis])
-            place += time_step * middle[axis]
+            place += time_step * (middle[axis] + drift[axis])
             speed += time_step * rates[1 + axis]
         if self.surface:
             carriers = slice(self.fluids + self.held)
             volume = float((fields.mass[carriers] / fields.density[carriers]).sum())
-            velocity = np.pad(np.array(middle), ((0, 0), (0, self.held)))
+            velocity = np.pad(np.array(middle) + drift, ((0, 0), (0, self.held)))
             self.surface.move(velocity, time_step, volume)
         if self.law.mirror:
             self._reflect(middle)
