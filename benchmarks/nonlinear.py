@@ -42,6 +42,7 @@ from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
 from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
+from benchmarks.support.kept_rows import KeptRows
 from benchmarks.support.program_run import ProgramRun
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
@@ -60,6 +61,7 @@ from reflowshock.fem.output.compare import compare_histories
 from tests.support.fem_tangent import flowing_pair
 
 RESULT = turns.RESULTS / "nonlinear.json"
+BUILD = turns.RESULTS.parents[1] / "build"
 FINITE = {"kinematics": "corotational", "plasticity": "on", "formulation": "one_point"}
 ELASTIC = {"plasticity": "off", "formulation": "one_point"}
 HELD = {"scheme": "held_velocity", "fine_joints": CRITICAL[:1]}
@@ -152,7 +154,7 @@ def against_peers() -> tuple[Bars, dict]:
     for law, (material, strain, names, kinds) in PEERS.items():
         displacement = mesh.points @ (TURN @ (np.eye(3) + strain * STRETCHED) - np.eye(3)).T
         motions = {kind: moved_body(mesh, material, kind, displacement) for kind in kinds}
-        given = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, law)
+        given = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
         running = {name: peers.Peer(name, given) for name in names if name in found}
         force = np.zeros_like(displacement)
         force[motions[kinds[0]].body.local.nodes] = motions[kinds[0]].force
@@ -298,15 +300,20 @@ def drift() -> tuple[Bars, dict]:
 
 
 def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
-    """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some."""
+    """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some.
+
+    Each pair is kept in ``build`` when it is done: a run that was broken off goes on there.
+    """
+    kept = KeptRows(BUILD / f"growth-{formulation}.jsonl", formulation)
     found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
-    for pair, fraction in list(grid())[::every]:
+    for number, (pair, fraction) in enumerate(list(grid())[::every], 1):
+        label = f"{pair!r} at {fraction}"
+        row = kept.found(label, partial(window_growth, pair, fraction, formulation))
         for name, values in found.items():
-            coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)
-            values[repr(pair)] = coupled.spectral_radius() - 1.0
-            if name == ALONG_PATHS[0]:
-                levels[repr(pair)] = len(coupled.meso.motion.body.schedule)
+            values[label] = row[name]
+        levels[label] = row["levels"]
+        print(number, label, f"{max(row[name] for name in ALONG_PATHS):.1e}", flush=True)
     grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
     bars = {
         f"nonlinear windows that grow by more than {GROWTH:g}, {formulation}, {name}": turns.bar(count, 0, False)
@@ -314,6 +321,17 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     }
     worst = {name: max(values.values()) for name, values in found.items()}
     return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
+
+
+def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
+    """Return by how much a window of each scheme grows, and in how many levels the first one is."""
+    found: dict[str, float] = {}
+    for name in ALONG_PATHS:
+        coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)
+        found[name] = coupled.spectral_radius() - 1.0
+        if name == ALONG_PATHS[0]:
+            found["levels"] = len(coupled.meso.motion.body.schedule)
+    return found
 
 
 PARTS = {

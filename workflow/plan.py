@@ -13,6 +13,7 @@ from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
 from reflowshock.workflow.pipeline.gate import LONG
+from reflowshock.workflow.process.kernel_cache import compilation
 from reflowshock.workflow.process.terminal import new_table, styled
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
@@ -42,14 +43,16 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 
 
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
-    """Return a plan for scripts: stages, effects as in ``summary.json``, and the wall time [s] of what would run."""
+    """Return a plan for scripts: stages, effects as in ``summary.json``, wall times [s] of compilation and of all."""
     stages = planned_stages(store, point)
+    once = compilation([name for name, stage in stages.items() if stage.runs])
     return {
         "case": point.case.case.name,
         "folder": str(store.folder),
         "stages": {name: asdict(stage) for name, stage in stages.items()},
         "effects": dict(kind_of(point.case).forecast(point.case).effects),
-        "seconds": sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
+        "compilation": once,
+        "seconds": once + sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
     }
 
 
@@ -99,7 +102,8 @@ def reason(state: StageState, case: Case) -> str:
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """Predict the wall time [s] of all that has to be made up to a stage."""
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
-    return sum(costs[stage.name].seconds for stage in point.case.pipeline.upstream(until) if states[stage.name].stale)
+    stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
+    return sum(costs[name].seconds for name in stale) + compilation(stale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +137,10 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     for name, state in states.items():
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
+    if once := compilation([name for name, state in states.items() if state.stale]):
+        table.add_row("kernels", styled("[yellow]run[/]"), f"about {duration(once)}", "compiled once, in these stages")
     stale = [costs[name] for name, state in states.items() if state.stale]
-    left = sum(cost.seconds for cost in stale)
+    left = sum(cost.seconds for cost in stale) + once
     remark = _about_time(left)
     if any(cost.source == FORMER for cost in stale):
         remark += f"; {FORMER}: as former runs here took"

@@ -85,7 +85,16 @@ def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
     division = by_buffer(whole, survey, rules)
     meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
     pushed = rules.pushed or meso[list(rules.shaken)].any()
-    return division if pushed else with_path_levels(whole, survey, division, rules)
+    if pushed:
+        return division
+
+    def around(taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        nodes = seeds_of(whole, taken)
+        nodes[whole.tie.slave[nodes[whole.tie.master].any(axis=1)]] = True
+        return division.meso & touching(whole.mesh.cells, nodes)
+
+    pace = Pace(survey.step, survey.cost, division.plan.window, rules.fraction)
+    return with_path_levels(division, pace, around, rules.coupling.most_levels)
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:

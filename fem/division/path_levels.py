@@ -11,28 +11,36 @@ highest frequency. There are two layers, or one in which it fades as much as in 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.choose_levels import ROUNDING, SUBSTEP_COST
-from reflowshock.fem.division.division import Division, Rules
-from reflowshock.fem.division.whole import Survey, Whole, seeds_of, touching
-from reflowshock.fem.kernels.levels import PACES
+from reflowshock.fem.division.choose_levels import ROUNDING, SUBSTEP_COST, Pace
+from reflowshock.fem.division.division import Division
+
+MOST_LEVELS = 3  # as many as ``kernels.levels`` has paces; it is compiled code, which no plan loads
+Around = Callable[[NDArray[np.bool_]], NDArray[np.bool_]]
 
 
-def with_path_levels(whole: Whole, survey: Survey, division: Division, rules: Rules) -> Division:
-    """Return a division of held velocity in the levels, and with the substeps, of least predicted cost."""
-    plan, found = division.plan, FinerCells(whole, survey, division, rules)
+def with_path_levels(division: Division, pace: Pace, around: Around, most: int) -> Division:
+    """Return a division of held velocity in the levels, and with the substeps, of least predicted cost.
+
+    Args:
+        division: In one level.
+        pace: Critical steps and costs of all cells.
+        around: Returns which cells ``(ne,)`` of the meso model share a node with some, by a tie or without.
+        most: Largest number of levels wanted.
+    """
+    plan, found = division.plan, FinerCells(division.meso, pace, around)
 
     def cost(ratios: tuple[int, ...]) -> float:
         counts = np.cumprod(ratios)
         level = found.level(ratios)
-        return float(survey.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
+        return float(pace.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
 
-    ratios = min(candidates(plan.substeps, min(PACES, rules.coupling.most_levels)), key=cost)
+    ratios = min(candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
     return replace(division, level=found.level(ratios), ratios=ratios, plan=replace(plan, substeps=math.prod(ratios)))
 
 
@@ -58,11 +66,11 @@ def opaque_ratio(fraction: float) -> float:
 class FinerCells:
     """Cells of the meso model that need smaller steps than some share of the window, and layers around them."""
 
-    def __init__(self, whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
-        """Take a divided mesh."""
-        self._whole, self._meso = whole, division.meso
-        self._steps, self._window = rules.fraction * survey.step, division.plan.window
-        self._opaque = opaque_ratio(rules.fraction)
+    def __init__(self, meso: NDArray[np.bool_], pace: Pace, around: Around) -> None:
+        """Take the cells ``(ne,)`` of the meso model, and what ``with_path_levels`` takes."""
+        self._meso, self._around = meso, around
+        self._steps, self._window = pace.fraction * pace.steps, pace.window
+        self._opaque = opaque_ratio(pace.fraction)
         self._known: dict[int, NDArray[np.bool_]] = {}
 
     def than(self, count: int) -> NDArray[np.bool_]:
@@ -77,9 +85,3 @@ class FinerCells:
         """Return the level ``(ne,)`` of each cell, 0 for those of the macro model."""
         inner = [self.than(int(count)) for count in np.cumprod(ratios)[:-1]]
         return np.sum([self._meso, *inner], axis=0, dtype=np.int32)
-
-    def _around(self, taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the cells ``(ne,)`` of the meso model that share a node with some, by a tie or without."""
-        tie, nodes = self._whole.tie, seeds_of(self._whole, taken)
-        nodes[tie.slave[nodes[tie.master].any(axis=1)]] = True
-        return self._meso & touching(self._whole.mesh.cells, nodes)

@@ -18,9 +18,11 @@ from reflowshock.fem.problem.shock import Ranks
 # those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.
 UPDATES_PER_SECOND = 1.2e7
 BOARD_ADVANTAGE = 4.3
-WINDOW_OVERHEAD = 3.0e-5  # [s] interpreter per window, same source
+ROW_COST = 4.0  # updates of boxes in the time that a row of them takes, however short (boards of graded boxes)
+IDLE_COST = 0.15  # updates of assembled elements in the time in which the nodes of one move that does not act
+WINDOW_OVERHEAD = 1.5e-4  # [s] interpreter per window, same source
 STEP_OVERHEAD = 2.5e-5  # [s] interpreter per step of a motion or of a level inside it, same source
-CALL_OVERHEAD = 7.0e-5  # [s] interpreter per window whose steps are one call, same source
+CALL_OVERHEAD = 1.2e-4  # [s] interpreter per window whose steps are one call, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
 PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
 ROUNDING = 1e-9  # of a duration
@@ -68,6 +70,23 @@ def _box_critical_step(material: Material, lengths: tuple[float, ...]) -> float:
     pairs = ((3, 0, 1), (4, 1, 2), (5, 0, 2))
     shear = max(elasticity[k, k] * (size[i] ** -2.0 + size[j] ** -2.0) for k, i, j in pairs)
     return 1.0 / math.sqrt(max(float(normal), float(shear)) / material.density)
+
+
+def skewed_critical_step(material: Material, edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the critical steps ``(n,)`` [s] of hexahedra with three edges each, ``(n, 3, 3)`` [m], at any angles.
+
+    The uniform strains are the stiffest modes here, too: u_i = a_ik xi_k with xi from -1 to 1 has the strain of
+    a_ik d(xi_k)/dx_j and the kinetic energy of the mass times a_ik^2. Of boxes this is ``box_critical_step``.
+    """
+    gradient = 2.0 * np.linalg.inv(edges)  # (n, 3, 3): d(xi_k)/dx_j at j, k
+    strain = np.zeros((len(edges), 6, 3, 3))  # of a_ik at i, k
+    for axis in range(3):
+        strain[:, axis, axis] = gradient[:, axis]
+    for row, first, second in ((3, 0, 1), (4, 1, 2), (5, 0, 2)):
+        strain[:, row, first], strain[:, row, second] = gradient[:, second], gradient[:, first]
+    modes = strain.reshape(len(edges), 6, 9)
+    stiffness = np.einsum("nai,ab,nbj->nij", modes, elasticity_matrix(material), modes)
+    return 2.0 / np.sqrt(np.linalg.eigvalsh(stiffness)[:, -1] / material.density)
 
 
 def damped_critical_step(critical: Step, stiffness: float) -> Step:

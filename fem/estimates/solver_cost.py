@@ -33,6 +33,7 @@ NONLINEAR_RATE = {
     "tetrahedron_quadratic": 4.5e6,
 }
 TURNING_BOX_RATE, TURNING_RATE = 2.0e7, 1.2e7  # elastic and corotational: boxes of graded meshes, any hexahedra
+TURNING_BOARD_RATE = 1.35e7  # such boxes of a board that waits for memory: 1e5 of them, or 1e4 in turns with the joints
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
 ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation

@@ -8,6 +8,7 @@ import numpy as np
 from reflowshock.meshing.board.pads import has_rim, pad_table
 from reflowshock.meshing.board.parameters import Board, JointNumerics, Package, Pad, Warpage
 from reflowshock.meshing.board.plan import (
+    MOST_LINES,
     Interval,
     Plan,
     blocks_within,
@@ -15,6 +16,7 @@ from reflowshock.meshing.board.plan import (
     column_levels,
     footprint,
     hole_rings,
+    hole_square,
     package_plan,
     patch,
 )
@@ -22,12 +24,26 @@ from reflowshock.meshing.board.plan import (
 FLAT = Warpage()
 
 
+Edges = tuple[tuple[float, float, float], ...]
+
+
 @dataclass(frozen=True, slots=True)
 class PartEstimate:
-    """Number of hexahedra of a part and the edge lengths (x, y, z) of its smallest one [m]."""
+    """What the hexahedra of a part are like.
+
+    Attributes:
+        elements: Their number.
+        smallest: Edge lengths (x, y, z) of the smallest box [m].
+        rows: Rows of equal boxes side by side; 0 where they are not counted.
+        around_holes: How many of the elements lie around mounting holes, and are no boxes.
+        shapes: The three edges [m] of each of their shapes, in the middle of the element.
+    """
 
     elements: int
     smallest: tuple[float, float, float]
+    rows: int = 0
+    around_holes: int = 0
+    shapes: tuple[Edges, ...] = ()
 
 
 def count_elements(
@@ -57,11 +73,50 @@ def _board_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
     layer = board.thickness / numerics.layers
     size = (_smallest(plan.x), _smallest(plan.y), layer)
     in_patch = patch_cells * numerics.patch_layers
+    of_holes = around_holes * numerics.layers, _shapes_around_holes(plan, board)
     return {
-        "board": PartEstimate(all_cells * numerics.layers - in_patch, size),
+        "board": PartEstimate(all_cells * numerics.layers - in_patch, size, _rows(plan) * numerics.layers, *of_holes),
         "board_patch": PartEstimate(in_patch, size),
         "copper_board": _plate(package, plan, footprint(plan, package)),
     }
+
+
+def _rows(plan: Plan) -> int:
+    """Count the rows of equal cells of one layer, along the axis that has fewer: a graded cell is one of its own."""
+    pieces, cells = zip(*(_pieces(axis) for axis in (plan.x, plan.y)), strict=True)
+    return min(pieces[0] * cells[1], cells[0] * pieces[1])
+
+
+def _pieces(axis: tuple[Interval, ...]) -> tuple[int, int]:
+    """Count the pieces of equal cells of an axis, and its cells."""
+    return sum(1 if part.ratio == 1.0 else part.cells for part in axis), sum(part.cells for part in axis)
+
+
+def _shapes_around_holes(plan: Plan, board: Board) -> tuple[Edges, ...]:
+    """Return the edges of each shape of element between a round hole and the square around it, as they are meshed.
+
+    Lines run straight from points of the arc, equally far apart, to those of the square's side. Of more cells than are
+    ever meshed nothing is laid out.
+    """
+    rings, square, radius = hole_rings(board), hole_square(board), 0.5 * board.holes.diameter
+    height = (0.0, 0.0, board.thickness / board.numerics.layers)
+    found = []
+    for cells in sorted(
+        {axis[k].cells for block in plan.holes for axis, k in zip((plan.x, plan.y), block, strict=True)}
+    ):
+        if cells * rings > MOST_LINES:
+            return ()
+        along = np.linspace(-1.0, 1.0, cells + 1)
+        arc = radius * np.column_stack([np.sin(0.25 * np.pi * along), np.cos(0.25 * np.pi * along)])
+        side = 0.5 * square * np.column_stack([along, np.ones(cells + 1)])
+        outward = np.linspace(0.0, 1.0, rings + 1)[:, None, None]
+        points = (1.0 - outward) * arc + outward * side
+        between = 0.5 * (np.diff(points, axis=1)[1:] + np.diff(points, axis=1)[:-1])
+        spokes = 0.5 * (np.diff(points, axis=0)[:, 1:] + np.diff(points, axis=0)[:, :-1])
+        pairs = zip(between.reshape(-1, 2).tolist(), spokes.reshape(-1, 2).tolist(), strict=True)
+        for (x, y), (u, v) in pairs:
+            found += [((x, y, 0.0), (u, v, 0.0), height), ((-y, x, 0.0), (-v, u, 0.0), height)]
+    return tuple(found)
 
 
 def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:

@@ -21,6 +21,7 @@ def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
     assert places == sorted(places)
     assert "The real shapes lower the peak peel stress" in page
     assert "published: two-scale" in page and "0.285" in page
+    assert "Largest peel stress first" in page
     assert len(page) < 12e6
 
 

@@ -9,16 +9,19 @@ from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration
 from reflowshock.workflow.board_drop.duration import longest_duration
-from reflowshock.workflow.board_drop.shock_effects import shock_effects
-from reflowshock.workflow.board_drop.shock_forecast import (
+from reflowshock.workflow.board_drop.part_forecast import (
     PartForecast,
-    ShockForecast,
     coarse_parts,
     forecast_parts,
+    two_scale_parts,
+)
+from reflowshock.workflow.board_drop.shock_effects import shock_effects
+from reflowshock.workflow.board_drop.shock_forecast import (
+    ShockForecast,
     forecast_shock,
+    mode_seconds,
     seconds_around,
     shorter_than_window,
-    two_scale_parts,
 )
 from reflowshock.workflow.case.forecast import (
     BYTES_OF_ELEMENT,
@@ -104,6 +107,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     numerics = case.shock.numerics
     dns = shock.implicit if numerics.dns_solver == "implicit" else shock.dns
     cooling, seconds = shock_cooling.forecast(case, parts)
+    once = seconds + mode_seconds(case)
     modes = {
         "two_scale": share * shock.two_scale + seconds_around(case, two_scale_parts(case), share),
         "dns": share * dns + seconds_around(case, parts, share * shock.dns_share),
@@ -117,7 +121,7 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
         effects=of_reflow.effects | of_shock | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds=of_reflow.seconds | {"shock": identical + sum(modes[mode] for mode in numerics.modes) + seconds},
+        seconds=of_reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes) + identical + once},
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.fem.estimates.thermal_effects import ResidualStress
 from reflowshock.problem import Problem
-from reflowshock.workflow.board_drop.shock_forecast import PartForecast, role_of
+from reflowshock.workflow.board_drop.part_forecast import PartForecast, role_of
 from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.package.case import BoardDropCase

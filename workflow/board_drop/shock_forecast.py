@@ -1,45 +1,33 @@
 """Scheme, levels, time steps and cost of a shock, from the parameters of its case alone."""
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.duration import longest_duration
+from reflowshock.workflow.board_drop.part_forecast import (
+    MACRO,
+    Parts,
+    coarse_parts,
+    forecast_parts,
+    is_box,
+    is_linear,
+    two_scale_parts,
+)
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
 if TYPE_CHECKING:
-    from reflowshock.meshing.board.estimate import PartEstimate
+    from reflowshock.fem.estimates.estimate import WindowPlan
     from reflowshock.workflow.package.case import BoardDropCase
 
-MACRO = "board"  # role of the parts whose elements the window follows
-BOXES = ("board", "substrate", "die")  # roles whose elements are boxes, but for columns
-IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
-# Measured on jedec_bga: until ranks have loaded libraries and kernels; set-up and a sample of histories, an element.
-SECONDS_TO_START, SETUP_SECONDS, SAMPLE_SECONDS = 4.0, 1.5e-4, 2.5e-6
-COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
-
-
-@dataclass(frozen=True, slots=True)
-class PartForecast:
-    """A part of the mesh.
-
-    Attributes:
-        elements: its hexahedra.
-        critical_step: of the smallest one [s].
-        scaled_step: the same with its mass scaled to the step of the others [s].
-        cost: of an update over that of an assembled elastic element.
-        linear: whether its force is linear in the displacement.
-    """
-
-    elements: int
-    critical_step: float
-    scaled_step: float
-    cost: float
-    linear: bool
+# Measured on jedec_bga, bga_drop and hu_bga_drop: until ranks have loaded libraries and kernels; set-up and a sample of
+# histories, of any mesh and an element.
+SECONDS_TO_START, SETUP_SECONDS, SAMPLE_SECONDS = 5.0, 5e-5, 2e-7
+SECONDS_OF_SAMPLE = 5e-3
+FIELD_SECONDS = 1.4e-5  # of an element in one sample of fields
+MODE_SOLUTIONS = 20  # solutions by one factor for each natural mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,69 +80,6 @@ class ShockForecast:
         return self.two_scale * self.dns_share / self.dns
 
 
-Parts = Mapping[str, PartForecast]
-
-
-def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict size and critical time step of every part of the mesh with all joints fine."""
-    from reflowshock.meshing.board.estimate import count_elements
-
-    return _forecasts(case, count_elements(case.package, case.board, case.warpage))
-
-
-def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of a two-scale run, in which joints may be coarse; of a one-way run those of both models."""
-    from reflowshock.meshing.board.estimate import count_elements
-
-    if case.shock.coupling.direction == "one_way":
-        return _driven_parts(case) | coarse_parts(case)
-    return _forecasts(case, count_elements(case.package, case.board, case.warpage, fine_joint_count(case)))
-
-
-def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of the run that finds the critical joints."""
-    from reflowshock.meshing.board.estimate import count_elements
-
-    return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
-
-
-def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
-    from reflowshock.meshing.board.estimate import count_elements
-
-    estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
-    return _forecasts(
-        case, {name: part for name, part in estimates.items() if name in ("solder", "copper") or name.endswith(COLUMN)}
-    )
-
-
-def fine_joint_count(case: "BoardDropCase") -> int | None:
-    """Return how many joints of a two-scale run are fine, None if all."""
-    coupling = case.shock.coupling
-    if coupling.fine_joints == "all":
-        return None
-    return coupling.critical_joints if coupling.fine_joints == "critical" else len(set(coupling.fine_joints))
-
-
-def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -> dict[str, PartForecast]:
-    import numpy as np
-
-    from reflowshock.fem.estimates.estimate import box_critical_step
-
-    scaled = case.shock.numerics.mass_scaled
-    step = {name: box_critical_step(material_of(case, name), np.array(of.smallest)) for name, of in estimates.items()}
-    heavier = {name for name in step if role_of(name) in scaled or (name.endswith(COLUMN) and IN_COLUMN in scaled)}
-    others = min((step[name] for name in step if name not in heavier), default=min(step.values()))
-    target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
-    raised = step | {name: max(step[name], target) for name in heavier}
-    return {
-        name: PartForecast(
-            part.elements, step[name], raised[name], relative_cost(case, name), is_linear_part(case, name)
-        )
-        for name, part in estimates.items()
-    }
-
-
 def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> ShockForecast:
     """Predict the scheme, the time steps and the wall time of the shock.
 
@@ -194,9 +119,20 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
 
 def seconds_around(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
     """Predict the wall time [s] of a run outside its windows: start, set-up, samples; ``share`` of all samples."""
-    elements = sum(part.elements for part in parts.values()) / case.shock.ranks.total
-    samples = share * case.shock.numerics.history_samples
-    return SECONDS_TO_START + elements * (SETUP_SECONDS + samples * SAMPLE_SECONDS)
+    elements, numerics = sum(part.elements for part in parts.values()), case.shock.numerics
+    histories, fields = share * numerics.history_samples, share * numerics.field_samples
+    shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
+    return SECONDS_TO_START + SETUP_SECONDS * elements + histories * SECONDS_OF_SAMPLE + shared
+
+
+def mode_seconds(case: "BoardDropCase") -> float:
+    """Predict the wall time [s] of finding the natural modes, where they are asked for."""
+    from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
+
+    if not case.shock.modes:
+        return 0.0
+    elements = sum(part.elements for part in coarse_parts(case).values())
+    return implicit_cost(plate_nodes(elements), MODE_SOLUTIONS * case.shock.modes).seconds
 
 
 def implicit_seconds(case: "BoardDropCase") -> float | None:
@@ -205,11 +141,6 @@ def implicit_seconds(case: "BoardDropCase") -> float | None:
     numerics = case.shock.numerics.model_copy(update={"dns_duration": None})
     whole = case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
     return forecast_shock(whole, parts).implicit if is_linear(parts) else None
-
-
-def is_linear(parts: Parts) -> bool:
-    """Whether the forces of all elements are linear."""
-    return all(part.linear for part in parts.values())
 
 
 def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
@@ -250,37 +181,37 @@ def _direct(case: "BoardDropCase", parts: Parts):
     """Return windows and seconds of the windows of a DNS."""
     from reflowshock.fem.estimates.estimate import predict_seconds
 
-    plan, board = _plan(case, parts), _in_boxes(MACRO, parts[MACRO])
+    plan, board = _plan(case, parts), parts[MACRO].in_boxes
     work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
     return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks, at_once=True)[1]
 
 
-def _in_boxes(name: str, part: PartForecast) -> float:
-    """Return the cost of an update of a part's elements in that of linear boxes of a board."""
-    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
-
-    return part.elements * (1.0 if is_box(name) and part.linear else BOARD_ADVANTAGE * part.cost)
-
-
 def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
     """Return scheme, levels and seconds of the windows of a two-scale run."""
-    from reflowshock.fem.estimates.estimate import predict_seconds
+    from reflowshock.fem.estimates.estimate import IDLE_COST, predict_seconds
 
     plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
     if scheme[0] == "local_steps":
-        ratios, level_of = _levels(case, parts, plan.window)
+        ratios, pieces = _levels(case, parts, plan.window)
+    elif scheme[0] == "held_velocity" and _takes_path_levels(case):
+        ratios, pieces = _path_levels(case, parts, plan)
     else:
-        ratios, level_of = (plan.substeps,), {name: int(name not in macro_parts(case, parts)) for name in parts}
+        macro = macro_parts(case, parts)
+        ratios, pieces = (plan.substeps,), [Piece(name, parts[name].elements, int(name not in macro)) for name in parts]
     levels, count = [], 1
     for level in range(len(ratios) + 1):
         count *= ratios[level - 1] if level else 1
-        here = {name: parts[name] for name in parts if level_of[name] == level}
-        elements = sum(part.elements for part in here.values())
-        cost = sum(part.elements * part.cost for part in here.values())
-        levels.append(LevelForecast(tuple(here), plan.window / count, count, elements, cost))
-    work = [(level.cost, level.count) for level in levels[1:]]
-    boxes = sum(_in_boxes(name, parts[name]) for name in levels[0].parts)
-    seconds = predict_seconds(boxes, work, plan, case.shock.ranks, at_once=scheme[0] != "local_steps")[0]
+        here = [piece for piece in pieces if piece.level == level]
+        elements = sum(piece.elements for piece in here)
+        cost = sum(piece.elements * parts[piece.part].cost for piece in here)
+        mainly = tuple(piece.part for piece in here if 2 * piece.elements > parts[piece.part].elements)
+        levels.append(LevelForecast(mainly, plan.window / count, count, elements, cost))
+    work, local = [(level.cost, level.count) for level in levels[1:]], scheme[0] == "local_steps"
+    if not local:  # one motion takes all of them, and moves those that do not act, too
+        idle = IDLE_COST * sum(level.elements * (count - level.count) for level in levels[1:])
+        work = [((sum(cost * steps for cost, steps in work) + idle) / count, count)]
+    boxes = sum(parts[name].in_boxes for name in levels[0].parts)
+    seconds = predict_seconds(boxes, work, plan, case.shock.ranks, at_once=not local)[0]
     return scheme, tuple(levels), seconds
 
 
@@ -302,8 +233,17 @@ def macro_parts(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
     return _slow(case, parts) if case.shock.coupling.direction == "one_way" else frozenset({MACRO})
 
 
-def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[int, ...], dict[str, int]]:
-    """Return the ratios of step levels and the level of each part, as if parts did not touch."""
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Elements of a part that take one step, and its level."""
+
+    part: str
+    elements: int
+    level: int
+
+
+def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[int, ...], list[Piece]]:
+    """Return the ratios of the levels of local steps, and all parts in them, as if parts did not touch."""
     import numpy as np
 
     from reflowshock.fem.division.choose_levels import Pace, choose_levels
@@ -324,38 +264,52 @@ def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[i
         raise CaseError(
             "plan", [Problem("shock.coupling.levels", str(error), coupling.levels, "auto, or more")]
         ) from error
-    return ratios, dict(zip(parts, level.tolist(), strict=True))
+    return ratios, [Piece(name, parts[name].elements, own) for name, own in zip(parts, level.tolist(), strict=True)]
 
 
-def relative_cost(case: "BoardDropCase", part: str) -> float:
-    """Return the cost of an element of a part over that of a linear one."""
-    from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
-    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
-
-    numerics = case.shock.numerics
-    if is_linear_part(case, part):
-        return 1.0
-    if material_of(case, part).plasticity is None and numerics.kinematics == "corotational":
-        box = role_of(part) in BOXES and not part.endswith(COLUMN)
-        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if box else TURNING_RATE)
-    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
+def _takes_path_levels(case: "BoardDropCase") -> bool:
+    """Whether nothing but elements and body accelerations acts on the joints' side; a large mass is on the board."""
+    springs = any(support.bedding for support in case.supports.values())
+    return not (
+        case.shock.coupling.direction == "one_way" or springs or any(case.shock.damping.coefficients) or case.cooled
+    )
 
 
-def is_linear_part(case: "BoardDropCase", part: str) -> bool:
-    """Whether elements of a part neither yield nor turn."""
-    return case.shock.numerics.kinematics == "small" and material_of(case, part).plasticity is None
+def _path_levels(case: "BoardDropCase", parts: Parts, plan: "WindowPlan") -> tuple[tuple[int, ...], list[Piece]]:
+    """Return the ratios of the levels along a path, and the parts in them as ``fem.division.path_levels`` chooses them.
+
+    Copper is next to solder, whose layers at the pads are pieces of their own; other parts do not touch here.
+    """
+    import numpy as np
+
+    from reflowshock.fem.division.choose_levels import Pace
+    from reflowshock.fem.division.division import Division
+    from reflowshock.fem.division.path_levels import with_path_levels
+    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
+
+    chain = _from_copper_on(case, parts)
+    others = [(name, part.elements) for name, part in parts.items() if name not in dict(chain)]
+    names, sizes = zip(*chain, *others, strict=True)
+    near = np.eye(len(names), dtype=bool)
+    for first in range(len(chain) - 1):
+        near[first, first + 1] = near[first + 1, first] = True
+    meso = ~np.isin(names, list(macro_parts(case, parts)))
+    steps = np.array([parts[name].scaled_step for name in names])
+    cost = np.array([BOARD_ADVANTAGE * parts[name].cost * size for name, size in zip(names, sizes, strict=True)])
+    division = with_path_levels(
+        Division("held_velocity", ~meso, meso, meso.astype(np.int32), (plan.substeps,), plan),
+        Pace(steps, cost, plan.window, case.shock.numerics.step_fraction),
+        lambda taken: meso & (near & taken).any(axis=1),
+        case.shock.coupling.most_levels,
+    )
+    return division.ratios, [Piece(*own) for own in zip(names, sizes, division.level.tolist(), strict=True)]
 
 
-def role_of(part: str) -> str:
-    """Return the material role of a part: its name up to "@", then up to "_"."""
-    return part.split("@")[0].split("_")[0]
-
-
-def is_box(part: str) -> bool:
-    """Whether a part is of the board's boxes: a column in their place has smaller elements."""
-    return role_of(part) == MACRO and not part.endswith(COLUMN)
-
-
-def material_of(case: "BoardDropCase", part: str) -> Material:
-    """Return the material of a part."""
-    return getattr(case.materials, role_of(part))
+def _from_copper_on(case: "BoardDropCase", parts: Parts) -> list[tuple[str, int]]:
+    """Return the elements of copper, of the first and second layers of solder on it, and of all other solder."""
+    if "copper" not in parts or "solder" not in parts:
+        return []
+    solder = parts["solder"].elements
+    layer = min(2 * solder // case.package.joint_numerics.layers, solder // 2)  # of all fine joints, at both pads
+    rest = solder - 2 * layer
+    return [("copper", parts["copper"].elements), ("solder", layer), ("solder", layer), ("solder", rest)]

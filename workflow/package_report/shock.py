@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from reflowshock.fem.output.ranking import ranking_measure
 from reflowshock.workflow.case.text import mega, micro, number, quantity
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
@@ -90,8 +91,8 @@ def ranking_mode(histories: dict, results: dict) -> str:
 def _add_ranks(histories: dict, results: dict, joints: tuple[list[dict], dict], context: dict) -> None:
     """Rank the joints by ``ranking_mode``; ``joints`` are their records and their verdicts."""
     main, ranked = next(iter(histories)), ranking_mode(histories, results)
-    whose = f"of the {tables.mode_name(ranked)}, whose joints are all fine"
-    context["ranked_by"] = whose if ranked != main else ""
+    whose = f" (of the {tables.mode_name(ranked)}, whose joints are all fine)" if ranked != main else ""
+    context["joint_order"] = f"Largest {ranking_measure(histories[ranked]).name} first{whose}"
     result = results[ranked]
     context["tables"]["joints"] = joint_tables.ranked_joints(
         histories[ranked], *joints, findings.fine_joints_of(result)

@@ -9,6 +9,7 @@ from reflowshock.workflow.case.run import Run, StageError, StageFunction
 from reflowshock.workflow.case.stage import Stage
 from reflowshock.workflow.convergence.measured import this_host
 from reflowshock.workflow.kinds import stage_seconds
+from reflowshock.workflow.process.kernel_cache import compilation
 from reflowshock.workflow.process.last_word import in_words, is_interrupt
 from reflowshock.workflow.process.terminal import console, health_line
 from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
@@ -38,12 +39,13 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     _check_key(run, stage, before["inputs"], key)
     discard(partial)
     partial.mkdir(parents=True)
+    forecast = stage_seconds(run.case).get(name, 0.0) + compilation([name])
     start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
     record = {
         "seconds": round(time.perf_counter() - start, 3),
         "core_seconds": round(core_seconds() - used, 3),
-        "forecast": stage_seconds(run.case).get(name),
+        "forecast": forecast,
         "machine": str(this_host()),
         "metrics": findings.metrics,
         "health": findings.health,

@@ -6,7 +6,7 @@ import pytest
 from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, element_stiffness, lumped_mass
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.estimates.estimate import box_critical_step
+from reflowshock.fem.estimates.estimate import box_critical_step, skewed_critical_step
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, is_box, parity_blocks
 from reflowshock.fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
@@ -114,6 +114,15 @@ def test_estimated_box_step_is_the_element_step(material, size):
     elements = elements_of(one_element(0.0, size), [np.arange(8)], material)
     exact = critical_steps(elements, element_geometry(elements.points, elements.cells).nodal_volume)[0]
     assert box_critical_step(material, np.array(size)) == pytest.approx(exact, rel=1e-9)
+
+
+def test_critical_step_of_a_hexahedron_at_any_angles_is_that_of_its_edges():
+    edges = np.array([[1.0, 0.3, 0.0], [-0.2, 0.7, 0.0], [0.0, 0.0, 0.25]]) * 1e-3
+    elements = elements_of(0.5 * SIDES @ edges, [np.arange(8)])
+    exact = critical_steps(elements, element_geometry(elements.points, elements.cells).nodal_volume)[0]
+    assert skewed_critical_step(FR4, edges[None])[0] == pytest.approx(exact, rel=1e-9)
+    box = np.diag([1e-3, 2e-3, 0.25e-3])
+    assert skewed_critical_step(FR4, box[None])[0] == pytest.approx(box_critical_step(FR4, np.diag(box)), rel=1e-12)
 
 
 def test_lumped_mass_is_density_times_volume_on_distorted_elements():

@@ -132,6 +132,23 @@ def test_estimate_counts_what_is_meshed(tmp_path, symmetry, copper):
     assert {name: estimate[name].elements for name in counts} == counts
 
 
+def test_estimate_knows_the_elements_around_holes(quarter):
+    estimate = count_elements(package(), board())["board"]
+    corners = quarter.points[quarter.cells("board")]
+    sides = np.sort(np.linalg.norm(np.roll(corners[:, :4], -1, axis=1) - corners[:, :4], axis=2), axis=1)
+    box = np.isclose(sides[:, 0], sides[:, 1], rtol=1e-6) & np.isclose(sides[:, 2], sides[:, 3], rtol=1e-6)
+    assert estimate.around_holes == np.sum(~box)
+    found = np.abs(np.linalg.det(np.array(estimate.shapes)))
+    meshed = [scaled_volume(own) for own in corners[~box]]
+    assert np.unique(np.round(found / MM**3, 6)) == pytest.approx(np.unique(np.round(np.array(meshed) / MM**3, 6)))
+
+
+def scaled_volume(corners: np.ndarray) -> float:
+    """Return the volume of the three edges in the middle of an upright hexahedron ``(8, 3)``."""
+    first, second = (corners[a] + corners[b] - corners[c] - corners[d] for a, b, c, d in ((1, 2, 0, 3), (3, 2, 0, 1)))
+    return abs(np.cross(0.5 * first, 0.5 * second)[2]) * np.ptp(corners[:, 2])
+
+
 def test_estimate_of_solder_follows_the_smallest_gap():
     flat, bent = (count_elements(package(), board(), Warpage(corner=corner))["solder"] for corner in (0.0, -0.06 * MM))
     assert flat.smallest[2] == pytest.approx(0.31 * MM / 6)

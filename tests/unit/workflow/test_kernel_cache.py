@@ -47,3 +47,23 @@ def test_where_none_can_be_made_it_is_temporary(tmp_path: Path, monkeypatch, var
 
 def test_tests_use_it() -> None:
     assert kernel_cache.VARIABLE in os.environ
+
+
+def test_compilation_is_predicted_until_it_was_done(tmp_path: Path) -> None:
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    once = kernel_cache.compilation(["geometry", "shock"], environment)
+    assert kernel_cache.compilation(["reflow", "shock"], environment) > once > 0.0
+    assert kernel_cache.compilation(["geometry"], environment) == 0.0
+    assert kernel_cache.compilation(["shock"], {}) == once
+    (tmp_path / "kernels_1").mkdir()
+    (tmp_path / "kernels_1" / "levels.take_steps-173.py311.nbi").write_bytes(b"")
+    assert kernel_cache.compilation(["shock"], environment) == 0.0
+
+
+def test_kernels_that_tell_of_compilation_exist() -> None:
+    from reflowshock.fem.kernels import levels
+    from reflowshock.particles.core import neighbours
+
+    named = {kernel for kernel, _ in kernel_cache.KERNELS.values()}
+    modules = {"levels": levels, "neighbours": neighbours}
+    assert all(hasattr(modules[name.partition(".")[0]], name.partition(".")[2]) for name in named)

@@ -5,15 +5,17 @@ from pathlib import Path
 
 import pytest
 
+from reflowshock.fem.division.path_levels import MOST_LEVELS
+from reflowshock.fem.kernels.levels import PACES
 from reflowshock.meshing.board.estimate import count_elements
 from reflowshock.workflow.board_drop.forecast import forecast
+from reflowshock.workflow.board_drop.part_forecast import forecast_parts, two_scale_parts
 from reflowshock.workflow.board_drop.shock_forecast import (
     SECONDS_TO_START,
-    forecast_parts,
     forecast_shock,
     implicit_seconds,
+    mode_seconds,
     seconds_around,
-    two_scale_parts,
 )
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
@@ -71,8 +73,48 @@ def test_one_level_is_one_ratio():
 def test_what_has_a_path_is_driven_by_held_velocity(setting):
     shock = predicted(setting)
     assert shock.scheme[0] == "held_velocity"
-    assert [level.count for level in shock.levels] == [1, shock.substeps]
+    assert shock.levels[0].parts == ("board",)
+    assert shock.levels[-1].count >= shock.substeps
     assert implicit_seconds(read_case(SMALL_CASE, [setting])) is None
+
+
+PATH = ("materials.solder=SAC405", "shock.numerics.mass_scaled=[]")
+
+
+def test_levels_along_a_path_have_layers_of_solder_with_the_copper():
+    case = read_case(SMALL_CASE, PATH)
+    parts, levels = two_scale_parts(case), predicted(*PATH).levels
+    solder, copper = parts["solder"].elements, parts["copper"].elements
+    assert len(levels) > 2
+    assert sum(level.elements for level in levels) == sum(part.elements for part in parts.values())
+    layer = 2 * solder // case.package.joint_numerics.layers
+    assert levels[-1].elements >= copper + min(solder, 2 * layer)
+    assert levels[-1].step <= 0.9 * parts["copper"].scaled_step
+
+
+@pytest.mark.parametrize(
+    "setting", ["shock.coupling.levels=1", "shock.damping.mass_coefficient=10 Hz", "shock.coupling.scheme=impulse"]
+)
+def test_what_else_acts_leaves_no_levels_along_a_path(setting):
+    shock = predicted(*PATH, setting)
+    assert [level.count for level in shock.levels] == [1, shock.substeps]
+
+
+def test_a_large_mass_on_the_board_leaves_levels():
+    shaken = predicted(*PATH, "shock.method=large_mass")
+    assert [level.count for level in shaken.levels] == [level.count for level in predicted(*PATH).levels]
+
+
+def test_elements_around_holes_set_the_window_where_they_are_the_smallest():
+    """hu_bga_drop takes 33 600 windows of 44.64 ns: 49.8 ns are the critical step of an element at its hole."""
+    case = read_case(CASES / "hu_bga_drop/case.toml")
+    shock = forecast_shock(case, forecast_parts(case))
+    assert shock.windows == 33600
+    assert forecast_parts(case)["board"].critical_step == pytest.approx(49.82e-9, rel=0.005)
+
+
+def test_no_more_levels_than_the_kernels_have_paces():
+    assert MOST_LEVELS == PACES
 
 
 def test_the_wanted_scheme_is_taken():
@@ -101,6 +143,14 @@ def test_what_lies_around_windows_counts():
     parts = forecast_parts(case)
     assert seconds_around(case, parts) > seconds_around(case, parts, share=0.1) > SECONDS_TO_START
     assert forecast(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
+
+
+def test_natural_modes_cost_only_where_they_are_asked_for():
+    assert (
+        mode_seconds(read_case(SMALL_CASE, ["shock.modes=4"]))
+        > mode_seconds(read_case(SMALL_CASE, ["shock.modes=0"]))
+        == 0.0
+    )
 
 
 def test_columns_are_no_boxes():

@@ -1,0 +1,42 @@
+"""Rows of a long table, each kept as soon as it is there: a run that was broken off goes on where it was."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import reflowshock.cases.hard.trials
+import reflowshock.fem
+
+SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # of what is measured
+
+
+class KeptRows:
+    """A file of JSON lines, a row each; rows of other sources or parameters stay there, but do not count."""
+
+    def __init__(self, path: Path, parameters: object) -> None:
+        """Read the rows of these parameters by the present sources; what a killed run left half written goes."""
+        self._path, self._key = path, digest_of(parameters)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        whole = path.read_text(encoding="utf-8").rpartition("\n")[0] if path.exists() else ""
+        path.write_text(f"{whole}\n" if whole else "", encoding="utf-8")
+        rows = [json.loads(line) for line in whole.splitlines()]
+        self._rows = {row["name"]: row["found"] for row in rows if row["key"] == self._key}
+
+    def found(self, name: str, compute: Callable[[], Any]) -> Any:
+        """Return what is kept under a name, or else compute it and keep it."""
+        if name not in self._rows:
+            self._rows[name] = compute()
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"key": self._key, "name": name, "found": self._rows[name]}) + "\n")
+        return self._rows[name]
+
+
+def digest_of(parameters: object) -> str:
+    """Return a name for parameters and all sources of what is measured."""
+    digest = hashlib.sha256(repr(parameters).encode())
+    for package in SOURCES:
+        for path in sorted(Path(package.__path__[0]).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

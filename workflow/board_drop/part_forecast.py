@@ -1,0 +1,173 @@
+"""Parts of the mesh of a shock before it is meshed: elements, critical time steps, cost of an update."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from reflowshock.fem.materials.parameters import Material
+
+if TYPE_CHECKING:
+    from reflowshock.meshing.board.estimate import PartEstimate
+    from reflowshock.workflow.package.case import BoardDropCase
+
+MACRO = "board"  # role of the parts whose elements the window follows
+BOXES = ("board", "substrate", "die")  # roles whose elements are boxes, but for columns
+IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
+COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
+
+
+@dataclass(frozen=True, slots=True)
+class PartForecast:
+    """A part of the mesh.
+
+    Attributes:
+        elements: its hexahedra.
+        critical_step: of the smallest one [s].
+        scaled_step: the same with its mass scaled to the step of the others [s].
+        cost: of an update over that of an assembled elastic element.
+        linear: whether its force is linear in the displacement.
+        in_boxes: cost of an update of all of them, over that of a linear box in a long row, where rows are kept.
+    """
+
+    elements: int
+    critical_step: float
+    scaled_step: float
+    cost: float
+    linear: bool
+    in_boxes: float
+
+
+Parts = Mapping[str, PartForecast]
+
+
+def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict size and critical time step of every part of the mesh with all joints fine."""
+    from reflowshock.meshing.board.estimate import count_elements
+
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage))
+
+
+def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of a two-scale run, in which joints may be coarse; of a one-way run those of both models."""
+    from reflowshock.meshing.board.estimate import count_elements
+
+    if case.shock.coupling.direction == "one_way":
+        return _driven_parts(case) | coarse_parts(case)
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage, fine_joint_count(case)))
+
+
+def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of the run that finds the critical joints."""
+    from reflowshock.meshing.board.estimate import count_elements
+
+    return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
+
+
+def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
+    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
+    from reflowshock.meshing.board.estimate import count_elements
+
+    estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
+    return _forecasts(
+        case, {name: part for name, part in estimates.items() if name in ("solder", "copper") or name.endswith(COLUMN)}
+    )
+
+
+def fine_joint_count(case: "BoardDropCase") -> int | None:
+    """Return how many joints of a two-scale run are fine, None if all."""
+    coupling = case.shock.coupling
+    if coupling.fine_joints == "all":
+        return None
+    return coupling.critical_joints if coupling.fine_joints == "critical" else len(set(coupling.fine_joints))
+
+
+def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -> dict[str, PartForecast]:
+    import numpy as np
+
+    from reflowshock.fem.estimates.estimate import box_critical_step, skewed_critical_step
+
+    scaled = case.shock.numerics.mass_scaled
+    step = {name: box_critical_step(material_of(case, name), np.array(of.smallest)) for name, of in estimates.items()}
+    for name, part in estimates.items():
+        if part.shapes:
+            skewed = skewed_critical_step(material_of(case, name), np.array(part.shapes))
+            step[name] = min(step[name], float(skewed.min()))
+    heavier = {name for name in step if role_of(name) in scaled or (name.endswith(COLUMN) and IN_COLUMN in scaled)}
+    others = min((step[name] for name in step if name not in heavier), default=min(step.values()))
+    target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
+    raised = step | {name: max(step[name], target) for name in heavier}
+    return {
+        name: PartForecast(
+            elements=part.elements,
+            critical_step=step[name],
+            scaled_step=raised[name],
+            cost=relative_cost(case, name),
+            linear=is_linear_part(case, name),
+            in_boxes=_in_boxes(case, name, part),
+        )
+        for name, part in estimates.items()
+    }
+
+
+def is_linear(parts: Parts) -> bool:
+    """Whether the forces of all elements are linear."""
+    return all(part.linear for part in parts.values())
+
+
+def _in_boxes(case: "BoardDropCase", name: str, part: "PartEstimate") -> float:
+    """Return the cost of an update of all elements of a part, over that of a linear box in a long row."""
+    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, ROW_COST, UPDATES_PER_SECOND
+    from reflowshock.fem.estimates.solver_cost import TURNING_BOARD_RATE
+
+    boxes = part.elements - part.around_holes
+    if is_box(name) and is_linear_part(case, name):
+        return boxes + ROW_COST * min(part.rows, boxes) + BOARD_ADVANTAGE * part.around_holes
+    each = relative_cost(case, name)
+    if is_box(name) and turns(case, name):
+        return BOARD_ADVANTAGE * (UPDATES_PER_SECOND / TURNING_BOARD_RATE * boxes + each * part.around_holes)
+    return BOARD_ADVANTAGE * each * part.elements
+
+
+def relative_cost(case: "BoardDropCase", part: str) -> float:
+    """Return the cost of an element of a part over that of a linear one."""
+    from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
+    from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
+
+    numerics = case.shock.numerics
+    if is_linear_part(case, part):
+        return 1.0
+    if turns(case, part):
+        box = is_box(part) or (role_of(part) in BOXES and not part.endswith(COLUMN) and not _warped(case))
+        return UPDATES_PER_SECOND / (TURNING_BOX_RATE if box else TURNING_RATE)
+    return UPDATES_PER_SECOND / NONLINEAR_RATE[numerics.formulation]
+
+
+def _warped(case: "BoardDropCase") -> bool:
+    """Whether the package is meshed warped or moved, so that its elements are no boxes."""
+    return case.thermal is not None or any(case.warpage.model_dump().values())
+
+
+def turns(case: "BoardDropCase", part: str) -> bool:
+    """Whether elements of a part are elastic and turn with frames of their own."""
+    return case.shock.numerics.kinematics == "corotational" and material_of(case, part).plasticity is None
+
+
+def is_linear_part(case: "BoardDropCase", part: str) -> bool:
+    """Whether elements of a part neither yield nor turn."""
+    return case.shock.numerics.kinematics == "small" and material_of(case, part).plasticity is None
+
+
+def role_of(part: str) -> str:
+    """Return the material role of a part: its name up to "@", then up to "_"."""
+    return part.split("@")[0].split("_")[0]
+
+
+def is_box(part: str) -> bool:
+    """Whether a part is of the board's boxes: a column in their place has smaller elements."""
+    return role_of(part) == MACRO and not part.endswith(COLUMN)
+
+
+def material_of(case: "BoardDropCase", part: str) -> Material:
+    """Return the material of a part."""
+    return getattr(case.materials, role_of(part))
