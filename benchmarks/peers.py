@@ -13,6 +13,7 @@ this is checked.
 import os
 import subprocess
 import venv
+from collections.abc import Sequence
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
@@ -93,25 +94,35 @@ def install() -> list[str]:
 
 
 def write_problem(
-    mesh: MeshData, displacement: np.ndarray, step: float, material: Isotropic = STEEL, law: str = "linear"
+    mesh: MeshData, displacement: np.ndarray, step: float, material: Isotropic = STEEL, finite: bool = False
 ) -> Path:
-    """Write what a peer starts from; return the file.
+    """Write the cube that a peer starts from; return the file.
 
     Args:
         mesh: Of hexahedra.
         displacement: ``(n, 3)`` [m].
         step: [s].
-        material: Of all of it.
-        law: ``linear``; ``finite``, its stresses linear in Green's strain; or ``plastic``, J2 without hardening in
-            finite rotation.
+        material: Of all of it, see ``model_arrays``.
+        finite: Whether strains are finite.
     """
-    path = FOLDER / f"{law}.npz"
-    constants = {name: getattr(material, name) for name in ("density", "young_modulus", "poisson_ratio")}
-    if material.plasticity:
-        constants["yield_stress"] = material.plasticity.A
-    cells = mesh.cells[:, CYCLIC]
-    np.savez(path, points=mesh.points, cells=cells, displacement=displacement, step=step, law=law, **constants)
+    path = FOLDER / f"{'finite' if finite else 'small'}.npz"
+    arrays = model_arrays(mesh, np.zeros(len(mesh.cells), int), [material])
+    np.savez(path, displacement=displacement, step=step, finite=finite, **arrays)
     return path
+
+
+def model_arrays(mesh: MeshData, material: np.ndarray, materials: Sequence[Isotropic]) -> dict[str, np.ndarray]:
+    """Return what ``support/kratos_model.py`` makes a model of; of a law that yields, only the yield stress at rest."""
+    constants = [
+        [item.density, item.young_modulus, item.poisson_ratio, item.plasticity.A if item.plasticity else np.nan]
+        for item in materials
+    ]
+    return {
+        "points": mesh.points,
+        "cells": mesh.cells[:, CYCLIC],
+        "material": material,
+        "constants": np.array(constants),
+    }
 
 
 def own_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, turns.Batch], np.ndarray, float]:

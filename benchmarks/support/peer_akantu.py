@@ -8,11 +8,9 @@ import tempfile
 import akantu
 from peer_loop import problem, serve
 
-CONSTANTS = {"rho": "density", "E": "young_modulus", "nu": "poisson_ratio"}
-
 given = problem()
-lines = [f"{key} = {float(given[name])}" for key, name in CONSTANTS.items()]
-lines.append(f"finite_deformation = {'true' if given['law'] == 'finite' else 'false'}")
+lines = [f"{key} = {value}" for key, value in zip(("rho", "E", "nu"), given["constants"][0, :3].tolist(), strict=True)]
+lines.append(f"finite_deformation = {'true' if given['finite'] else 'false'}")
 with tempfile.NamedTemporaryFile("w", suffix=".dat") as file:
     file.write("\n".join(["material elastic [", "name = cube", *lines, "]", ""]))
     file.flush()

@@ -2,8 +2,10 @@
 
 from abc import abstractmethod
 from math import sqrt
+from typing import Any
 
 from reflowshock.effect import Decision, Effect, decided, decision
+from reflowshock.parameters import changed
 from reflowshock.particles.parameters.droplets import Droplet
 from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, SphFlow
@@ -69,6 +71,29 @@ class ArtificialViscosity(FlowEffect):
         return decision(not viscous, "viscosity acts" if viscous else f"no viscosity acts: {alpha:g}", influence)
 
 
+class ShearDependence(FlowEffect):
+    """Viscosity that depends on the rate of shear."""
+
+    name = "shear_dependent_viscosity"
+    adds = "mu(sqrt(2 D : D)) in place of mu: power law or Carreau"
+    influence = "of the largest viscosity over the least one; not predicted"
+    place = "reflowshock.particles.sph.flow.shear_law"
+    switch = "<scene>.rheology"
+    source = "Carreau 1972; Bird, Armstrong, Hassager 1987"
+
+    def decide(self, scene: SphFlow) -> Decision:
+        """Where the case gives a rheology, and viscosity acts."""
+        given, viscous = scene.rheology, FlowViscosity().decide(scene)["on"]
+        if given is None:
+            return decision(False, "viscosity is constant: no rheology is given")
+        why = f"{given.law.replace('_', ' ')}, exponent {given.exponent:g}"
+        return decision(viscous, why if viscous else f"{why}, but viscosity does not act")
+
+    def other_way(self, case: Any, acts: bool) -> Any | None:
+        """Return a case of constant viscosity; where the case gives no rheology, none is known."""
+        return changed(case, f"{case.kind}.rheology", None) if acts else None
+
+
 class DropletTension(Effect[Droplet]):
     """Surface tension of a droplet, and the wetting of its wall."""
 
@@ -116,7 +141,7 @@ class DropletGravity(Effect[Droplet]):
         return decision(influence > NEGLIGIBLE_SHAPE_CHANGE, why, influence)
 
 
-FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity())
+FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 DROPLET_EFFECTS = (DropletTension(), DropletGravity())
 
 

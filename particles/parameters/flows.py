@@ -8,6 +8,7 @@ from pydantic import Field
 
 from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
+from reflowshock.particles.parameters.rheology import Rheology, rate_at_wall
 from reflowshock.quantity import Quantity
 
 # Alpha of liquid without viscosity of its own: as in dam breaks of Marrone et al. 2011.
@@ -22,6 +23,7 @@ class MethodNumerics(Parameters):
 
     The smoothing length is over the spacing of the particles, the speed of sound over the largest speed expected;
     density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
+    XSPH lets particles move with a velocity that is smoothed by so much: 0.5 is usual, none is needed with viscosity.
     Sums over pairs run on threads of the processor, or on a GPU (cuda).
     """
 
@@ -31,6 +33,7 @@ class MethodNumerics(Parameters):
     sound_speed: float = Field(10.0, ge=5, le=100)
     density_diffusion: float = Field(0.1, ge=0, le=0.2)
     artificial_viscosity: float | None = Field(None, ge=0, le=0.5)
+    xsph: float = Field(0.0, ge=0, le=1)
 
 
 class SphNumerics(MethodNumerics):
@@ -50,10 +53,11 @@ class SphEffects(Parameters):
 
 
 class SphFlow(Parameters):
-    """What all flows have: a liquid, and how it is computed."""
+    """What all flows have: a liquid, and how it is computed; its viscosity may depend on the rate of shear."""
 
     density: Annotated[float, Quantity("kg/m^3")] = Field(1000.0, gt=0)
     viscosity: Annotated[float, Quantity("Pa*s")] = Field(1.0e-3, gt=0)
+    rheology: Rheology | None = None
     effects: SphEffects = SphEffects()
     numerics: MethodNumerics = MethodNumerics()
 
@@ -94,8 +98,15 @@ class SphFlow(Parameters):
 
     @property
     def liquid_viscosity(self) -> float:
-        """Of the liquid, however the case says it [Pa s]."""
+        """Of the liquid, however the case says it [Pa s]; where it depends on the rate of shear, that in its law."""
         return self.viscosity
+
+    @property
+    def largest_viscosity(self) -> float:
+        """At rest or at the rate of shear of the largest speed over a spacing [Pa s]."""
+        if self.rheology is None:
+            return self.liquid_viscosity
+        return self.rheology.largest(self.liquid_viscosity, self.fastest / self.spacing)
 
 
 class PlaneFlow(SphFlow):
@@ -177,7 +188,16 @@ class Poiseuille(PlaneFlow):
     @property
     def force(self) -> float:
         """Acceleration along the channel [m/s^2]."""
+        if self.rheology is not None:
+            rate = self.rate_at_wall
+            return 2.0 * self.rheology.viscosity(rate, self.viscosity) * rate / (self.density * self.width)
         return 8.0 * self.viscosity * self.speed / (self.density * self.width**2)
+
+    @property
+    def rate_at_wall(self) -> float:
+        """Of shear, where it flows steadily and its viscosity depends on that [1/s]."""
+        assert self.rheology is not None
+        return rate_at_wall(self.rheology, self.viscosity, self.speed, self.width)
 
     @property
     def columns(self) -> int:

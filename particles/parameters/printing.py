@@ -142,6 +142,7 @@ class Printing(SphFlow):
 def _drop_of(scene: Printing) -> Droplet:
     return Droplet(
         diameter=(6.0 * scene.drop_volume / pi) ** (1.0 / 3.0), density=scene.density, viscosity=scene.viscosity,
+        rheology=scene.rheology,
         surface_tension=scene.surface_tension, speed=scene.speed, contact_angle=scene.contact_angle,
         gravity=scene.gravity, duration=scene.delay, effects=scene.effects,
         numerics=DropletNumerics(**scene.numerics.model_dump(exclude={"settling"})),

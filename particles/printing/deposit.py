@@ -146,8 +146,8 @@ class Deposit:
         liquid, held = self.liquid, np.flatnonzero(self.state == HELD)
         near = self._within_reach(np.concatenate((liquid, held)))
         self.order = np.concatenate((liquid, held, near))
-        walls = np.zeros((5, len(held) + len(near)))
-        fields = Fields(*(one[self.order] for one in self.fields[:12]), *walls)
+        walls, viscosity = np.zeros((5, len(held) + len(near))), np.zeros(len(self.order))
+        fields = Fields(*[*(one[self.order] for one in self.fields[:12]), *walls, viscosity])
         depth = -self.ground.at(self.points[near], 1) / self.law.length
         fields.wall_room[len(held) :] = beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
         self.surface.lie_on(self.ground if self.bodies else None)

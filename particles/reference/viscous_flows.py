@@ -1,12 +1,15 @@
 """Exact viscous flows: the start of a flow between plates, vortices that die out."""
 
+from collections.abc import Callable
 from math import exp, pi
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from reflowshock.arrays import Floats
 
 TERMS = 40
+POINTS = 2001  # of rates between the middle of a channel and its plates
 
 
 def starting_channel(height: Floats, time: float, width: float, viscosity: float, force: float) -> Floats:
@@ -25,6 +28,24 @@ def starting_channel(height: Floats, time: float, width: float, viscosity: float
         factor = 4.0 * force * width**2 / (viscosity * wave**3) * exp(-(wave**2) * viscosity * time / width**2)
         speed = speed - factor * np.sin(wave * height / width)
     return speed
+
+
+def steady_channel(height: Floats, width: float, rate_at_wall: float, viscosity: Callable[[float], float]) -> Floats:
+    """Return the speed [m/s] of steady flow between plates of liquid whose viscosity depends on the rate of shear.
+
+    The stress is linear across the channel, so that the place of each rate is known; speed is the integral of rates.
+
+    Args:
+        height: `(n,)` above the lower plate [m].
+        width: between the plates [m].
+        rate_at_wall: of shear at the plates [1/s].
+        viscosity: at a rate of shear [Pa s].
+    """
+    rates = np.linspace(0.0, rate_at_wall, POINTS)
+    stress = np.array([viscosity(rate) * rate for rate in rates])
+    place = 0.5 * width * stress / stress[-1]  # from the middle
+    below = cumulative_trapezoid(rates, place, initial=0.0)
+    return np.interp(np.abs(height - 0.5 * width), place, below[-1] - below)
 
 
 def taylor_green(x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Floats]:

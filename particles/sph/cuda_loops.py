@@ -11,7 +11,8 @@ from numba import cuda
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.particle_rates import rates_of, wall_values
+from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_values
+from reflowshock.particles.sph.shear_viscosity import viscosity_of
 
 THREADS_PER_BLOCK = 128
 
@@ -28,6 +29,24 @@ def _find_rates(fluids, lists, fields, law, rates):
         found = rates_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
         for k in range(rates.shape[0]):
             rates[k, i] = found[k]
+
+
+@cuda.jit
+def _find_viscosities(fluids, lists, fields, law, found):
+    offsets, indices = lists
+    i = cuda.grid(1)
+    if i < fluids:
+        found[0, i] = viscosity_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+
+
+@cuda.jit
+def _find_drifts(fluids, lists, fields, law, found):
+    offsets, indices = lists
+    i = cuda.grid(1)
+    if i < fluids:
+        drift = drift_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        for k in range(found.shape[0]):
+            found[k, i] = drift[k]
 
 
 @cuda.jit
@@ -63,6 +82,16 @@ class CudaLoops:
         if found.size:
             kernel = _find_wall_values[_blocks(found.shape[1]), THREADS_PER_BLOCK]
             self._run(kernel, (fluids, self._on_device(lists)), fields, found)
+
+    def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
+        """Write the viscosity of each particle of the liquid into the row of ``found`` `(1, n)`."""
+        kernel = _find_viscosities[_blocks(fluids), THREADS_PER_BLOCK]
+        self._run(kernel, (fluids, self._on_device(lists)), fields, found)
+
+    def find_drifts(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
+        """Write what `drift_of` returns of each particle of the liquid into rows of ``found`` `(3, n)`."""
+        kernel = _find_drifts[_blocks(fluids), THREADS_PER_BLOCK]
+        self._run(kernel, (fluids, self._on_device(lists)), fields, found)
 
     def _run(self, kernel: Any, particles: tuple[int, tuple[Any, Any]], fields: Fields, result: Floats) -> None:
         """Run a configured kernel of which particles and neighbours; its rows come back into ``result``."""

@@ -14,6 +14,7 @@ from reflowshock.particles.parameters.flow_effects import artificial_viscosity, 
 from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import Meeting
+from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Loops, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
 from reflowshock.particles.sph.threads import ThreadLoops, threads_for
@@ -177,10 +178,12 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         diffusion=numerics.density_diffusion * length * scene.sound,
         artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
         viscosity=scene.liquid_viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
+        **shear_law(scene),
         has_surface=int(has_surface),
         no_slip=int(not has_surface),
         mirror=0,
         spacing=spacing,
+        xsph=numerics.xsph,
         shifting=0.0 if has_surface else 1.0,
         period_x=periods[0],
         period_y=periods[1],
@@ -189,6 +192,20 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         gravity_y=gravity[1],
         gravity_z=gravity[2],
     )
+
+
+def shear_law(scene: SphFlow) -> dict[str, Any]:
+    """Return what a law says of a viscosity that depends on the rate of shear."""
+    given = scene.rheology
+    if given is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
+        return {"rheology": NEWTON, "exponent": 1.0, "shear_rate": 1.0, "least_viscosity": 0.0, "most_viscosity": 0.0}
+    least, most = given.viscosity_at_infinity, scene.liquid_viscosity
+    if given.law == "power_law":
+        least, most = scene.liquid_viscosity / given.bound, scene.liquid_viscosity * given.bound
+    return {
+        "rheology": LAWS[given.law], "exponent": given.exponent, "shear_rate": given.shear_rate,
+        "least_viscosity": least, "most_viscosity": most,
+    }  # fmt: skip
 
 
 def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
@@ -220,8 +237,11 @@ def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) 
     mass = density * law.spacing**law.dimension
     places = {name: points[axis].copy() for axis, name in enumerate("xyz")}
     still = {name: np.zeros(count) for name in ("u", "v", "w", "pressure", "slope_x", "slope_y", "slope_z")}
+    shares, viscosity = np.ones(fixed), np.zeros(count)
     walls_at_rest = {name: np.zeros(fixed) for name in ("wall_u", "wall_v", "wall_w", "wall_room")}
-    return Fields(**places, **still, density=density, mass=mass, **walls_at_rest, wall_share=np.ones(fixed))
+    return Fields(
+        **places, **still, density=density, mass=mass, **walls_at_rest, wall_share=shares, viscosity=viscosity
+    )  # fmt: skip
 
 
 def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> FlowResult:

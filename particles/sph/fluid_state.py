@@ -21,13 +21,17 @@ class Law(NamedTuple):
         sound: speed of sound c0 [m/s].
         diffusion: delta h c0 [m^2/s].
         artificial: alpha h c0 rho_0 [Pa s].
-        viscosity: mu [Pa s].
+        viscosity: mu [Pa s]; in the law of one that depends on the rate of shear, that of `Rheology`.
+        rheology: `NEWTON`, `POWER_LAW` or `CARREAU`.
+        exponent, shear_rate: of these laws; the rate in 1/s.
+        least_viscosity, most_viscosity: bounds [Pa s], the first one Carreau's viscosity at infinity.
         has_surface: 1 where the liquid has a free one. Then viscosity acts along the line of two particles, elsewhere
             along their velocities; and walls do not pull.
         no_slip: whether walls hold the liquid by its viscosity; 1 or 0.
         mirror: 1 where the plane z = 0 is a wall below the liquid: its particles meet their images behind it, which
             costs no particles and ends, with the liquid, at the contact line.
         spacing: of the particles at the start [m].
+        xsph: epsilon of the smoothed velocity that moves particles (Monaghan 1989); 0 is none.
         shifting: share of the shift of particles by Sun et al. (2017); 0 is none.
         period_x, period_y, period_z: of a periodic flow [m]; 0 where it is not.
         gravity_x, gravity_y, gravity_z: [m/s^2].
@@ -42,10 +46,16 @@ class Law(NamedTuple):
     diffusion: float
     artificial: float
     viscosity: float
+    rheology: int
+    exponent: float
+    shear_rate: float
+    least_viscosity: float
+    most_viscosity: float
     has_surface: int
     no_slip: int
     mirror: int
     spacing: float
+    xsph: float
     shifting: float
     period_x: float
     period_y: float
@@ -70,6 +80,7 @@ class Fields(NamedTuple):
             are layers of particles as they stand.
         wall_share: how much of each counts: the liquid that it sees over that room, at most one. So a wall of cured
             ink ends with the liquid, at the contact line, as a mirror does.
+        viscosity: of each particle [Pa s]; found where it depends on the rate of shear.
     """
 
     x: Floats
@@ -89,3 +100,4 @@ class Fields(NamedTuple):
     wall_w: Floats
     wall_room: Floats
     wall_share: Floats
+    viscosity: Floats

@@ -40,6 +40,21 @@ def artificial_viscosity(approach, distance2, slope, volume, density):
 
 
 @njit(cache=True, error_model="numpy")
+def xsph(level, mass, density_i, density_j):
+    """Weight of u_j - u_i in the velocity that moves i, over epsilon: m_j W / rho_ij (Monaghan 1989).
+
+    With the mean density rho_ij the centre of mass is not moved.
+    """
+    return 2.0 * mass * level / (density_i + density_j)
+
+
+@njit(cache=True, error_model="numpy")
+def shared_viscosity(viscosity_i, viscosity_j):
+    """Viscosity of a pair, 2 mu_i mu_j / (mu_i + mu_j) (Cleary 1998): stress is continuous across a jump."""
+    return 2.0 * viscosity_i * viscosity_j / (viscosity_i + viscosity_j)
+
+
+@njit(cache=True, error_model="numpy")
 def central_viscosity(approach, softened2, slope, volume, factor):
     """Newtonian viscosity along the line of the particles (Cleary 1998): a body that turns as a whole feels none.
 

@@ -47,6 +47,14 @@ def closing_in(k, velocity, d, fields):
 
 
 @njit(cache=True, error_model="numpy")
+def viscosity_between(i, j, fluids, fields, law):
+    """Return the viscosity between two particles [Pa s]; beside a wall it is the liquid's."""
+    if law.rheology == 0 or j >= fluids:
+        return fields.viscosity[i] if law.rheology else law.viscosity
+    return pair_terms.shared_viscosity(fields.viscosity[i], fields.viscosity[j])
+
+
+@njit(cache=True, error_model="numpy")
 def rates_of(i, fluids, neighbours, fields, law):
     """Return what a particle of the liquid is told by its neighbours.
 
@@ -98,7 +106,7 @@ def rates_of(i, fluids, neighbours, fields, law):
         if law.artificial > 0.0 and liquid:
             push += law.artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
         if law.viscosity > 0.0 and (liquid or law.no_slip):
-            softened2, double = distance2 + softening, 2.0 * law.viscosity / density
+            softened2, double = distance2 + softening, 2.0 * viscosity_between(i, j, fluids, fields, law) / density
             if law.has_surface:
                 factor = double * (law.dimension + 2)
                 push += pair_terms.central_viscosity(approach, softened2, steep, volume, factor)
@@ -133,6 +141,28 @@ def rates_of(i, fluids, neighbours, fields, law):
     if law.diffusion > 0.0:
         bx, by, bz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
     return rate, ax, ay, az, bx, by, bz, cx, cy, cz
+
+
+@njit(cache=True, error_model="numpy")
+def drift_of(i, fluids, neighbours, fields, law):
+    """Return the velocity (3) [m/s] that XSPH adds where it moves a particle of the liquid; momentum stays."""
+    x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
+    inverse = 1.0 / law.length
+    fu = fv = fw = 0.0
+    mirror = law.mirror if z < 2.0 * law.length else 0
+    for n in range((1 + mirror) * len(neighbours) + mirror):
+        j, side = seen(n, i, neighbours, mirror)
+        if j >= fluids:
+            continue
+        dx = across(x - fields.x[j], law.period_x)
+        dy = across(y - fields.y[j], law.period_y)
+        dz = across(z - side * fields.z[j], law.period_z)
+        level = law.norm * shape(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+        weight = law.xsph * pair_terms.xsph(level, fields.mass[j], fields.density[i], fields.density[j])
+        fu += weight * (fields.u[j] - u)
+        fv += weight * (fields.v[j] - v)
+        fw += weight * (side * fields.w[j] - w)
+    return fu, fv, fw
 
 
 @njit(cache=True, error_model="numpy")

@@ -81,6 +81,12 @@ class Loops(Protocol):
     def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
         """Write pressures, velocities and shares `(5, m)` of walls."""
 
+    def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
+        """Write the viscosities `(1, n)` of the liquid, where they depend on the rate of shear."""
+
+    def find_drifts(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats, /) -> None:
+        """Write the velocities `(3, n)` by which XSPH moves the liquid."""
+
 
 @dataclass(slots=True)
 class Simulation:
@@ -150,7 +156,8 @@ class Simulation:
     def time_step(self) -> float:
         """The largest stable step [s]."""
         law, tension = self.law, self.surface.tension if self.surface else 0.0
-        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, law.viscosity, tension)
+        viscosity = float(self.fields.viscosity[: self.fluids].max()) if law.rheology else law.viscosity
+        return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, viscosity, tension)
 
     def step(self, time_step: float) -> None:
         """Go on by a time step [s].
@@ -160,16 +167,18 @@ class Simulation:
         """
         liquid, half = slice(self.fluids), 0.5 * time_step
         fields, rates = self.fields, self.rates
-        middle = []
+        middle, drift = [], np.zeros((3, self.fluids))
+        if self.law.xsph:
+            self.loops.find_drifts(self.fluids, self.rows.lists, fields, drift)
         for axis in range(3):
             place, speed = fields[axis][liquid], fields[3 + axis][liquid]
             middle.append(speed + half * rates[1 + axis])
-            place += time_step * middle[axis]
+            place += time_step * (middle[axis] + drift[axis])
             speed += time_step * rates[1 + axis]
         if self.surface:
             carriers = slice(self.fluids + self.held)
             volume = float((fields.mass[carriers] / fields.density[carriers]).sum())
-            velocity = np.pad(np.array(middle), ((0, 0), (0, self.held)))
+            velocity = np.pad(np.array(middle) + drift, ((0, 0), (0, self.held)))
             self.surface.move(velocity, time_step, volume)
         if self.law.mirror:
             self._reflect(middle)
@@ -195,6 +204,8 @@ class Simulation:
         self.rows.update(np.array(fields[:3]))
         fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)
         self._extend_to_walls()
+        if law.rheology:
+            self.loops.find_viscosities(self.fluids, self.rows.lists, fields, fields.viscosity[None, liquid])
         self.loops.find_rates(self.fluids, self.rows.lists, fields, self.rates)
         self.rates[1:4] += np.array([[law.gravity_x], [law.gravity_y], [law.gravity_z]])
         if self.surface:

@@ -10,7 +10,8 @@ from numba import get_num_threads, njit, prange, set_num_threads
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.particle_rates import rates_of, wall_values
+from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_values
+from reflowshock.particles.sph.shear_viscosity import viscosity_of
 
 # With fewer particles a thread more costs more than it brings.
 PARTICLES_PER_THREAD = 4000
@@ -41,6 +42,14 @@ class ThreadLoops:
         """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(5, m)`."""
         _find_wall_values(fluids, lists, fields, self._law, found)
 
+    def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
+        """Write the viscosity of each particle of the liquid into the row of ``found`` `(1, n)`."""
+        _find_viscosities(fluids, lists, fields, self._law, found)
+
+    def find_drifts(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
+        """Write what `drift_of` returns of each particle of the liquid into rows of ``found`` `(3, n)`."""
+        _find_drifts(fluids, lists, fields, self._law, found)
+
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _find_rates(fluids, lists, fields, law, rates):
@@ -49,6 +58,22 @@ def _find_rates(fluids, lists, fields, law, rates):
         found = rates_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
         for k in range(10):
             rates[k, i] = found[k]
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _find_viscosities(fluids, lists, fields, law, found):
+    offsets, indices = lists
+    for i in prange(fluids):
+        found[0, i] = viscosity_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _find_drifts(fluids, lists, fields, law, found):
+    offsets, indices = lists
+    for i in prange(fluids):
+        drift = drift_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        for k in range(found.shape[0]):
+            found[k, i] = drift[k]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

@@ -4,11 +4,14 @@ from math import log2, sqrt
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
 
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
+from reflowshock.particles.parameters.rheology import Rheology
 from reflowshock.particles.scenes.dam_break import dam, solve_dam_break
-from reflowshock.particles.scenes.viscous_flows import solve_poiseuille, solve_taylor_green
+from reflowshock.particles.scenes.viscous_flows import channel, exact_speeds, solve_poiseuille, solve_taylor_green
 from reflowshock.particles.sph.simulation import Simulation
 
 
@@ -23,6 +26,77 @@ def test_a_channel_starts_as_the_exact_one():
         errors.append(value(solve_poiseuille(scene), "profile_error"))
     assert errors[1] < 0.01
     assert log2(errors[0] / errors[1]) > 1.0
+
+
+def carreau_profile(height, scene):
+    """Steady speeds [m/s]: stress is linear across the channel; a root for the rate at each height, then a sum."""
+    law, place = scene.rheology, np.linspace(0.0, 0.5 * scene.width, 1001)
+    stress = scene.density * scene.force * place
+    rates = [brentq(lambda rate, s=s: law.viscosity(rate, scene.viscosity) * rate - s, 0.0, 1e4) for s in stress]
+    below = cumulative_trapezoid(rates, place, initial=0.0)
+    return np.interp(np.abs(height - 0.5 * scene.width), place, below[-1] - below)
+
+
+def power_law_profile(height, scene):
+    """Steady speeds [m/s] of a power law without bounds (Bird, Armstrong, Hassager 1987)."""
+    offset = np.abs(2.0 * height / scene.width - 1.0)
+    return scene.speed * (1.0 - offset ** (1.0 + 1.0 / scene.rheology.exponent))
+
+
+THINNING = {"law": "power_law", "exponent": 0.5, "shear_rate": 40.0}
+THICKENING = {"law": "power_law", "exponent": 1.5, "shear_rate": 40.0}
+CARREAU = {"law": "carreau", "exponent": 0.4, "shear_rate": 10.0, "viscosity_at_infinity": 1e-4}
+
+
+def steady_speeds(height, scene):
+    return exact_speeds(height, 0.0, scene)
+
+
+def error_of_steady_flow(rheology, profile, across, duration):
+    """RMS error of speeds, over the largest, after a duration [w^2 / nu] from the exact ones."""
+    numerics = SphNumerics(particles_across=across)
+    scene = Poiseuille(width=1e-3, speed=0.01, duration=duration, rheology=Rheology(**rheology), numerics=numerics)
+    simulation = channel(scene)
+    liquid = slice(simulation.fluids)
+    simulation.fields.u[liquid] = profile(simulation.fields.z[liquid], scene)
+    while simulation.time < scene.until:
+        simulation.step(simulation.time_step())
+    error = simulation.fields.u[liquid] - profile(simulation.fields.z[liquid], scene)
+    return float(np.sqrt((error**2).mean())) / scene.speed
+
+
+@pytest.mark.parametrize("rheology", [THINNING, THICKENING])
+def test_a_power_law_without_its_bounds_has_the_exact_profile(rheology):
+    scene = Poiseuille(width=1e-3, speed=0.01, rheology=Rheology(**rheology, bound=1000.0))
+    height = np.linspace(0.0, scene.width, 41)
+    assert steady_speeds(height, scene) == pytest.approx(power_law_profile(height, scene), abs=1e-4 * scene.speed)
+
+
+def test_the_profile_of_a_carreau_liquid_is_that_of_a_root_at_each_height():
+    scene = Poiseuille(width=1e-3, speed=0.01, rheology=Rheology(**CARREAU))
+    height = np.linspace(0.0, scene.width, 41)
+    assert steady_speeds(height, scene) == pytest.approx(carreau_profile(height, scene), abs=1e-4 * scene.speed)
+    assert steady_speeds(np.array([0.5e-3]), scene)[0] == pytest.approx(scene.speed, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("rheology", "profile"),
+    [(THINNING | {"bound": 4.0}, steady_speeds), (CARREAU, carreau_profile)], ids=["power law", "Carreau"],
+)  # fmt: skip
+def test_liquid_whose_viscosity_depends_on_shear_keeps_its_profile(rheology, profile):
+    assert error_of_steady_flow(rheology, profile, 10, 0.1) < 0.03
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("rheology", "profile"),
+    [(THINNING, power_law_profile), (THICKENING, power_law_profile), (CARREAU, carreau_profile)],
+    ids=["thinning", "thickening", "Carreau"],
+)
+def test_profiles_of_such_liquids_converge(rheology, profile):
+    coarse, fine = (error_of_steady_flow(rheology, profile, across, 0.5) for across in (10, 20))
+    assert fine < 0.02
+    assert log2(coarse / fine) > 1.0
 
 
 def test_vortices_die_out_at_the_exact_rate():

@@ -6,6 +6,7 @@ from typing import Any
 from reflowshock.particles.parameters.droplets import LEAST_SOUND_SPEED, Droplet
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphFlow, TaylorGreen
 from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.parameters.rheology import Rheology
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
@@ -80,7 +81,7 @@ class PrintingCase(FlowCase):
 def of_printing(case: PrintingCase) -> list[Problem]:
     """Find drops on top of each other, particles that are too large, sound that is too slow, too short delays."""
     scene = case.printing
-    found, numerics = _of_particles("printing", scene.drop), scene.numerics
+    found, numerics = _of_particles("printing", scene.drop) + of_rheology("printing", scene), scene.numerics
     least = LEAST_PITCH * scene.length
     if scene.pitch < least:
         allowed = f">= {micrometres(least)}, {LEAST_PITCH:g} diameters of a drop"
@@ -108,7 +109,7 @@ def of_droplet(case: DropletCase) -> list[Problem]:
     if drop.reynolds is not None and not drop.impact_speed:
         allowed = "together with droplet.speed or droplet.weber"
         found.append(Problem("droplet.reynolds", "says nothing without an impact", drop.reynolds, allowed))
-    found += _of_particles("droplet", drop)
+    found += _of_particles("droplet", drop) + of_rheology("droplet", drop)
     if drop.has_wall and drop.start != "sphere":
         found.append(Problem("droplet.start", "only a free drop starts as a cube", drop.start, "sphere"))
     return found
@@ -135,7 +136,7 @@ def _of_particles(kind: str, drop: Droplet) -> list[Problem]:
 
 def of_dam_break(case: DamBreakCase) -> list[Problem]:
     """Find a column that does not fit in its tank, and a sensor that is not at its wall."""
-    dam, found = case.dam_break, []
+    dam, found = case.dam_break, of_rheology("dam_break", case.dam_break)
     if dam.width > dam.tank_length - dam.spacing:
         allowed = f"> dam_break.width = {metres(dam.width)}"
         found.append(
@@ -153,7 +154,10 @@ def of_dam_break(case: DamBreakCase) -> list[Problem]:
 def of_viscous(case: FlowCase) -> list[Problem]:
     """Find a Reynolds number at which the exact solution is none that is seen, and viscosity that is left out."""
     scene: SphFlow = case.scene
-    found = []
+    found = of_rheology(case.kind, scene)
+    if isinstance(scene, TaylorGreen) and scene.rheology is not None:
+        message = "no exact solution is known"
+        found.append(Problem(f"{case.kind}.rheology", message, scene.rheology.law, "constant viscosity"))
     if scene.reynolds_number > LARGEST_REYNOLDS:
         least = scene.viscosity * scene.reynolds_number / LARGEST_REYNOLDS
         message = f"makes the Reynolds number {scene.reynolds_number:.3g}, at which the exact flow is not stable"
@@ -169,6 +173,22 @@ def of_viscous(case: FlowCase) -> list[Problem]:
         message = "without viscosity nothing is left of this flow"
         found.append(Problem(f"{case.kind}.effects.viscosity", message, "off", "auto, on"))
     return found
+
+
+def of_rheology(kind: str, scene: SphFlow) -> list[Problem]:
+    """Find keys of the other law, and a viscosity at infinity that is none."""
+    rheology: Rheology | None = scene.rheology
+    if rheology is None:
+        return []
+    other = "viscosity_at_infinity" if rheology.law == "power_law" else "bound"
+    if other in rheology.model_fields_set:
+        value = getattr(rheology, other)
+        return [Problem(f"{kind}.rheology.{other}", f"says nothing in the law {rheology.law}", value, "leave it out")]
+    if rheology.viscosity_at_infinity >= scene.liquid_viscosity:
+        value = from_si(rheology.viscosity_at_infinity, "mPa*s", digits=3)
+        allowed = f"< {from_si(scene.liquid_viscosity, 'mPa*s', digits=3)}, the viscosity at rest"
+        return [Problem(f"{kind}.rheology.viscosity_at_infinity", "is not below that at rest", value, allowed)]
+    return []
 
 
 def metres(length: float) -> str:

@@ -24,6 +24,8 @@ SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
 SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.5e-3, 3.4e-6
 # What a solid particle within reach of the liquid costs, over a liquid one: cases/printing, 64 drops.
 SOLID_SHARE = 0.65
+# A step with a viscosity that depends on the rate of shear, over one without: an impact, 16 particles across.
+SHEAR_COST = 1.37
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
 
@@ -57,6 +59,8 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     steps = ceil(scene.until / step)
     in_space = isinstance(scene, Droplet | Printing)
     each = SECONDS_PER_PARTICLE_IN_SPACE if in_space else SECONDS_PER_PARTICLE
+    if effects["shear_dependent_viscosity"]["on"]:
+        each *= SHEAR_COST
     moving = _in_the_loops(scene) if isinstance(scene, Printing) else scene.particles
     seconds = SECONDS_TO_START + steps * ((SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * moving)
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})
@@ -72,7 +76,9 @@ def _in_the_loops(scene: Printing) -> float:
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:
     """Return the time step that a flow is expected to take [s]."""
-    length, viscosity = scene.numerics.smoothing_length * scene.spacing, scene.liquid_viscosity if is_viscous else 0.0
+    length, viscosity = scene.numerics.smoothing_length * scene.spacing, 0.0
+    if is_viscous:
+        viscosity = scene.largest_viscosity
     tension = scene.surface_tension if isinstance(scene, Droplet | Printing) else 0.0
     return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity, tension)
 

@@ -9,7 +9,6 @@ import numpy as np
 from reflowshock.arrays import Floats
 from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.reference.dam_break import measured_pressure
-from reflowshock.particles.reference.viscous_flows import starting_channel
 from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, PrintingCase
 from reflowshock.workflow.fluid.printed_part import add_part
@@ -90,10 +89,12 @@ def channel_curves(
     case: PoiseuilleCase, time: float, points: Floats, velocity: Floats, history: Mapping[str, Floats]
 ) -> list[Chart]:
     """Return speeds across the channel at a time [s] beside the exact ones, and the largest speed in time."""
+    from reflowshock.particles.scenes.viscous_flows import exact_speeds
+
     scene = case.poiseuille
     order = np.argsort(points[:, 2])
     height = points[order, 2]
-    exact = starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
+    exact = exact_speeds(height, time, scene)
     speeds = [
         Series("particles", height / scene.width, velocity[order, 0] / scene.speed, BLUE, line="none", marks=True),
         Series("exact", height / scene.width, exact / scene.speed, RED),

@@ -13,6 +13,7 @@ CASES = Path(__file__).resolve().parents[3] / "cases"
 DAM, CHANNEL, VORTICES = (CASES / name / "case.toml" for name in ("dam_break", "poiseuille", "taylor_green"))
 PRINTING = CASES / "printing/case.toml"
 FREE, CAP, IMPACT = (CASES / name / "case.toml" for name in ("young_laplace", "static_caps", "drop_impact"))
+CARREAU = ["droplet.rheology.law=carreau", "droplet.rheology.exponent=0.5", "droplet.rheology.shear_rate=1e5 1/s"]
 BAD_VALUES = {
     "no room": (DAM, "dam_break.width=3.3 m", ["dam_break.tank_length", '"3.22 m"', "> dam_break.width = 3.3 m"]),
     "thin column": (DAM, "dam_break.width=1 mm", ["dam_break.width", "less than one particle", ">= 0.01 m"]),
@@ -50,6 +51,24 @@ BAD_VALUES = {
     "drops on each other": (PRINTING, "printing.pitch=2 um", ["printing.pitch", "on each other", ">= 5.75 um"]),
     "drops in each other": (PRINTING, "printing.delay=2 us", ["printing.delay", "in the one before", ">= 7.67 us"]),
     "no order": (PRINTING, "printing.order=rastr", ["one of raster, serpentine, interleaved", "did you mean raster?"]),
+    "a carreau bound": (
+        IMPACT,
+        CARREAU + ["droplet.rheology.bound=5"],
+        ["rheology.bound", "says nothing", "leave it out"],
+    ),
+    "no rate of shear": (IMPACT, CARREAU[:2], ["droplet.rheology.shear_rate"]),
+    "thicker at infinity": (
+        IMPACT,
+        [*CARREAU, "droplet.rheology.viscosity_at_infinity=20 mPa*s"],
+        ["viscosity_at_infinity", "is not below that at rest", "< 14.9 mPa*s"],
+    ),
+    "an exponent of three": (IMPACT, [*CARREAU, "droplet.rheology.exponent=3"], ["rheology.exponent", "<= 2"]),
+    "a law that is none": (IMPACT, [*CARREAU, "droplet.rheology.law=careau"], ["did you mean carreau?"]),
+    "vortices that thin": (
+        VORTICES,
+        [one.replace("droplet", "taylor_green") for one in CARREAU],
+        ["taylor_green.rheology", "no exact solution is known"],
+    ),
     "unknown key": (VORTICES, "taylor_green.sides=1 mm", ["taylor_green.sides", "unknown key", "side"]),
 }
 
@@ -57,7 +76,7 @@ BAD_VALUES = {
 @pytest.mark.parametrize(("path", "setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
 def test_what_cannot_be_is_refused_in_words(path, setting, words):
     with pytest.raises(CaseError) as caught:
-        read_case(path, [setting], True)
+        read_case(path, [setting] if isinstance(setting, str) else setting, True)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
@@ -80,6 +99,15 @@ def test_plans_tell_particles_steps_and_cost(path):
     assert kind_of(case).size(case).memory > 0.0
     study = kind_of(case).study(case)
     assert {run.parameter for run in study.runs} == {"particle spacing", "smoothing length"}
+
+
+def test_viscosity_by_shear_costs_what_its_forecast_says():
+    case = read_case(IMPACT, CARREAU, True)
+    (effect,) = (one for one in kind_of(case).effects if one.name == "shear_dependent_viscosity")
+    with_, without = forecast_flow(case), forecast_flow(effect.other_way(case, True))
+    assert with_.effects[effect.name]["on"] and not without.effects[effect.name]["on"]
+    assert 1.2 < with_.seconds["particles"] / without.seconds["particles"] < 1.4
+    assert effect.other_way(case, False) is None
 
 
 def test_viscosity_limits_the_step_of_fine_flows():

@@ -1,0 +1,88 @@
+"""A model of Kratos in explicit steps, for the processes of peers: hexahedra of a material each."""
+
+from collections.abc import Callable
+
+import KratosMultiphysics as Kratos
+import KratosMultiphysics.ConstitutiveLawsApplication as Laws
+import KratosMultiphysics.StructuralMechanicsApplication as Structural
+import numpy as np
+
+STEP_VARIABLES = (
+    Kratos.DISPLACEMENT,
+    Kratos.VELOCITY,
+    Kratos.ACCELERATION,
+    Kratos.REACTION,
+    Kratos.VOLUME_ACCELERATION,
+    Kratos.NODAL_MASS,
+    Kratos.FORCE_RESIDUAL,
+    Kratos.RESIDUAL_VECTOR,
+    Structural.MIDDLE_VELOCITY,
+    Structural.FRACTIONAL_ACCELERATION,
+)
+ELEMENTS = {True: "TotalLagrangianElement3D8N", False: "SmallDisplacementElement3D8N"}  # of finite and small strain
+LAWS = {True: Laws.KirchhoffSaintVenant3DLaw, False: Structural.LinearElastic3DLaw}
+NO_HARDENING, NEVER = 3, 1e12  # of Kratos' curves; fracture energy [J/m^2]
+COLUMNS = (Kratos.DENSITY, Kratos.YOUNG_MODULUS, Kratos.POISSON_RATIO, Kratos.YIELD_STRESS)
+
+
+def explicit_model(given: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Callable[[], None]]:
+    """Return a body at rest in its first state, and what takes a step.
+
+    Args:
+        given: ``points``, ``cells`` (cyclic order), ``material`` of each, ``constants`` of materials (density, Young's
+            modulus, Poisson's ratio, yield stress or nan), whether strains are ``finite``, ``step`` [s].
+    """
+    Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
+    finite, step = bool(given["finite"]), float(given["step"])
+    body = kept.CreateModelPart("body", 2)
+    for variable in STEP_VARIABLES:
+        body.AddNodalSolutionStepVariable(variable)
+    fill(body, given, finite)
+    information = body.ProcessInfo
+    information[Kratos.DOMAIN_SIZE] = 3
+    information[Kratos.COMPUTE_LUMPED_MASS_MATRIX] = True
+    information[Structural.RAYLEIGH_ALPHA] = information[Structural.RAYLEIGH_BETA] = 0.0
+    information[Kratos.DELTA_TIME] = step
+    scheme = Structural.ExplicitCentralDifferencesScheme(1.0, 1.0 / 3.0, 0)
+    strategy = Structural.MechanicalExplicitStrategy(body, scheme, False, False, finite)
+    strategy.SetEchoLevel(0)
+    strategy.SetRebuildLevel(0)
+    strategy.Initialize()
+
+    def advance() -> None:
+        body.CloneTimeStep(information[Kratos.TIME] + step)
+        strategy.InitializeSolutionStep()
+        strategy.Predict()
+        strategy.SolveSolutionStep()
+        strategy.FinalizeSolutionStep()
+
+    return body, advance
+
+
+kept = Kratos.Model()  # owns the parts: without it they are gone
+
+
+def fill(body: Kratos.ModelPart, given: dict[str, np.ndarray], finite: bool) -> None:
+    """Add materials, nodes and elements."""
+    materials = [material_of(body, number, row, finite) for number, row in enumerate(given["constants"], start=1)]
+    for number, point in enumerate(given["points"].tolist(), start=1):
+        body.CreateNewNode(number, *point)
+    cells, kinds = (given["cells"] + 1).tolist(), given["material"].tolist()
+    for number, (nodes, kind) in enumerate(zip(cells, kinds, strict=True), start=1):
+        body.CreateNewElement(ELEMENTS[finite], number, nodes, materials[kind])
+    for axis in "XYZ":
+        pair = [Kratos.KratosGlobals.GetVariable(f"{name}_{axis}") for name in ("DISPLACEMENT", "REACTION")]
+        Kratos.VariableUtils().AddDof(*pair, body)
+
+
+def material_of(body: Kratos.ModelPart, number: int, row: np.ndarray, finite: bool) -> Kratos.Properties:
+    """Return a material: J2 without hardening where it has a yield stress, else linear."""
+    found = body.CreateNewProperties(number)
+    for variable, value in zip(COLUMNS, row.tolist(), strict=True):
+        if np.isfinite(value):
+            found[variable] = value
+    found[Kratos.CONSTITUTIVE_LAW] = LAWS[finite]()
+    if np.isfinite(row[-1]):
+        found[Kratos.CONSTITUTIVE_LAW] = Laws.FiniteStrainIsotropicPlasticity3DVonMisesVonMises()
+        found[Laws.HARDENING_CURVE], found[Kratos.FRACTURE_ENERGY] = NO_HARDENING, NEVER
+    return found

@@ -1,0 +1,75 @@
+"""Viscosity that depends on the rate of shear: its laws, and the rate at a particle; compiled for threads and CUDA.
+
+The laws are those of `parameters/rheology.py`; the constants in `Law` say which one acts.
+"""
+
+from math import sqrt
+
+from numba import njit
+
+from reflowshock.particles.sph.particle_rates import across, seen, solved
+from reflowshock.particles.sph.smoothing import slope
+
+NEWTON, POWER_LAW, CARREAU = 0, 1, 2
+LAWS = {"power_law": POWER_LAW, "carreau": CARREAU}
+
+
+@njit(cache=True, error_model="numpy")
+def viscosity_at(rate, law):
+    """Return the viscosity [Pa s] at a rate of shear [1/s]."""
+    ratio = rate / law.shear_rate
+    if law.rheology == CARREAU:
+        share = (1.0 + ratio * ratio) ** (0.5 * (law.exponent - 1.0))
+        return law.least_viscosity + (law.viscosity - law.least_viscosity) * share
+    if law.exponent == 1.0:
+        return law.viscosity
+    bounded = law.viscosity * ratio ** (law.exponent - 1.0) if ratio > 0.0 else law.most_viscosity
+    if (ratio <= 0.0 and law.exponent > 1.0) or bounded < law.least_viscosity:
+        return law.least_viscosity
+    return bounded if bounded < law.most_viscosity else law.most_viscosity
+
+
+@njit(cache=True, error_model="numpy")
+def viscosity_of(i, fluids, neighbours, fields, law):
+    """Return the viscosity [Pa s] of a particle of the liquid, from the renormalised gradient of velocity about it.
+
+    Walls count with the velocity that viscosity sees where they hold the liquid, else not at all.
+    """
+    x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
+    inverse = 1.0 / law.length
+    scale = law.norm * inverse * inverse
+    ux = uy = uz = vx = vy = vz = wx = wy = wz = 0.0
+    xx = yy = zz = xy = yz = xz = 0.0
+    mirror = law.mirror if z < 2.0 * law.length else 0
+    for n in range((1 + mirror) * len(neighbours) + mirror):
+        j, side = seen(n, i, neighbours, mirror)
+        if j >= fluids and not law.no_slip:
+            continue
+        dx = across(x - fields.x[j], law.period_x)
+        dy = across(y - fields.y[j], law.period_y)
+        dz = across(z - side * fields.z[j], law.period_z)
+        steep = scale * slope(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+        weight = steep * fields.mass[j] / fields.density[j]
+        hold = side if law.no_slip else 1.0
+        ju, jv, jw = hold * fields.u[j] - u, hold * fields.v[j] - v, side * fields.w[j] - w
+        ux += weight * ju * dx
+        uy += weight * ju * dy
+        uz += weight * ju * dz
+        vx += weight * jv * dx
+        vy += weight * jv * dy
+        vz += weight * jv * dz
+        wx += weight * jw * dx
+        wy += weight * jw * dy
+        wz += weight * jw * dz
+        xx -= weight * dx * dx
+        yy -= weight * dy * dy
+        zz -= weight * dz * dz
+        xy -= weight * dx * dy
+        yz -= weight * dy * dz
+        xz -= weight * dx * dz
+    moments = (xx, yy, zz, xy, yz, xz)
+    ux, uy, uz = solved(moments, (ux, uy, uz), law.dimension)
+    vx, vy, vz = solved(moments, (vx, vy, vz), law.dimension)
+    wx, wy, wz = solved(moments, (wx, wy, wz), law.dimension)
+    stretch = 2.0 * (ux * ux + vy * vy + wz * wz)
+    return viscosity_at(sqrt(stretch + (uy + vx) ** 2 + (vz + wy) ** 2 + (uz + wx) ** 2), law)

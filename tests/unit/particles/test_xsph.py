@@ -1,0 +1,66 @@
+"""XSPH: particles move with a smoothed velocity; momentum and the centre of mass are what they are without it."""
+
+import numpy as np
+import pytest
+
+from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.scenes.droplet import droplet
+
+INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "duration": 1e-5}
+
+
+def ink(xsph, **changes):
+    return droplet(Droplet(**INK | changes, numerics=DropletNumerics(particles_per_diameter=8, xsph=xsph)))
+
+
+def drifts(simulation):
+    found = np.zeros((3, simulation.fluids))
+    simulation.loops.find_drifts(simulation.fluids, simulation.rows.lists, simulation.fields, found)
+    return found
+
+
+def test_noise_is_smoothed_and_the_centre_of_mass_stays():
+    simulation, random = ink(0.5), np.random.default_rng(4)
+    fields = simulation.fields
+    for speed in fields[3:6]:
+        speed[:] = random.normal(size=simulation.fluids)
+    fields.density[:] *= random.uniform(0.95, 1.05, simulation.fluids)
+    found = drifts(simulation)
+    assert np.abs(found @ fields.mass).max() < 1e-12 * np.abs(found).max() * fields.mass.sum()
+    assert np.std(fields.u + found[0]) < 0.85 * np.std(fields.u)
+    pairwise = np.zeros(3)  # a plain sum over all pairs, for one particle
+    law, i = simulation.law, 40
+    for j in range(simulation.fluids):
+        q = np.linalg.norm([fields[k][i] - fields[k][j] for k in range(3)]) / law.length
+        level = 1.0 - 1.5 * q * q * (1.0 - 0.5 * q) if q < 1.0 else 0.25 * max(2.0 - q, 0.0) ** 3
+        weight = 0.5 * fields.mass[j] * level / (np.pi * law.length**3 * 0.5 * (fields.density[i] + fields.density[j]))
+        pairwise += weight * np.array([fields[3 + k][j] - fields[3 + k][i] for k in range(3)])
+    assert found[:, i] == pytest.approx(pairwise, rel=1e-12)
+
+
+def test_what_moves_as_a_whole_is_not_touched_and_beside_a_wall_the_image_counts():
+    simulation = ink(0.5)
+    simulation.fields.u[:] = 3.0
+    assert not drifts(simulation).any()
+    above = ink(0.5, contact_angle=1.5)
+    above.fields.u[:], above.fields.w[:] = 3.0, -1.0
+    found, near = drifts(above), above.fields.z < above.law.length
+    assert not found[:2].any()  # along the wall an image moves on
+    assert (found[2, near] > 0.0).all()  # across it, it comes back
+
+
+def test_a_drop_rests_with_it_as_without_it():
+    pair = [ink(xsph, start="cube") for xsph in (0.0, 0.5)]
+    for simulation in pair:
+        while simulation.time < 1.2e-5:
+            simulation.step(simulation.time_step())
+    widths = [np.ptp(simulation.surface.points, axis=0) for simulation in pair]
+    assert widths[1] == pytest.approx(widths[0], rel=0.03)
+    momentum = np.array([one @ simulation.fields.mass for one in simulation.fields[3:6]])
+    assert np.abs(momentum).max() < 1e-10 * simulation.fields.mass.sum()
+
+
+def test_where_it_is_off_no_loop_runs(monkeypatch):
+    simulation = ink(0.0)
+    monkeypatch.setattr(simulation.loops, "find_drifts", None)
+    simulation.step(1e-9)
