@@ -20,6 +20,8 @@ SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
 ISPG_EDGES = (5, 11)
+# Below this angle a cube of fewer particles along an edge becomes a film, in which particles lack neighbours.
+ISPG_FILM_ANGLE, ISPG_FILM_EDGE = radians(60.0), 6
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -67,6 +69,11 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
             ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
+        ),
+        f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
+            drop.count < ISPG_FILM_EDGE
+            and drop.contact_angle is not None
+            and drop.contact_angle < ISPG_FILM_ANGLE - ROUNDING
         ),
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])

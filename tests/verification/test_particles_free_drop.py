@@ -104,12 +104,13 @@ def test_second_mode_of_solder_at_a_tenth_of_the_radius():
 
 
 @pytest.mark.long
-def test_the_scheme_ispg_swings_with_its_period():
-    """The decay is 1.27 times the exact one with 561 particles, 1.22 with 923: smoothing takes the rest."""
-    scene = Oscillation(volume=1e-9, particles_per_radius=5, scheme="ispg")
+@pytest.mark.parametrize(("shells", "excess"), [(5, 0.3), (7, 0.2)])
+def test_the_scheme_ispg_swings_with_its_period_and_decay(shells, excess):
+    """The decay is 1.26 times the exact one with 561 particles, 1.18 with 1415: smoothing takes the rest."""
+    scene = Oscillation(volume=1e-9, particles_per_radius=shells, scheme="ispg")
     metrics = solve_oscillation(scene, scene.resolve(Liquid())).metrics
     assert abs(metrics["period_error"][0]) < 0.01
-    assert 0.0 < metrics["decay_rate_error"][0] < 0.3
+    assert 0.0 < metrics["decay_rate_error"][0] < excess
     assert metrics["volume_drift"][0] < 1e-6
 
 

@@ -207,6 +207,10 @@ ISPG = ("drop.particles_per_edge=11",)
         ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
+        (
+            "drop={volume='1 mm^3',contact_angle='50 deg',particles_per_edge=5}",
+            "5 particles along an edge below 60 deg",
+        ),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
 )
