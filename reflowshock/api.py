@@ -22,6 +22,7 @@ from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import PlannedStage
+from reflowshock.workflow.process.kernel_cache import compilation
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.folders import read_mark
 from reflowshock.workflow.store.point import Point
@@ -60,16 +61,18 @@ class Plan:
         stages: name -> what would be done, in order.
         effects: name -> whether it acts ("on"), "why", and where it is predicted its "influence" on the results.
         text: all of it in words.
+        compilation: predicted wall time [s] of kernels that a first run compiles.
     """
 
     stages: Mapping[str, PlannedStage]
     effects: Mapping[str, Mapping[str, Any]]
     text: str
+    compilation: float
 
     @property
     def seconds(self) -> float:
         """Predicted wall time of the stages that would run [s]."""
-        return sum(stage.seconds or 0.0 for stage in self.stages.values() if stage.runs)
+        return self.compilation + sum(stage.seconds or 0.0 for stage in self.stages.values() if stage.runs)
 
     def __str__(self) -> str:
         return self.text
@@ -117,9 +120,9 @@ class Case:
         store, point = self._store(out), Point({}, self.resolved)
         text = StringIO()
         plan.show_plan(store, point, Console(file=text, width=WIDTH, force_jupyter=False))
-        return Plan(
-            plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects, text.getvalue()
-        )
+        stages, effects = plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects
+        once = compilation([name for name, stage in stages.items() if stage.runs])
+        return Plan(stages, effects, text.getvalue(), once)
 
     def run(
         self, out: str | Path | None = None, *, until: str = "report", cores: int | None = None, force: bool = False

@@ -138,7 +138,7 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
     if once := compilation([name for name, state in states.items() if state.stale]):
-        table.add_row("kernels", styled("[yellow]run[/]"), f"about {duration(once)}", "compiled once, in these stages")
+        table.add_row("kernels", "", f"about {duration(once)}", "compiled once, in these stages")
     stale = [costs[name] for name, state in states.items() if state.stale]
     left = sum(cost.seconds for cost in stale) + once
     remark = _about_time(left)

@@ -60,6 +60,14 @@ def circumradius(sides: int) -> float:
     return float(np.sqrt(angle / np.sin(angle)))
 
 
+def section_edges(numerics: JointNumerics, radius: float) -> np.ndarray:
+    """Return the two edges ``(q, 2, 2)`` [m], in the middle of each quad, of a round section with an area of pi r^2."""
+    section = butterfly(numerics.core, numerics.rings)
+    corners = (radius * circumradius(len(section.rim)) * section.points)[section.quads]
+    first, second, third, fourth = (corners[:, k] for k in range(4))
+    return 0.5 * np.stack([second - first + third - fourth, fourth - first + third - second], axis=1)
+
+
 def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
     """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
     steps = np.linspace(-1.0, 1.0, core + 1)

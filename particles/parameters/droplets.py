@@ -14,6 +14,8 @@ PARTICLES_PER_DIAMETER = 16.0
 # Over the largest speed expected: less, and densities change by more than about 2 % as the drop strikes.
 LEAST_SOUND_SPEED = 8.0
 
+WallAngle = Annotated[float | None, Quantity("deg"), Field(ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)]
+
 
 class DropletNumerics(MethodNumerics):
     """How a droplet is computed: with particles a spacing apart at the start, or so many across the diameter."""
@@ -35,7 +37,8 @@ class Droplet(SphFlow):
     With a speed, or with Weber and Reynolds number, it strikes a wall, as a sphere that just touches it; then the
     contact angle is 90 degrees where none is given. With a contact angle alone it starts as a half sphere on the wall
     and comes to rest. With neither it is free, and starts as a sphere or a cube. Speed and viscosity may follow from
-    the Weber number rho U^2 D / gamma and the Reynolds number rho U D / mu.
+    the Weber number rho U^2 D / gamma and the Reynolds number rho U D / mu. Between receding and advancing angle the
+    wall holds the contact line; where one of them is not given it is the contact angle.
     """
 
     diameter: Annotated[float, Quantity("um")] = Field(gt=0)
@@ -43,7 +46,9 @@ class Droplet(SphFlow):
     speed: Annotated[float | None, Quantity("m/s")] = Field(None, gt=0)
     weber: float | None = Field(None, gt=0)
     reynolds: float | None = Field(None, gt=0)
-    contact_angle: Annotated[float | None, Quantity("deg")] = Field(None, ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)
+    contact_angle: WallAngle = None
+    advancing_angle: WallAngle = None
+    receding_angle: WallAngle = None
     gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
     start: Literal["sphere", "cube"] = "sphere"
     duration: Annotated[float, Quantity("us")] = Field(gt=0)
@@ -73,6 +78,15 @@ class Droplet(SphFlow):
     def angle(self) -> float:
         """The contact angle [rad]."""
         return RIGHT_ANGLE if self.contact_angle is None else self.contact_angle
+
+    @property
+    def bounds(self) -> tuple[float, float] | None:
+        """Cosines of the advancing and the receding angle; None where the contact angle is one."""
+        if self.advancing_angle is None and self.receding_angle is None:
+            return None
+        angles = (self.angle if one is None else one for one in (self.advancing_angle, self.receding_angle))
+        advancing, receding = (cos(one) for one in angles)
+        return advancing, receding
 
     @property
     def length(self) -> float:

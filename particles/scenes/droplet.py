@@ -62,7 +62,7 @@ def droplet(scene: Droplet) -> Simulation:
     pressure = np.full(points.shape[1], scene.laplace_pressure if tension else 0.0)
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), pressure, law)
     fields.w[:] = -scene.impact_speed
-    surface = LiquidSurface(*triangles, tension, cos(scene.angle), law)
+    surface = LiquidSurface(*triangles, tension, cos(scene.angle), law, scene.bounds)
     for _ in range(ENCLOSURES):
         surface.enclose(scene.volume)
     return Simulation(fields, points.shape[1], law, surface, flow.device_of(scene))
@@ -182,11 +182,11 @@ def base_width(points: Floats, spacing: float) -> float:
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
-    """Return the metrics whose exact values at rest are known: of a free sphere, of a cap without weight."""
+    """Return the metrics whose values at rest are known: of a free sphere, of a cap of one angle without weight."""
     if not scene.has_wall:
         return ("pressure_error", "roundness")
     weighs = decide_flow(scene)["droplet_gravity"]["on"]
-    return () if weighs or scene.impact_speed else ("base_error", "height_error")
+    return () if weighs or scene.impact_speed or scene.bounds else ("base_error", "height_error")
 
 
 def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:

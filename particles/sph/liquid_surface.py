@@ -77,6 +77,7 @@ class LiquidSurface:
         triangles: `(t, 3)`, outward oriented.
         tension: gamma [N/m].
         cosine: of the contact angle.
+        bounds: cosines of the advancing and the receding contact angle on the wall.
         law: of the particles.
         rings: contact lines, anticlockwise about liquid, as vertices `(k,)`; found where triangles end.
         moves: number of steps.
@@ -91,6 +92,7 @@ class LiquidSurface:
     tension: float
     cosine: float
     law: Law
+    bounds: tuple[float, float] | None = None
     rings: tuple[Indices, ...] = field(init=False)
     moves: int = 0
     rebuilds: int = 0
@@ -211,11 +213,31 @@ class LiquidSurface:
             result -= (share * (result * normals).sum(axis=1))[:, None] * normals
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
-            pull = 0.5 * self.tension * self.cosine
-            result[ring, 0] += pull * along[:, 1]
-            result[ring, 1] -= pull * along[:, 0]
+            outward = 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
+            result[ring, :2] += self.tension * self._cosines(ring, outward, result)[:, None] * outward
             result[ring, 2] = 0.0
         return result
+
+    def _cosines(self, ring: Indices, outward: Floats, forces: Floats) -> Floats:
+        """Cosines of the contact angle along a contact line `(k,)`.
+
+        Between advancing and receding angle the wall holds the line against what pulls at it: the free surface, and
+        the pressure of a liquid at rest below it.
+
+        Args:
+            ring: its vertices.
+            outward: `(k, 2)` normal in the wall, as long as the line about each vertex [m].
+            forces: `(m, 3)` of the free surface [N].
+        """
+        if self.bounds is None or not self.tension:
+            return np.full(len(ring), self.cosine)
+        _, area = volume_and_gradient(self.points, self.triangles, (), ())
+        free = np.linalg.norm(area, axis=1)
+        free[np.concatenate(self.rings)] = 0.0
+        pressure = -float((forces * area)[free > 0.0].sum() / (free**2).sum())
+        push = forces[ring, :2] + pressure * area[ring, :2]
+        needed = -(push * outward).sum(axis=1) / (self.tension * (outward**2).sum(axis=1))
+        return np.clip(needed, *self.bounds)
 
     def _mean_curvature(self, steep: Floats) -> float:
         """Mean over the surface of the sum of its curvatures [1/m]; ``steep`` is the gradient of the area."""

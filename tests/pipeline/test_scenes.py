@@ -202,6 +202,9 @@ def test_drops_are_printed_from_case_file_to_report(tmp_path):
     assert "report: " in ended.stdout, ended.stderr
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert {"drops", "volume_error", "connected_parts_max", "roughness_sa", "volume_drift"} <= summary["metrics"].keys()
+    assert summary["metrics"]["outcome"]["value"] == "separate"
+    page = (tmp_path / "run/report.html").read_text()
+    assert "<h2>Printed part</h2>" in page and "Sa [µm]" in page and "6.37" in page and "mm³" not in page
     assert {"part.stl", "height_map.png"} <= {path.name for path in (tmp_path / "run/particles").iterdir()}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.scenes.droplet import droplet, solve_droplet
 
@@ -41,6 +41,29 @@ def test_a_drop_on_a_wall_becomes_a_cap():
 @pytest.mark.parametrize(("degrees", "duration", "slack"), [(60.0, 250e-6, 0.02), (120.0, 350e-6, 0.03)])
 def test_drops_on_walls_that_they_wet_or_not_become_caps(degrees, duration, slack):
     assert_cap(ink(14, duration, contact_angle=np.radians(degrees)), slack)
+
+
+@pytest.mark.parametrize(
+    ("receding", "advancing", "angle"), [(60.0, 120.0, 90.0), (100.0, 130.0, 100.0), (50.0, 80.0, 80.0)]
+)
+def test_a_contact_line_moves_only_beyond_its_advancing_and_receding_angle(receding, advancing, angle):
+    """A half sphere on a wall: it stays, recedes to the receding angle or advances to the advancing one."""
+    contact, bounds = np.radians(0.5 * (receding + advancing)), np.radians([receding, advancing])
+    scene = ink(10, 80e-6, contact_angle=contact, receding_angle=bounds[0], advancing_angle=bounds[1])
+    result = solve_droplet(scene)
+    base, height = cap(np.radians(angle))
+    assert value(result, "base_over_diameter") == pytest.approx(base, rel=0.03)
+    assert value(result, "height_over_diameter") == pytest.approx(height, rel=0.03)
+    assert "base_error" not in result.metrics
+
+
+def test_one_angle_is_what_it_was_without_bounds():
+    one, two = (droplet(ink(8, 1.0, contact_angle=1.2, **more)) for more in ({}, {"advancing_angle": 1.2}))
+    for simulation in (one, two):
+        for _ in range(20):
+            simulation.step(1e-8)
+    assert two.surface.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
+    assert np.allclose(one.surface.points, two.surface.points, rtol=0.0, atol=1e-12 * one.law.spacing)
 
 
 def test_an_impact_spreads_as_volumes_of_fluid_do():

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 from reflowshock.fem.materials.parameters import Material
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from reflowshock.meshing.board.estimate import PartEstimate
     from reflowshock.workflow.package.case import BoardDropCase
 
 MACRO = "board"  # role of the parts whose elements the window follows
 BOXES = ("board", "substrate", "die")  # roles whose elements are boxes, but for columns
 IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
+MOST_ELEMENTS = 10_000_000  # of a part whose shapes are looked at; more are never meshed
 COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
 
 
@@ -90,9 +94,9 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
     scaled = case.shock.numerics.mass_scaled
     step = {name: box_critical_step(material_of(case, name), np.array(of.smallest)) for name, of in estimates.items()}
     for name, part in estimates.items():
-        if part.shapes:
-            skewed = skewed_critical_step(material_of(case, name), np.array(part.shapes))
-            step[name] = min(step[name], float(skewed.min()))
+        shapes = np.array(part.shapes) if part.shapes else _joint_shapes(case, name, part)
+        if len(shapes):
+            step[name] = min(step[name], float(skewed_critical_step(material_of(case, name), shapes).min()))
     heavier = {name for name in step if role_of(name) in scaled or (name.endswith(COLUMN) and IN_COLUMN in scaled)}
     others = min((step[name] for name in step if name not in heavier), default=min(step.values()))
     target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
@@ -108,6 +112,23 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
         )
         for name, part in estimates.items()
     }
+
+
+def _joint_shapes(case: "BoardDropCase", name: str, part: "PartEstimate") -> "NDArray[np.float64]":
+    """Return the edges ``(n, 3, 3)`` [m] of the shapes of upright elements of joints; of other parts none."""
+    import numpy as np
+
+    from reflowshock.meshing.joint.swept import section_edges
+
+    package = case.package
+    fine = package.joint_numerics
+    numerics = {"solder": fine, "copper": fine, "solder_coarse": package.coarse_joint_numerics}.get(name)
+    if numerics is None or part.elements > MOST_ELEMENTS:
+        return np.empty((0, 3, 3))
+    flat = section_edges(numerics, min(pad.wetted_radius for pad in (package.board_pad, package.package_pad)))
+    shapes = np.zeros((len(flat), 3, 3))
+    shapes[:, :2, :2], shapes[:, 2, 2] = flat, part.smallest[2]
+    return shapes
 
 
 def is_linear(parts: Parts) -> bool:

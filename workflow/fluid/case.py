@@ -109,9 +109,22 @@ def of_droplet(case: DropletCase) -> list[Problem]:
     if drop.reynolds is not None and not drop.impact_speed:
         allowed = "together with droplet.speed or droplet.weber"
         found.append(Problem("droplet.reynolds", "says nothing without an impact", drop.reynolds, allowed))
-    found += _of_particles("droplet", drop) + of_rheology("droplet", drop)
+    found += _of_particles("droplet", drop) + of_rheology("droplet", drop) + _of_hysteresis(drop)
     if drop.has_wall and drop.start != "sphere":
         found.append(Problem("droplet.start", "only a free drop starts as a cube", drop.start, "sphere"))
+    return found
+
+
+def _of_hysteresis(drop: Droplet) -> list[Problem]:
+    """Find advancing and receding angles without a wall, or on the wrong side of the contact angle."""
+    found = []
+    for name, given, side in (("advancing", drop.advancing_angle, 1.0), ("receding", drop.receding_angle, -1.0)):
+        key = f"droplet.{name}_angle"
+        if given is not None and not drop.has_wall:
+            found.append(Problem(key, "says nothing without a wall", _degrees(given), "together with a contact angle"))
+        elif given is not None and side * (given - drop.angle) < 0.0:
+            allowed = f"{'>=' if side > 0.0 else '<='} {_degrees(drop.angle)}, the contact angle"
+            found.append(Problem(key, "is on the wrong side of the contact angle", _degrees(given), allowed))
     return found
 
 
@@ -189,6 +202,10 @@ def of_rheology(kind: str, scene: SphFlow) -> list[Problem]:
         allowed = f"< {from_si(scene.liquid_viscosity, 'mPa*s', digits=3)}, the viscosity at rest"
         return [Problem(f"{kind}.rheology.viscosity_at_infinity", "is not below that at rest", value, allowed)]
     return []
+
+
+def _degrees(angle: float) -> str:
+    return from_si(angle, "deg", digits=3)
 
 
 def metres(length: float) -> str:

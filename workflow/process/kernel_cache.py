@@ -27,21 +27,27 @@ def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -
     named = environment.get(VARIABLE)
     if named and _is_made(Path(named)):
         return
-    name = f"kernels-{digest()}"
-    with suppress(RuntimeError):  # this user has no home
-        home = environment.get("HOME") or Path.home()
-        folder = Path(environment.get("XDG_CACHE_HOME") or Path(home, ".cache")) / "reflowshock" / name
-        if _is_made(folder):
-            environment[VARIABLE] = str(folder)
-            return
+    folder = _usual_folder(environment)
+    if folder and _is_made(folder):
+        environment[VARIABLE] = str(folder)
+        return
     environment[VARIABLE] = tempfile.mkdtemp(prefix="reflowshock-kernels-")
 
 
 def compilation(stages: Iterable[str], environment: Mapping[str, str] = os.environ) -> float:
     """Predict for how long [s] stages will compile kernels: not at all where a run by these sources has done it."""
-    folder = environment.get(VARIABLE)
-    kept = {path.name.rpartition("-")[0] for path in Path(folder).rglob("*.nbi")} if folder else set()
+    named = environment.get(VARIABLE)
+    folder = Path(named) if named else _usual_folder(environment)
+    kept = {path.name.rpartition("-")[0] for path in folder.rglob("*.nbi")} if folder else set()
     return sum(seconds for stage, (kernel, seconds) in KERNELS.items() if stage in stages and kernel not in kept)
+
+
+def _usual_folder(environment: Mapping[str, str]) -> Path | None:
+    """Return the folder of the present sources; None where the user has no home."""
+    with suppress(RuntimeError):
+        home = environment.get("HOME") or Path.home()
+        return Path(environment.get("XDG_CACHE_HOME") or Path(home, ".cache")) / "reflowshock" / f"kernels-{digest()}"
+    return None
 
 
 def _is_made(folder: Path) -> bool:

@@ -211,4 +211,5 @@ def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
     for row in rows:
         if row.verdict != HEALTHY:
             print_error(f"point {row.number} {row.key} {row.verdict}: {row.message}")
-    console.print(f"results: {folder}/study.html, results.csv, results.parquet, main_effects.png")
+    pictures = [name for name in ("main_effects.png", "process_map.png") if (folder / name).exists()]
+    console.print(f"results: {folder}/" + ", ".join(("study.html", "results.csv", "results.parquet", *pictures)))

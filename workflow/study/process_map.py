@@ -51,7 +51,8 @@ def process_map(study: Study, metric: str, rows: Sequence[Row]) -> Figure | None
         else:
             axis.set_yticks([])
         axis.margins(0.1, 0.2)
-        axis.legend(title=metric.replace("_", " "), loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+        title, place = metric.replace("_", " "), (1.01, 0.5)
+        axis.legend(title=title, loc="center left", bbox_to_anchor=place, frameon=False, labelspacing=1.0)
     return figure
 
 

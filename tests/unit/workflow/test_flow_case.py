@@ -69,6 +69,12 @@ BAD_VALUES = {
         [one.replace("droplet", "taylor_green") for one in CARREAU],
         ["taylor_green.rheology", "no exact solution is known"],
     ),
+    "advancing below the contact angle": (
+        CAP,
+        ["droplet.contact_angle=90 deg", "droplet.advancing_angle=80 deg"],
+        ["droplet.advancing_angle", "wrong side", ">= 90 deg"],
+    ),
+    "receding without a wall": (FREE, "droplet.receding_angle=80 deg", ["receding_angle", "without a wall"]),
     "unknown key": (VORTICES, "taylor_green.sides=1 mm", ["taylor_green.sides", "unknown key", "side"]),
 }
 

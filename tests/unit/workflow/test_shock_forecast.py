@@ -113,6 +113,15 @@ def test_elements_around_holes_set_the_window_where_they_are_the_smallest():
     assert forecast_parts(case)["board"].critical_step == pytest.approx(49.82e-9, rel=0.005)
 
 
+def test_elements_of_a_section_set_the_steps_of_joints():
+    """The meshes of hu_bga_drop: 3.469 ns of copper, 5.646 ns of solder; 3, 9 and 18 steps a window."""
+    case = read_case(CASES / "hu_bga_drop/case.toml", ["scale=physical", "shock.numerics.kinematics=corotational"])
+    parts = two_scale_parts(case)
+    assert parts["copper"].critical_step == pytest.approx(3.469e-9, rel=0.003)
+    assert parts["solder"].critical_step == pytest.approx(5.646e-9, rel=0.003)
+    assert [level.count for level in forecast_shock(case, forecast_parts(case)).levels] == [1, 3, 9, 18]
+
+
 def test_no_more_levels_than_the_kernels_have_paces():
     assert MOST_LEVELS == PACES
 
