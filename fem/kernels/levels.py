@@ -186,17 +186,20 @@ def take_steps(motion, forces, interface, accelerations, step):
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
     pushed, due = np.zeros_like(motion.ahead), len(motion.ahead) > 0
-    work = 0.0
-    for k in range(len(accelerations) - 1):
+    work, last = 0.0, len(accelerations) - 2
+    place = first_moment(motion.counted_mass, displacement)
+    for k in range(last + 1):
         move_interface(interface, k, velocity)
         if due:
             add_ahead(motion.ahead, force)
         advance(motion.state, motion.mobility, accelerations[k], step)
         moved = slaves_moved(motion, forces, k + 1)
         spread_to_slaves(motion.slave[:moved], motion.master[:moved], motion.weight[:moved], displacement)
-        mean = 0.5 * (accelerations[k] + accelerations[k + 1])
-        if mean.any():
-            work += step * power_of(mean, motion.counted_mass, velocity)
+        mean = accelerations[k] + accelerations[k + 1]
+        if k == last or np.any(mean != accelerations[k + 1] + accelerations[k + 2]):
+            before, place = place, first_moment(motion.counted_mass, displacement)
+            for c in range(3):  # of all steps since the mean changed: the sum of dt v is what the nodes have moved
+                work += 0.5 * mean[c] * (place[c] - before[c])
         which, block, pace, due = add_paced_forces(motion, forces, k + 1, pushed)
         if which != ALL_FINE:
             return work, k + 1, which, block, pace
@@ -205,7 +208,7 @@ def take_steps(motion, forces, interface, accelerations, step):
             add_impulse(interface.counted, force, interface.weights[k + 1, j], interface.impulses[j])
             if due:
                 add_impulse(interface.counted, motion.ahead, interface.weights[k + 1, j], interface.impulses[j])
-    return work, len(accelerations) - 1, ALL_FINE, 0, 0
+    return work, last + 1, ALL_FINE, 0, 0
 
 
 @njit(cache=True)
@@ -280,14 +283,14 @@ def gather_forces(motion, moved, due):
 
 
 @njit(cache=True, fastmath=FINITE)
-def power_of(acceleration, mass, velocity):
-    """Return the power [W] of an acceleration ``(3,)`` on masses ``(n,)`` at velocities ``(n, 3)``."""
+def first_moment(mass, places):
+    """Return the sum of masses ``(n,)`` times places ``(n, 3)``."""
     x = y = z = 0.0
     for i in range(len(mass)):
-        x += mass[i] * velocity[i, 0]
-        y += mass[i] * velocity[i, 1]
-        z += mass[i] * velocity[i, 2]
-    return acceleration[0] * x + acceleration[1] * y + acceleration[2] * z
+        x += mass[i] * places[i, 0]
+        y += mass[i] * places[i, 1]
+        z += mass[i] * places[i, 2]
+    return x, y, z
 
 
 @njit(cache=True)

@@ -19,10 +19,11 @@ import numpy as np
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.facets import nearest_on_triangles
 from reflowshock.meshing.core.hexahedra import boundary_quads, quad_areas
+from reflowshock.meshing.joint.butterfly import circumradius
 from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.joint_mesh import JointMesh, JointMeshError, check_errors
 from reflowshock.meshing.joint.solder import Solder
-from reflowshock.meshing.joint.swept import Placing, circumradius, swept_solder
+from reflowshock.meshing.joint.swept import Placing, swept_solder
 from reflowshock.meshing.joint.tetrahedra import fill_apart
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,

@@ -19,8 +19,9 @@ from reflowshock.meshing.board.package_side import PackageSide, underside
 from reflowshock.meshing.board.pads import PadSite
 from reflowshock.meshing.board.parameters import Board, JointNumerics, Package
 from reflowshock.meshing.board.plan import column_levels
+from reflowshock.meshing.joint.butterfly import Butterfly, butterfly
 from reflowshock.meshing.joint.solder import Side
-from reflowshock.meshing.joint.swept import Butterfly, butterfly, section_nodes
+from reflowshock.meshing.joint.swept import section_nodes
 
 
 @dataclass(frozen=True, slots=True)

@@ -221,7 +221,11 @@ def test_a_flow_goes_from_case_file_to_report(tmp_path, name, settings, metrics)
     assert "report: " in ended.stdout, ended.stderr
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert metrics | {"volume_drift", "particles", "particle_steps_per_second"} <= summary["metrics"].keys()
-    assert summary["effects"].keys() == {"flow_viscosity", "artificial_viscosity"}
+    assert summary["effects"].keys() == {
+        "flow_viscosity",
+        "artificial_viscosity",
+        "shear_dependent_viscosity",
+    }
     page = (tmp_path / "run/report.html").read_text()
     assert "<h2>Flow</h2>" in page
     assert (tmp_path / "run/particles/particles.vtu").exists()

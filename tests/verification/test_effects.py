@@ -52,17 +52,20 @@ G, STEPS = scene.G, 40
 Check = Callable[..., None]
 OFF: dict[str, Check] = {}
 ON: dict[str, Check] = {}
+RHEOLOGY = "tests/unit/particles/test_rheology.py"
 # What needs a whole run is tested where there is one.
 ELSEWHERE_OFF = {
     "identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path",
     "flow_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
     "artificial_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
+    "shear_dependent_viscosity": f"{RHEOLOGY}::test_shear_dependence_acts_where_it_is_given_and_viscosity_acts",
     "droplet_tension": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
     "droplet_gravity": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
 }
 ELSEWHERE_ON = {
     "flow_viscosity": "tests/verification/test_particles_flows.py::test_viscosity_that_is_left_out_changes_nothing",
     "artificial_viscosity": "tests/verification/test_particles_flows.py::test_little_artificial_viscosity_does_little",
+    "shear_dependent_viscosity": f"{RHEOLOGY}::test_an_exponent_of_one_computes_what_constant_viscosity_does",
     "droplet_tension": "tests/verification/test_particles_droplets.py::test_little_tension_does_little",
     "droplet_gravity": "tests/verification/test_particles_droplets.py::test_little_weight_does_little",
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",

@@ -6,7 +6,8 @@ import pytest
 from reflowshock.cases.hard.trials.surfaces import truncated_sphere
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.hexahedra import volumes
-from reflowshock.meshing.joint.swept import butterfly, layer_cells, solder_levels
+from reflowshock.meshing.joint.butterfly import butterfly
+from reflowshock.meshing.joint.swept import layer_cells, solder_levels
 from reflowshock.meshing.surface.closed_surface import close_surface, enclosed_volume, measure
 
 RADIUS, HALF_GAP = 0.3e-3, 0.15e-3

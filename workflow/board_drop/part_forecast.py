@@ -118,7 +118,7 @@ def _joint_shapes(case: "BoardDropCase", name: str, part: "PartEstimate") -> "ND
     """Return the edges ``(n, 3, 3)`` [m] of the shapes of upright elements of joints; of other parts none."""
     import numpy as np
 
-    from reflowshock.meshing.joint.swept import section_edges
+    from reflowshock.meshing.joint.butterfly import section_edges
 
     package = case.package
     fine = package.joint_numerics

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from reflowshock.cases.hard.trials.surfaces import revolve
 from reflowshock.meshing.core.facets import cut_segments, radius_by_angle, section_area, section_centroid
-from reflowshock.meshing.joint.swept import butterfly
+from reflowshock.meshing.joint.butterfly import butterfly
 
 
 @pytest.mark.parametrize("height", [0.4e-3, 0.5e-3])  # between vertices, and exactly at a level of them

@@ -7,10 +7,11 @@ from reflowshock.cases.hard.trials.packages import board, package, side_of
 from reflowshock.cases.hard.trials.surfaces import barrel, with_void
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.core.hexahedra import quad_areas, scaled_jacobian
+from reflowshock.meshing.joint.butterfly import butterfly
 from reflowshock.meshing.joint.column import column_pad, columns_of
 from reflowshock.meshing.joint.joint_mesh import CopperPads, JointPlace, build_joint
 from reflowshock.meshing.joint.solder_mesh import mesh_coarse_or_fine, mesh_joint
-from reflowshock.meshing.joint.swept import butterfly, swept_solder
+from reflowshock.meshing.joint.swept import swept_solder
 from tests.unit.meshing.test_column import BOWED, MM, NSMD, NUMERICS, standing
 
 LAYERS = NUMERICS | {"layers": 7}
