@@ -128,10 +128,12 @@ class WindowMotion(ExplicitMotion):
         before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
         return now + 0.5 * (self._substeps - 1) * (now - before)
 
-    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+    def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
         """Return the same at the ends of all substeps of a window: but for the last one it does not change."""
-        first, last = self.body_acceleration(times[0]), self.body_acceleration(times[-1])
-        return [*[first] * (len(times) - 1), last]
+        found, now = np.empty((len(times), 3)), self.window_acceleration(times[-1])
+        found[:] = self.window_acceleration(self.time)
+        found[-1] = now + 0.5 * (self._substeps - 1) * (now - found[0])
+        return found
 
     def window_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""
@@ -163,16 +165,13 @@ class Driven(Continued):
         motion, counted = self.motion, self._counted
         self._channels.velocities.receive(motion.velocity)
         given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
-        change, impulses = np.outer(self._lags, acceleration), np.zeros((2, len(counted), 3))
-        push = motion.push()
-        for weight, sum_so_far in zip(self._weights[0], impulses, strict=True):
-            add_impulse(counted, push, weight, sum_so_far)
+        change, impulses = self._lags[:, None] * acceleration, np.zeros((2, len(counted), 3))
         motion.take_steps(
             self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
         )
         motion.velocity[self._interface] = given
         impulse, lagging = impulses
-        return -float(np.sum(impulse * motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
+        return -float(np.vdot(impulse, motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
 
     def finish_window(self) -> None:
         """Do nothing: the window is done."""
