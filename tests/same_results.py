@@ -35,7 +35,7 @@ HEATED = (
 # A drop in which solder that has cooled hardly flows would amplify rounding: its plastic work starts with the drop.
 COOLED = (
     "thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405",
-    "shock.peak_acceleration=15000 G",
+    "shock.numerics.plasticity=on", "shock.peak_acceleration=15000 G",
 )  # fmt: skip
 QUICK = ("scale=quick",)
 COARSE_DROP = ("drop.particles_per_edge=7",)

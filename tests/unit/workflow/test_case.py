@@ -89,7 +89,7 @@ BAD_VALUES = {
         ["shock.failure.life.scatter", "out of range", ">= 1"],
     ),
     "linear steps of solder that yields": (
-        'materials.solder={ plasticity = { A = "38 MPa" } }\nshock.numerics.dns_solver=implicit',
+        "shock.numerics.plasticity=on\nshock.numerics.dns_solver=implicit",
         ['shock.numerics.dns_solver = "implicit"', "solder yields", "allowed: explicit"],
     ),
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
