@@ -116,8 +116,13 @@ class StepsAtOnce:
         Raises:
             InvertedElementError: An element is turned inside out; the motion's time is that of the step.
         """
-        tied = *self.tied, self.order, self.moved, self.ends, motion.slave_force
-        steps = StepArrays(*state, motion.mobility, motion.counted_mass, *tied)
+        steps = StepArrays(
+            *(*state, motion.mobility, motion.counted_mass, *self.tied),
+            order=self.order,
+            moved=self.moved,
+            ends=self.ends,
+            slave_force=motion.slave_force,
+        )
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
         for _ in range(taken):
             motion.time += motion.step
