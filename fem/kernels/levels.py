@@ -202,26 +202,30 @@ def take_steps(motion, forces, interface, accelerations, step):
         Work of the accelerations [J]; steps taken; what ``add_forces`` returned last; at which pace that was.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
-    last, pushed = len(accelerations) - 1, np.zeros_like(motion.ahead)
+    last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
     means = 0.5 * (accelerations[:-1] + accelerations[1:])
     steady = means[last // 2].copy()
     body, work = (accelerations, means - steady), 0.0
     start = first_moment(motion.counted_mass, displacement)
     add_ahead(motion.ahead, force)
     count_impulses(interface, 0, force)
+    held = interface.rows.min() if len(interface.rows) else len(velocity)
     for k in range(1, last + 1):
         reach = moved = begin = 0
         for pace in range(PACES):
             if acts(forces, pace, k):
-                reach, moved = motion.ends[pace], motion.moved[pace]
-                work += move_nodes(motion, interface, (begin, reach, forces.every[pace], k), body, step)
+                reach, moved, block = motion.ends[pace], motion.moved[pace], (begin, motion.ends[pace], every[pace], k)
+                if reach > held:
+                    move_interface(interface, block, velocity)
+                work += move_nodes(motion, block, body, step)
             begin = motion.ends[pace]
         spread_to_slaves(motion.slave[:moved], motion.master[:moved], motion.weight[:moved], displacement)
-        which, block, pace = add_paced_forces(motion, forces, k, pushed, k == last)
+        which, place, pace = add_paced_forces(motion, forces, k, pushed, k == last)
         if which != ALL_FINE:
-            return work, k, which, block, pace
+            return work, k, which, place, pace
         gather_forces(motion, moved, k == last)
-        count_impulses(interface, k, force[:reach])
+        if reach > held:
+            count_impulses(interface, k, force[:reach])
     count_impulses(interface, last, motion.ahead)
     move_interface(interface, (0, len(velocity), 1, last), velocity)
     end = first_moment(motion.counted_mass, displacement)
@@ -244,12 +248,11 @@ def acts(forces, pace, substep):
 
 
 @njit(cache=True)
-def move_nodes(motion, interface, block, body, step):
+def move_nodes(motion, block, body, step):
     """Move some nodes by the steps since something acted on them, and zero their force.
 
     Args:
         motion: As in ``take_steps``.
-        interface: As there.
         block: First node, end, steps to be taken and the number of the last of them.
         body: Accelerations, and what their means over steps have beside the steady part.
         step: dt [s].
@@ -259,7 +262,6 @@ def move_nodes(motion, interface, block, body, step):
     """
     begin, end, count, substep = block
     velocity, kicks = motion.state[1], np.empty((3, 3))
-    move_interface(interface, block, velocity)
     accelerations, changes = body[0][substep - count : substep], body[1][substep - count : substep]
     kicks_of(accelerations, step, kicks)
     move(motion.state, motion.mobility, (begin, end), kicks, (step, count))
