@@ -21,7 +21,8 @@ Parts, each by itself where it is named; figures of earlier calls stay:
   degrees and strained by half a per cent, and the block flows: its elements have their tangents. One-point elements;
   ``growth_of_modes``, ``errors_of_modes``: those with incompatible modes.
 
-Sides take turns; ratios are of processor seconds. Bars that stand in ``not_measured`` need longer runs.
+Sides take turns; ratios are of processor seconds. Wall times of whole cases are those of their runs in ``runs``; where
+there is none, ``not_measured`` has the command.
 """
 
 import argparse
@@ -47,6 +48,7 @@ from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.kept_rows import KeptRows
 from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
+from benchmarks.support.whole_runs import found_in_runs
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
 from reflowshock.cases.hard.trials.bodies import motion_of, nonlinear_body
@@ -97,10 +99,6 @@ PEERS = {  # law -> material, strain, peers that have it, elements of this progr
     "plastic": (IDEAL_SOLDER, 3e-3, ("kratos",), ("one_point", "incompatible_modes")),
 }
 PEER_BAR, SAME_FORCES = 20.0, 1e-3  # of J2 and of Green's strain instead of the stretch: of the order of the strain
-NOT_MEASURED = {
-    "default case, answer complete": "its run folder tells: reflowshock run cases/jedec_bga/case.toml",
-    "hu_bga_drop, full size, finite + J2, two scales": "its run folder tells: --set scale=physical",
-}
 Bars = dict[str, dict[str, Any]]
 
 
@@ -378,11 +376,13 @@ def main() -> None:
     options = parser.parse_args()
     parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
-    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
+    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}}
     for name in chosen:
         bars, rest = parts[name]()
         found["bars"] |= bars
         found[name] = rest
+        bars, found["not_measured"] = found_in_runs()
+        found["bars"] |= bars
         turns.write("nonlinear", found)
 
 
