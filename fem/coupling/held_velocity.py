@@ -175,7 +175,6 @@ class Driven(Continued):
         motion.take_steps(
             self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
         )
-        motion.velocity[self._interface] = given
         impulse, lagging = impulses
         lag = lagging.sum(axis=0) @ acceleration if acceleration.any() else 0.0
         return -float(np.vdot(impulse, given[self._owned]) + lag)

@@ -150,7 +150,7 @@ class ExplicitMotion(Motion):
             ends.append(ends[-1] + self.step)
         accelerations = np.concatenate([self.gravity[None], self.accelerations(ends[1:])])
         state = self._state, self.ahead
-        self._body_work += self._at_once.take(self, state, interface or no_interface(count), accelerations)
+        self._body_work += self._at_once.take(self, state, interface or no_interface(count), (ends, accelerations))
         self.gravity = accelerations[-1]
 
     def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
@@ -168,6 +168,8 @@ class ExplicitMotion(Motion):
             self.update_force()
             if interface is not None:
                 count_impulses(interface, k + 1, self.push())
+        if interface is not None:
+            self.velocity[interface.rows] = interface.given
 
     def push(self) -> NDArray[np.float64]:
         """Return the impulse over dt ``(n, 3)`` [N] of the step that begins: the force, and what acts for others."""

@@ -103,19 +103,24 @@ class StepsAtOnce:
         return cls(paced_forces_of(arrays, every), order, tied, moved, ends, [found[pace] for pace in paces])
 
     def take(
-        self, motion: Motion, state: tuple[np.ndarray, np.ndarray], interface: Interface, accelerations: np.ndarray
+        self,
+        motion: Motion,
+        state: tuple[np.ndarray, np.ndarray],
+        interface: Interface,
+        course: tuple[Sequence[float], np.ndarray],
     ) -> float:
-        """Take steps; return the work of the accelerations ``(m + 1, 3)`` [m/s^2] at the ends of steps [J].
+        """Take steps; return the work of the accelerations [J].
 
         Args:
             motion: Of which ``state`` is the ``state`` and ``ahead`` of ``StepArrays``.
             state: See above.
             interface: See ``take_steps``.
-            accelerations: See above.
+            course: Times [s] as each of m steps begins and after the last; accelerations ``(m + 1, 3)`` [m/s^2] then.
 
         Raises:
             InvertedElementError: An element is turned inside out; the motion's time is that of the step.
         """
+        times, accelerations = course
         steps = StepArrays(
             *(*state, motion.mobility, motion.counted_mass, *self.tied),
             order=self.order,
@@ -124,8 +129,7 @@ class StepsAtOnce:
             slave_force=motion.slave_force,
         )
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
-        for _ in range(taken):
-            motion.time += motion.step
+        motion.time = times[taken]
         if which != ALL_FINE:
             error: InvertedElementError = self.terms[pace][NAMES[which]].inverted(block, motion.displacement)
             raise error

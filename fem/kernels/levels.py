@@ -131,7 +131,7 @@ class Interface(NamedTuple):
     Attributes:
         rows: ``(k,)`` int32 its nodes on this rank.
         counted: ``(c,)`` int32 those that count on this rank.
-        given: ``(k, 3)`` [m/s] their mean velocity.
+        given: ``(k, 3)`` [m/s] their mean velocity, which they have afterwards.
         change: ``(m, 3)`` [m/s] of it in each step.
         weights: ``(m + 1, 2)`` [s], [s^2] of the force before the first step and after each in both impulses.
         impulses: ``(2, c, 3)`` [N s], [N s^2], added to.
@@ -227,7 +227,9 @@ def take_steps(motion, forces, interface, accelerations, step):
         if reach > held:
             count_impulses(interface, k, force[:reach])
     count_impulses(interface, last, motion.ahead)
-    move_interface(interface, (0, len(velocity), 1, last), velocity)
+    for i in range(len(interface.rows)):
+        for c in range(3):
+            velocity[interface.rows[i], c] = interface.given[i, c]
     end = first_moment(motion.counted_mass, displacement)
     for c in range(3):
         work += steady[c] * (end[c] - start[c])
