@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.neighbours import find_beside, have_moved
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import surface_loops
@@ -191,7 +191,7 @@ class LiquidSurface:
         Raises:
             SurfaceLost: there are no particles beside a vertex.
         """
-        self._update_lists(np.array(fields[:3])[:, :carriers])
+        self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
         self._shares = np.empty((2, len(self._lists[1])))
         surface_loops.find_shares(self.points, self._lists, fields, self.law, self._shares)
         starts = self._lists[0][:-1]
@@ -271,20 +271,16 @@ class LiquidSurface:
         self._find_wetness()
 
     def _update_lists(self, liquid: Floats) -> None:
-        """Find the particles beside each vertex again when either has moved half the skin."""
-        together = np.concatenate((liquid.T, self.points))
-        if len(together) == len(self._built_at):
-            moved = ((together - self._built_at) ** 2).sum(axis=1).max()
-            if moved <= (0.5 * SKIN * self.law.spacing) ** 2:
-                return
-        self._list(together)
+        """Find the particles `(n, 3)` beside each vertex again when some have moved by the skin."""
+        together = np.concatenate((self.points, liquid))
+        skin = SKIN * self.law.spacing
+        if len(together) != len(self._built_at) or have_moved(together, self._built_at, skin):
+            self._list(together)
 
     def _list(self, together: Floats) -> None:
-        self._built_at = together
+        self._built_at, vertices = together, len(self.points)
         reach = SUPPORT * self.law.length + SKIN * self.law.spacing
-        self._lists = surface_loops.rows_of_vertices(
-            *find_neighbours(together, reach), len(together) - len(self.points)
-        )
+        self._lists = find_beside(together[:vertices], together[vertices:], reach)
 
     def _wet(self) -> None:
         """Keep vertices above the wall, contact lines on it; triangles that have come down on it are wet."""

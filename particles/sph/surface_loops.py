@@ -7,27 +7,9 @@ is kept. Above a wall in z = 0 the images of particles count too: they move and 
 
 from math import sqrt
 
-import numpy as np
 from numba import njit, prange
 
 from reflowshock.particles.sph.smoothing import WENDLAND_C2, shape
-
-
-@njit(cache=True)
-def rows_of_vertices(offsets, indices, liquid):
-    """Return offsets and indices of the particles beside each vertex, from lists of particles and vertices together."""
-    vertices = offsets.shape[0] - 1 - liquid
-    starts = np.zeros(vertices + 1, np.int32)
-    for v in range(vertices):
-        starts[v + 1] = starts[v]
-        for k in range(offsets[liquid + v], offsets[liquid + v + 1]):
-            starts[v + 1] += indices[k] < liquid
-    found, place = np.empty(starts[vertices], np.int32), 0
-    for k in range(offsets[liquid], offsets[liquid + vertices]):
-        if indices[k] < liquid:
-            found[place] = indices[k]
-            place += 1
-    return starts, found
 
 
 @njit(cache=True, parallel=True)
