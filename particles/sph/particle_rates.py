@@ -63,6 +63,12 @@ def closing_in(k, velocity, d, fields):
 
 
 @compiled
+def pulls_not(law):
+    """Whether walls do not pull at liquid: where it has a surface that is not tracked."""
+    return law.has_surface and not law.tracked
+
+
+@compiled
 def own_viscosity(i, fields, law):
     """Return the viscosity of a particle [Pa s]; 0 where viscosity does not act."""
     return positive(fields.viscosity[i] if law.rheology else law.viscosity)
@@ -168,7 +174,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
     scale = law.norm * inverse * inverse
     softening = pair_terms.SOFTENING * law.length * law.length
     level = shape(law.kernel, line, law.spacing * inverse)
-    own = positive(pressure) if law.has_surface else pressure  # walls do not pull
+    own = positive(pressure) if pulls_not(law) else pressure
     viscosity = own_viscosity(i, fields, law) / density if law.no_slip else 0.0
     along = 2.0 * (law.dimension + 2) * viscosity if law.has_surface else 0.0
     aside = 0.0 if law.has_surface else 2.0 * viscosity
@@ -278,4 +284,4 @@ def wall_values(i, fluids, neighbours, fields, law):
     room, share = fields.wall_room[k], 1.0
     if room > law.norm * liquid:
         share = law.norm * liquid / room
-    return positive(pressure) if law.has_surface else pressure, u, v, w, share
+    return positive(pressure) if pulls_not(law) else pressure, u, v, w, share

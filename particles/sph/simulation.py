@@ -145,6 +145,11 @@ class Simulation:
         u, v, w = (speed[: self.fluids] for speed in (self.fields.u, self.fields.v, self.fields.w))
         return float(np.sqrt((u * u + v * v + w * w).max()))
 
+    @property
+    def pressures(self) -> Floats:
+        """Of the particles of the liquid `(fluids,)` [Pa], with that of its surface."""
+        return self.fields.pressure[: self.fluids] + (self.surface.pressure if self.surface else 0.0)
+
     def saved(self) -> dict[str, Any]:
         """All of it, for a checkpoint."""
         return {
@@ -190,8 +195,7 @@ class Simulation:
             volume = float((fields.mass[carriers] / fields.density[carriers]).sum())
             velocity = np.pad(np.array(middle) + drift, ((0, 0), (0, self.held)))
             self.surface.move(velocity, time_step, volume)
-        if self.law.mirror:
-            self._reflect(middle)
+        self._reflect(middle[2])
         density = fields.density[liquid] + half * rates[0]
         fields.density[liquid] += time_step * rates[0]
         self._find_rates()
@@ -202,10 +206,12 @@ class Simulation:
         self.time += time_step
         self.steps += 1
 
-    def _reflect(self, middle: list[Floats]) -> None:
+    def _reflect(self, *speeds: Floats) -> None:
         """Let a particle that has passed through the mirror change places with its image, whose motion is its own."""
+        if not self.law.mirror:
+            return
         through = np.flatnonzero(self.fields.z[: self.fluids] < 0.0)
-        for across in (self.fields.z, self.fields.w, self.fields.slope_z, middle[2]):
+        for across in (self.fields.z, self.fields.w, self.fields.slope_z, *speeds):
             across[through] *= -1.0
 
     def _find_rates(self) -> None:
@@ -239,3 +245,4 @@ class Simulation:
         factor = 4.0 * law.shifting * self.fastest * law.length * time_step
         for axis in range(3):
             self.fields[axis][: self.fluids] -= factor * self.rates[7 + axis]
+        self._reflect()
