@@ -108,9 +108,11 @@ class GalerkinPast:
         return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
 
     def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: they have the velocity there."""
+        """The past of particles that are now elsewhere: they have the velocity there, and none where an edge holds them."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        return replace(self, points=body.points, velocity=physics.admit(body, self.velocity + change))
+        velocity = physics.admit(body, self.velocity + change)
+        history = self.history.stopped(physics.pinned(body))
+        return replace(self, points=body.points, velocity=velocity, history=history)
 
 
 @dataclass(slots=True)
