@@ -17,9 +17,13 @@ REACH = 2
 
 @njit(cache=True)
 def _sort_into_cells(points, origin, size, shape):
-    """Counting sort of the points into cells: first index of each cell, points in cell order, cell of each point."""
+    """Counting sort of the points into cells.
+
+    Returns the first index of each cell, the points in cell order, the cell of each point with its place in that order,
+    and where the points in that order are.
+    """
     count = points.shape[0]
-    cell = np.empty((count, 3), np.int32)
+    cell = np.empty((count, 4), np.int32)
     start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int32)
     for i in range(count):
         for d in range(3):
@@ -27,30 +31,33 @@ def _sort_into_cells(points, origin, size, shape):
         start[(cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2] + 1] += 1
     for c in range(1, start.shape[0]):
         start[c] += start[c - 1]
-    order = np.empty(count, np.int32)
+    order, places = np.empty(count, np.int32), np.empty((count, 3))
     fill = start.copy()
     for i in range(count):
         c = (cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2]
+        cell[i, 3] = fill[c]
         order[fill[c]] = i
+        places[fill[c]] = points[i]
         fill[c] += 1
-    return start, order, cell
+    return start, order, cell, places
 
 
 @njit(cache=True)
-def _visit_row(i, points, radius, cells, found):
+def _visit_row(i, radius, cells, found):
     """Write the neighbours of point i into found (unless it is empty) and return their number."""
-    start, order, cell, shape, movers = cells
+    start, order, cell, places, shape, movers = cells
+    own = places[cell[i, 3]]
+    x, y, z, square = own[0], own[1], own[2], radius * radius
+    low, high = max(cell[i, 2] - REACH, 0), min(cell[i, 2] + REACH + 1, shape[2])
     count = 0
     for cx in range(max(cell[i, 0] - REACH, 0), min(cell[i, 0] + REACH + 1, shape[0])):
         for cy in range(max(cell[i, 1] - REACH, 0), min(cell[i, 1] + REACH + 1, shape[1])):
-            for cz in range(max(cell[i, 2] - REACH, 0), min(cell[i, 2] + REACH + 1, shape[2])):
-                c = (cx * shape[1] + cy) * shape[2] + cz
-                for k in range(start[c], start[c + 1]):
+            column = (cx * shape[1] + cy) * shape[2]
+            for k in range(start[column + low], start[column + high]):
+                dx, dy, dz = x - places[k, 0], y - places[k, 1], z - places[k, 2]
+                if dx * dx + dy * dy + dz * dz < square:
                     j = order[k]
-                    dx = points[i, 0] - points[j, 0]
-                    dy = points[i, 1] - points[j, 1]
-                    dz = points[i, 2] - points[j, 2]
-                    if j != i and (i < movers or j < movers) and dx * dx + dy * dy + dz * dz < radius * radius:
+                    if j != i and (i < movers or j < movers):
                         if found.shape[0] > 0:
                             found[count] = j
                         count += 1
@@ -58,31 +65,33 @@ def _visit_row(i, points, radius, cells, found):
 
 
 @njit(cache=True, parallel=True)
-def _rows(points, radius, cells):
-    """Compressed rows: one pass counts, the other writes."""
-    count = points.shape[0]
+def _rows(count, radius, cells):
+    """Compressed rows of the first `count` points: one pass counts, the other writes."""
     nothing = np.empty(0, np.int32)
     offsets = np.zeros(count + 1, np.int32)
     for i in prange(count):
-        offsets[i + 1] = _visit_row(i, points, radius, cells, nothing)
+        offsets[i + 1] = _visit_row(i, radius, cells, nothing)
     for i in range(count):
         offsets[i + 1] += offsets[i]
     indices = np.empty(offsets[count], np.int32)
     for i in prange(count):
-        _visit_row(i, points, radius, cells, indices[offsets[i] : offsets[i + 1]])
+        _visit_row(i, radius, cells, indices[offsets[i] : offsets[i + 1]])
     return offsets, indices
 
 
-def find_neighbours(points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:
+def find_neighbours(
+    points: Points, radius: float, movers: int | None = None, rows: int | None = None
+) -> tuple[Indices, Indices]:
     """Find all pairs closer than a radius.
 
     Args:
         points: `(n, 3)` [m], finite.
         radius: search radius [m].
         movers: how many points, the first ones, move; pairs of two others are left out. All where it is None.
+        rows: how many points, the first ones, have a row. All where it is None.
 
     Returns:
-        offsets `(n + 1,)` and indices: row i lists the neighbours of point i, itself left out.
+        offsets `(rows + 1,)` and indices: row i lists the neighbours of point i, itself left out.
 
     Raises:
         FloatingPointError: a coordinate is not finite.
@@ -93,7 +102,8 @@ def find_neighbours(points: Points, radius: float, movers: int | None = None) ->
     size = radius / REACH
     shape = np.maximum(((points.max(axis=0) - origin) / size).astype(np.int64) + 1, 1)
     moving = len(points) if movers is None else movers
-    return _rows(points, radius, (*_sort_into_cells(points, origin, size, shape), shape, moving))
+    cells = (*_sort_into_cells(points, origin, size, shape), shape, moving)
+    return _rows(len(points) if rows is None else rows, radius, cells)
 
 
 class NeighbourList:

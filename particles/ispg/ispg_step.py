@@ -108,7 +108,7 @@ class GalerkinPast:
         return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
 
     def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: they have the velocity there, and none where an edge holds them."""
+        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
         velocity = physics.admit(body, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))
@@ -223,9 +223,10 @@ class PreparedIspgStep:
         predicted = replace(body, points=base.points + base.time_step * guess)
         enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
+        motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past, base = self._with_momenta(equations, base)
-        force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
+            past, base = self._with_momenta(equations, base, motions)
+        force = self.physics.force(predicted) + base.time_step * equations.tension(guess)
         start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
@@ -233,11 +234,11 @@ class PreparedIspgStep:
         points = base.points + base.time_step * velocity
         history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
-        momenta = rigid_momenta(rigid_motions(points), equations.masses, velocity)
+        momenta = rigid_momenta(motions, equations.masses, velocity)
         losses = self._carried_losses(equations, past.velocity)
         losses = _step_losses(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * (equations.stiffness @ start)
+        pull = force - base.time_step * equations.tension(start)
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
@@ -264,17 +265,19 @@ class PreparedIspgStep:
             iterations=self.solver.factors.iterations,
         )
 
-    def _with_momenta(self, equations: GalerkinEquations, base: Base) -> tuple[GalerkinPast, Base]:
-        """The last velocity, and that of the base, with the momenta of the last steps.
+    def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
+        """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
+        Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
+        drop would be left turning.
         """
         past, kept = self.past, self._admitted_motions()
+        motions = motions[kept]
 
         def corrected(velocity: Floats, momenta: Floats) -> Floats:
             if not kept.any():
                 return velocity
-            motions = rigid_motions(self.body.points)[kept]
             missing = momenta[kept] - rigid_momenta(motions, equations.masses, velocity)
             inertia = np.array([rigid_momenta(motions, equations.masses, motion) for motion in motions])
             return velocity + np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
@@ -308,12 +311,14 @@ class PreparedIspgStep:
         fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
         nothing = sparse.csr_matrix((len(body.points),) * 2)
+        rigid = rigid_motions(body.points)[self._admitted_motions()]
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             basis=basis,
             spacing=spacing,
             stiffness=sum((part.stiffness(body) for part in tensions), nothing),
+            rigid=_orthonormal(rigid, density * space.volumes),
             drag=friction * wall_shares(body, space.volumes),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
@@ -376,6 +381,12 @@ def rigid_motions(points: Floats) -> Floats:
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
     return np.tensordot(motions, masses[:, None] * velocity, axes=2)
+
+
+def _orthonormal(motions: Floats, masses: Floats) -> Floats:
+    """A basis `(k, n, 3)` of rigid motions, orthonormal by the masses `(n,)` [kg]."""
+    inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions]).reshape((len(motions),) * 2)
+    return np.tensordot(np.linalg.inv(np.linalg.cholesky(inertia)), motions, axes=1)
 
 
 def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:

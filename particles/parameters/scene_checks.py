@@ -75,6 +75,8 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
             few and angle is not None and angle < ISPG_FILM_ANGLE - ROUNDING
         ),
+        f"{drop.count} particles along an edge on a pad (at least {ISPG_FILM_EDGE})": few
+        and drop.pad_radius is not None,
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
 
@@ -168,7 +170,9 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = found or _ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    found = (
+        found or _ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    )
     return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
