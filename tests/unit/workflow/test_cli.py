@@ -8,6 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.examples import EXAMPLES
@@ -43,8 +44,14 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     path = tmp_path / "mine.toml"
     mine, template = (display_values(read_case(file)) for file in (path, CASE))
     assert mine == template | {"case.name": "mine"}
-    given = [key for key, _ in flat(tomllib.loads(path.read_text())) if not key.startswith("scales.")]
-    assert set(given) == set(mine)
+    given = dict(flat(tomllib.loads(path.read_text())))
+    named = {key: value for key, value in given.items() if key.startswith("materials.")}
+    assert {key.removeprefix("materials."): LIBRARY[name] for key, name in named.items()} == read_case(
+        CASE
+    ).materials.by_role
+    assert {key for key in given if not key.startswith(("scales.", "materials."))} == {
+        key for key in mine if not key.startswith("materials.")
+    }
 
 
 def flat(table: dict, prefix: str = ""):
