@@ -99,9 +99,8 @@ class Galerkin:
             factors: `(n, 3)` of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], each with a force
                 on what it resists, as `load_rough` and `load` have it.
         """
-        result = self._nothing()
-        kernels.resistance(self.starts, self.columns, self.weights, self._with_images(field), factors, result)
-        return self._folded(result)
+        images = self._with_images(field)
+        return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))
 
     def divergence(self, field: Floats) -> Floats:
         """Divergence of a velocity at the particles `(n,)` [1/s]."""

@@ -180,12 +180,13 @@ def forces_of(starts, columns, weights, stress, result):
 
 
 @njit(cache=True)
-def resistance(starts, columns, weights, field, factors, result):
-    """Add what resists velocities `(n + g, 3)` to forces `(n + g, 3)`, in one pass over the rows.
+def resistance(starts, columns, weights, field, factors):
+    """Forces `(n + g, 3)` that resist velocities `(n + g, 3)`, in one pass over the rows.
 
     Factors `(n, 3)` of each particle: of v - N v, with the same on v - N v [kg/s]; of N v, on N v [kg/s]; of the strain
     rate, twice which is the stress times volume [N m s].
     """
+    result = np.zeros(field.shape)
     for i in range(starts.shape[0] - 1):
         x0 = x1 = x2 = x3 = y0 = y1 = y2 = y3 = z0 = z1 = z2 = z3 = 0.0
         for k in range(starts[i], starts[i + 1]):
@@ -210,6 +211,7 @@ def resistance(starts, columns, weights, field, factors, result):
             result[j, 0] += w0 * x0 + w1 * xx + w2 * xy + w3 * xz
             result[j, 1] += w0 * y0 + w1 * xy + w2 * yy + w3 * yz
             result[j, 2] += w0 * z0 + w1 * xz + w2 * yz + w3 * zz
+    return result
 
 
 @njit(cache=True)
