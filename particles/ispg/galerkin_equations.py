@@ -63,7 +63,7 @@ class GalerkinEquations:
         fluid: its density, viscosity and smoothing.
         basis: `(3 n, d)` admissible velocities, orthonormal columns, by particle.
         stiffness: `(n, n)` of the surface tension, gamma K [N/m].
-        rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
+        rigid: `(k, 3 n)` rigid motions that walls admit, by particle, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
@@ -170,8 +170,9 @@ class GalerkinEquations:
         K alone resists turning, which a surface does not: a drop would be left turning on its wall.
         """
         rigid = self.rigid
-        pull = self.stiffness @ (field - np.tensordot(np.tensordot(rigid, self.momentum(field), axes=2), rigid, axes=1))
-        return pull - self.momentum(np.tensordot(np.tensordot(rigid, pull, axes=2), rigid, axes=1))
+        moving = (rigid @ self.momentum(field).ravel()) @ rigid
+        pull = self.stiffness @ (field - moving.reshape(-1, 3))
+        return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""

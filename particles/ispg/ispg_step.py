@@ -164,7 +164,7 @@ class IspgStep:
             self.past = GalerkinPast.start(body, physics.energy(body), self.past.losses)
         else:
             self.past = self.past.carried_on(body, physics)
-        return PreparedIspgStep(self, body, physics, self.past)
+        return PreparedIspgStep(self, body, physics, self.past, admitted_motions(body, physics))
 
     @property
     def mass(self) -> sparse.csr_matrix:
@@ -202,12 +202,14 @@ class PreparedIspgStep:
         body: the liquid body.
         physics: what acts on it.
         past: of the particles where they are now.
+        admitted: `(6,)` which rigid motions walls admit.
     """
 
     solver: IspgStep
     body: Body
     physics: Physics
     past: GalerkinPast
+    admitted: NDArray[np.bool_]
 
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
@@ -272,7 +274,7 @@ class PreparedIspgStep:
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
         drop would be left turning.
         """
-        past, kept = self.past, self._admitted_motions()
+        past, kept = self.past, self.admitted
         motions = motions[kept]
 
         def corrected(velocity: Floats, momenta: Floats) -> Floats:
@@ -284,12 +286,6 @@ class PreparedIspgStep:
 
         start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
         return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
-
-    def _admitted_motions(self) -> NDArray[np.bool_]:
-        """Which rigid motions walls admit, `(6,)`."""
-        motions = rigid_motions(self.body.points)
-        changes = [np.abs(self.physics.admit(self.body, motion) - motion).max() for motion in motions]
-        return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
@@ -311,7 +307,7 @@ class PreparedIspgStep:
         fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
         nothing = sparse.csr_matrix((len(body.points),) * 2)
-        rigid = rigid_motions(body.points)[self._admitted_motions()]
+        rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
             fluid=fluid,
@@ -372,10 +368,20 @@ def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
     )
 
 
+def admitted_motions(body: Body, physics: Physics) -> NDArray[np.bool_]:
+    """Which rigid motions walls admit, `(6,)`."""
+    motions = rigid_motions(body.points)
+    changes = [np.abs(physics.admit(body, motion) - motion).max() for motion in motions]
+    return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
+
+
 def rigid_motions(points: Floats) -> Floats:
     """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
-    axes = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
-    return np.array([*axes, *(np.cross(axis, points) for axis in axes)])
+    motions = np.zeros((6, *points.shape))
+    for axis in range(3):
+        motions[axis, :, axis] = 1.0
+        motions[3 + axis, :, axis - 2], motions[3 + axis, :, axis - 1] = -points[:, axis - 1], points[:, axis - 2]
+    return motions
 
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
@@ -384,9 +390,9 @@ def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
 
 
 def _orthonormal(motions: Floats, masses: Floats) -> Floats:
-    """A basis `(k, n, 3)` of rigid motions, orthonormal by the masses `(n,)` [kg]."""
-    inertia = np.array([rigid_momenta(motions, masses, motion) for motion in motions]).reshape((len(motions),) * 2)
-    return np.tensordot(np.linalg.inv(np.linalg.cholesky(inertia)), motions, axes=1)
+    """A basis `(k, 3 n)` of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
+    flat = motions.reshape(len(motions), 3 * len(masses))
+    return np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
 
 
 def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:
