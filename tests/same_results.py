@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCE = 1e-6
 MEASURED_UNITS = {"1/s", "MB", "B"}
-MEASURED = ("seconds", "time_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
+MEASURED = ("seconds", "time_ratio", "core_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
 ONE_RANK = ("shock.ranks.total=1",)  # the shares of two follow speeds that are measured
 HEATED = (
     "warpage.corner=0 mm", "thermal.melting=100 degC", "thermal.peak=200 degC", "thermal.solidification=200 degC",

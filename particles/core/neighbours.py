@@ -17,77 +17,88 @@ REACH = 2
 
 @njit(cache=True)
 def _sort_into_cells(points, origin, size, shape):
-    """Counting sort of the points into cells.
+    """Counting sort of the points into cells: first index of each cell, which point is where, and their places there.
 
-    Returns the first index of each cell, the points in cell order, the cell of each point with its place in that order,
-    and where the points in that order are.
+    Cells that follow each other along z follow each other in memory.
     """
     count = points.shape[0]
-    cell = np.empty((count, 4), np.int32)
-    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int32)
+    cell = np.empty(count, np.int64)
+    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
     for i in range(count):
-        for d in range(3):
-            cell[i, d] = min(max(int((points[i, d] - origin[d]) / size), 0), shape[d] - 1)
-        start[(cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2] + 1] += 1
+        x, y, z = _cell_of(points[i], origin, size, shape)
+        cell[i] = (x * shape[1] + y) * shape[2] + z
+        start[cell[i] + 1] += 1
     for c in range(1, start.shape[0]):
         start[c] += start[c - 1]
-    order, places = np.empty(count, np.int32), np.empty((count, 3))
+    order, places = np.empty(count, np.int32), np.empty((3, count))
     fill = start.copy()
     for i in range(count):
-        c = (cell[i, 0] * shape[1] + cell[i, 1]) * shape[2] + cell[i, 2]
-        cell[i, 3] = fill[c]
-        order[fill[c]] = i
-        places[fill[c]] = points[i]
-        fill[c] += 1
-    return start, order, cell, places
+        k = fill[cell[i]]
+        order[k] = i
+        for d in range(3):
+            places[d, k] = points[i, d]
+        fill[cell[i]] += 1
+    return start, order, places
 
 
 @njit(cache=True)
-def _visit_row(i, radius, cells, found):
-    """Write the neighbours of point i into found (unless it is empty) and return their number."""
-    start, order, cell, places, shape, movers = cells
-    own = places[cell[i, 3]]
-    x, y, z, square = own[0], own[1], own[2], radius * radius
-    low, high = max(cell[i, 2] - REACH, 0), min(cell[i, 2] + REACH + 1, shape[2])
-    count = 0
-    for cx in range(max(cell[i, 0] - REACH, 0), min(cell[i, 0] + REACH + 1, shape[0])):
-        for cy in range(max(cell[i, 1] - REACH, 0), min(cell[i, 1] + REACH + 1, shape[1])):
-            column = (cx * shape[1] + cy) * shape[2]
+def _cell_of(place, origin, size, shape):
+    """Cell of a place, the nearest one where it is outside the grid."""
+    x = min(max(int((place[0] - origin[0]) / size), 0), shape[0] - 1)
+    y = min(max(int((place[1] - origin[1]) / size), 0), shape[1] - 1)
+    z = min(max(int((place[2] - origin[2]) / size), 0), shape[2] - 1)
+    return x, y, z
+
+
+@njit(cache=True)
+def _visit(place, left_out, radius, grid, found):
+    """Write the points near a place into found (unless it is empty) and return their number.
+
+    ``left_out``: a point that is not listed, and the first of those that are not.
+    """
+    start, order, places, origin, size, shape = grid
+    x, y, z = place[0], place[1], place[2]
+    cx, cy, cz = _cell_of(place, origin, size, shape)
+    own, end = left_out
+    low, high = max(cz - REACH, 0), min(cz + REACH + 1, shape[2])
+    count, writes, limit = 0, found.shape[0] > 0, radius * radius
+    for ix in range(max(cx - REACH, 0), min(cx + REACH + 1, shape[0])):
+        for iy in range(max(cy - REACH, 0), min(cy + REACH + 1, shape[1])):
+            column = (ix * shape[1] + iy) * shape[2]
             for k in range(start[column + low], start[column + high]):
-                dx, dy, dz = x - places[k, 0], y - places[k, 1], z - places[k, 2]
-                if dx * dx + dy * dy + dz * dz < square:
-                    j = order[k]
-                    if j != i and (i < movers or j < movers):
-                        if found.shape[0] > 0:
-                            found[count] = j
-                        count += 1
+                dx, dy, dz = x - places[0, k], y - places[1, k], z - places[2, k]
+                j = order[k]
+                near = (dx * dx + dy * dy + dz * dz < limit) & (j != own) & (j < end)
+                if writes and near:
+                    found[count] = j
+                count += near
     return count
 
 
 @njit(cache=True, parallel=True)
-def _rows(count, radius, cells):
-    """Compressed rows of the first `count` points: one pass counts, the other writes."""
+def _rows(places, radius, grid, own, movers):
+    """Compressed rows: one pass counts, the other writes. ``own``: whether a point is listed in its own row."""
+    count, points = places.shape[0], grid[1].shape[0]
     nothing = np.empty(0, np.int32)
     offsets = np.zeros(count + 1, np.int32)
     for i in prange(count):
-        offsets[i + 1] = _visit_row(i, radius, cells, nothing)
+        left_out = (-1 if own else i, points if i < movers else movers)
+        offsets[i + 1] = _visit(places[i], left_out, radius, grid, nothing)
     for i in range(count):
         offsets[i + 1] += offsets[i]
     indices = np.empty(offsets[count], np.int32)
     for i in prange(count):
-        _visit_row(i, radius, cells, indices[offsets[i] : offsets[i + 1]])
+        left_out = (-1 if own else i, points if i < movers else movers)
+        _visit(places[i], left_out, radius, grid, indices[offsets[i] : offsets[i + 1]])
     return offsets, indices
 
 
-def find_neighbours(
-    points: Points, radius: float, movers: int | None = None, rows: int | None = None
-) -> tuple[Indices, Indices]:
+def find_neighbours(points: Points, radius: float, rows: int | None = None) -> tuple[Indices, Indices]:
     """Find all pairs closer than a radius.
 
     Args:
         points: `(n, 3)` [m], finite.
         radius: search radius [m].
-        movers: how many points, the first ones, move; pairs of two others are left out. All where it is None.
         rows: how many points, the first ones, have a row. All where it is None.
 
     Returns:
@@ -96,14 +107,56 @@ def find_neighbours(
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    if not np.isfinite(points).all():
+    return _rows(points[:rows], radius, _grid(points, points, radius), False, len(points))
+
+
+def find_beside(places: Points, points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:
+    """Find the points closer than a radius to each place.
+
+    Args:
+        places: `(m, 3)` [m], finite.
+        points: `(n, 3)` [m], finite.
+        radius: search radius [m].
+        movers: how many places, the first ones, see all points; the others see as many points, the first ones. All do
+            where it is None.
+
+    Returns:
+        offsets `(m + 1,)` and indices: row i lists the points near place i, also one that is there.
+
+    Raises:
+        FloatingPointError: a coordinate is not finite.
+    """
+    moving = max(len(places), len(points)) if movers is None else movers
+    return _rows(places, radius, _grid(places, points, radius), True, moving)
+
+
+def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
+    """Points in cells of which `REACH` are a radius wide."""
+    if not (np.isfinite(points).all() and np.isfinite(places).all()):
         raise FloatingPointError("find_neighbours: a particle position is not finite")
-    origin = points.min(axis=0)
-    size = radius / REACH
-    shape = np.maximum(((points.max(axis=0) - origin) / size).astype(np.int64) + 1, 1)
-    moving = len(points) if movers is None else movers
-    cells = (*_sort_into_cells(points, origin, size, shape), shape, moving)
-    return _rows(len(points) if rows is None else rows, radius, cells)
+    origin, size = points.min(axis=0), radius / REACH
+    shape = (np.ptp(points, axis=0) / size).astype(np.int64) + 1
+    return (*_sort_into_cells(points, origin, size, shape), origin, size, shape)
+
+
+@njit(cache=True)
+def have_moved(points, built_at, skin):
+    """Whether a list made of other places `(n, 3)` may lack pairs: one has moved by half a skin or more from all.
+
+    What moves all of them alike changes no distance.
+    """
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for i in range(points.shape[0]):
+        for d in range(3):
+            moved = points[i, d] - built_at[i, d]
+            low[d], high[d] = min(low[d], moved), max(high[d], moved)
+    for i in range(points.shape[0]):
+        square = 0.0
+        for d in range(3):
+            square += (points[i, d] - built_at[i, d] - 0.5 * (low[d] + high[d])) ** 2
+        if not square <= (0.5 * skin) ** 2:  # what is no number has moved, too
+            return True
+    return False
 
 
 class NeighbourList:

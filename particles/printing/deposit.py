@@ -120,8 +120,8 @@ class Deposit:
         self.update()
         (start, (corners, triangles), _), drop = self.start, self.scene.drop
         shift = np.array([*place, self._lift(place) - 0.5 * drop.diameter - 0.5 * EDGE * drop.spacing])
-        pressure = np.full(start.shape[1], drop.laplace_pressure if self.surface.tension else 0.0)
-        new = flow.liquid_and_walls(start + shift[:, None], np.empty((3, 0)), pressure, self.law)
+        still = np.zeros(start.shape[1])
+        new = flow.liquid_and_walls(start + shift[:, None], np.empty((3, 0)), still, self.law)
         for speed, value in zip(new[3:6], self.scene.velocity, strict=True):
             speed[:] = value
         self.fields = Fields(*(np.concatenate(pair) for pair in zip(self.fields, new, strict=True)))

@@ -56,11 +56,10 @@ def solve_droplet(
 
 
 def droplet(scene: Droplet) -> Simulation:
-    """Set up the particles under the pressure of surface tension, and the surface about them."""
+    """Set up the particles and the surface about them, whose tension is in balance with the pressure of a sphere."""
     points, triangles, spacing = start_shape(scene)
     law, tension = liquid_of(scene, spacing)
-    pressure = np.full(points.shape[1], scene.laplace_pressure if tension else 0.0)
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), pressure, law)
+    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     fields.w[:] = -scene.impact_speed
     surface = LiquidSurface(*triangles, tension, cos(scene.angle), law, scene.bounds)
     for _ in range(ENCLOSURES):
@@ -74,6 +73,7 @@ def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
     weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
     law = flow.in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
+    law = law._replace(tracked=1, shifting=1.0)
     return law, scene.surface_tension if effects["droplet_tension"]["on"] else 0.0
 
 
@@ -146,7 +146,7 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     radius = np.linalg.norm(points.T - centre, axis=1)
     core = radius < CORE * 0.5 * scene.diameter
     distance = np.linalg.norm(surface.points - centre, axis=1)
-    pressure = float((fields.pressure[core] if core.any() else fields.pressure).mean())
+    pressure = float((simulation.pressures[core] if core.any() else simulation.pressures).mean())
     return (
         simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,

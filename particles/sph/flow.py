@@ -88,7 +88,7 @@ class FlowRun:
         for axis, period in enumerate((law.period_x, law.period_y, law.period_z)):
             if period > 0.0:
                 points[:, axis] %= period
-        self.pictures.append(Picture(simulation.time, points, velocity, simulation.fields.pressure[liquid].copy()))
+        self.pictures.append(Picture(simulation.time, points, velocity, simulation.pressures))
 
 
 def run_flow(
@@ -180,6 +180,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         viscosity=scene.liquid_viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
         **shear_law(scene),
         has_surface=int(has_surface),
+        tracked=0,
         no_slip=int(not has_surface),
         mirror=0,
         spacing=spacing,

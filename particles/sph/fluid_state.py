@@ -27,6 +27,7 @@ class Law(NamedTuple):
         least_viscosity, most_viscosity: bounds [Pa s], the first one Carreau's viscosity at infinity.
         has_surface: 1 where the liquid has a free one. Then viscosity acts along the line of two particles, elsewhere
             along their velocities; and walls do not pull.
+        tracked: 1 where that surface is one of triangles, with a pressure of its own: then walls pull, too.
         no_slip: whether walls hold the liquid by its viscosity; 1 or 0.
         mirror: 1 where the plane z = 0 is a wall below the liquid: its particles meet their images behind it, which
             costs no particles and ends, with the liquid, at the contact line.
@@ -52,6 +53,7 @@ class Law(NamedTuple):
     least_viscosity: float
     most_viscosity: float
     has_surface: int
+    tracked: int
     no_slip: int
     mirror: int
     spacing: float

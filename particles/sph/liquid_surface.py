@@ -4,11 +4,12 @@ E = gamma (A_free - cos(theta) A_wet). Vertices move with the particles beside t
 them by the same weights (`surface_loops.py`): what the surface loses, the particles gain, so that a drop comes to rest.
 The contact angle is nowhere set: it is the balance of the forces on the contact line.
 
-Particles at a free surface lack neighbours, and what their pressure transmits ends below the surface, by a depth of
-`DEPTH` smoothing lengths: in a sphere it balances tension on the surface only if it is too high by 2 x depth / R, at
-any resolution. The tension that acts is therefore gamma (1 - depth x mean curvature), of the whole surface; wetting
-acts as it is, which the balance of a cap asks for. DEPTH was found once, with spheres of 12 particles an edge of the
-cube of their volume and the cubic spline; it is no parameter of a case, and the depth vanishes with the spacing.
+The tension of a surface at rest is balanced by a pressure, and a uniform one does nothing else. So it is taken out of
+both: vertices bear the forces of E - p V, with the pressure p of the whole surface, and particles what is left of their
+pressure, which is none at rest. So it does not matter that particles lack neighbours at a free surface, where their
+sums carry too little of a pressure, nor that a lattice of particles under pressure is stiff; and nothing is fitted.
+Particles that no pressure spreads draw together where it is negative: they are shifted to where there are fewer
+(`simulation.py`). Beside the surface it is itself what lacks in their sums, so that they fill it evenly.
 
 A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
 have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.neighbours import find_beside, have_moved
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import surface_loops
@@ -38,8 +39,6 @@ from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
 
-# Of the smoothing length: how far below the surface pressure ends.
-DEPTH = 0.187
 # In spacings of the particles: edges of triangles, the skin of the lists.
 EDGE, SKIN = 1.2, 0.5
 # The same: triangles lower than this above the wall are on it; no air is followed that would have to leave.
@@ -85,6 +84,7 @@ class LiquidSurface:
         ground: distance to solid bodies on which it may lie, negative in them; None where there are none.
         wetness: `(m,)` how much of each vertex is on them, 0 to 1; and their normals there, `(m, 3)`.
         meetings: liquids that merged or parted.
+        pressure: that of the liquid over that of its particles [Pa].
     """
 
     points: Floats
@@ -99,6 +99,7 @@ class LiquidSurface:
     ground: LevelSet | None = None
     wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
     meetings: list[Meeting] = field(default_factory=list)
+    pressure: float = 0.0
     _built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
     _lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     _shares: Floats = field(default_factory=lambda: np.empty((2, 0)))
@@ -111,7 +112,7 @@ class LiquidSurface:
         return {
             "points": self.points, "triangles": self.triangles, "rings": list(self.rings), "moves": self.moves,
             "rebuilds": self.rebuilds, "built_at": self._built_at, "shares": self._shares,
-            "meetings": list(self.meetings),
+            "meetings": list(self.meetings), "pressure": self.pressure,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -119,7 +120,7 @@ class LiquidSurface:
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
         self.moves, self.rebuilds = saved["moves"], saved["rebuilds"]
         self._built_at, self._shares = saved["built_at"], saved["shares"]
-        self.meetings = saved["meetings"]
+        self.meetings, self.pressure = saved["meetings"], saved["pressure"]
         self._find_wetness()
         self._list(self._built_at)
 
@@ -181,7 +182,9 @@ class LiquidSurface:
         self._take(self.points, self.triangles)
 
     def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
-        """Add the accelerations that it gives particles to rows 1 to 3 of their rates `(10, n)`.
+        """Add the accelerations that it gives particles to rows 1 to 3 of their rates `(10, n)`, and itself to 7 to 9.
+
+        These, the gradient of concentration, are then zero beside it, too, where particles are spread evenly.
 
         Args:
             rates: of the liquid.
@@ -191,22 +194,36 @@ class LiquidSurface:
         Raises:
             SurfaceLost: there are no particles beside a vertex.
         """
-        self._update_lists(np.array(fields[:3])[:, :carriers])
-        self._shares = np.empty((2, len(self._lists[1])))
-        surface_loops.find_shares(self.points, self._lists, fields, self.law, self._shares)
-        starts = self._lists[0][:-1]
-        if (np.diff(self._lists[0]) == 0).any() or not np.add.reduceat(self._shares[0], starts).all():
+        self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
+        weights, (offsets, indices) = np.empty((2, len(self._lists[1]))), self._lists
+        surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
+        level = np.add.reduceat(weights[0], offsets[:-1]) if len(indices) else np.zeros(1)
+        if (np.diff(offsets) == 0).any() or not level.all():
             raise SurfaceLost("the liquid has left its surface")
-        pushes = np.zeros((3, carriers))
-        surface_loops.share_forces(self._lists, self._shares, self.forces(), fields.mass, pushes)
-        rates[1:4] += pushes[:, : rates.shape[1]]
+        self._shares = weights / np.repeat(level, np.diff(offsets))
+        pushes, crowd = np.zeros((3, carriers)), np.zeros((3, carriers))
+        surface_loops.share_out(self._lists, self._shares, self.forces(), pushes)
+        surface_loops.share_out(self._lists, weights, self._outward(), crowd)
+        fluids = rates.shape[1]
+        rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
+        rates[7:10] += crowd[:, :fluids]
+
+    def _outward(self) -> Floats:
+        """Areas about the vertices times their outward normals `(m, 3)` [m^2], without what lies on the ground."""
+        area = volume_and_gradient(self.points, self.triangles, (), ())[1]
+        for ring in self.rings:
+            area[ring, 2] = 0.0
+        return area if self.ground is None else (1.0 - self.wetness[0])[:, None] * area
 
     def forces(self) -> Floats:
-        """Forces -dE/dx on the vertices `(m, 3)` [N]; those of contact lines along the wall, which holds them."""
+        """Forces -d(E - p V)/dx on the vertices `(m, 3)` [N], with the pressure that leaves none on the whole surface.
+
+        Those of contact lines are along the wall, which holds them.
+        """
         wet = None if self.ground is None else self._wet_shares()
-        steep = area_gradient(self.points, self.triangles, None if wet is None else 1.0 - wet)
-        tension = self.tension * (1.0 - DEPTH * self.law.length * self._mean_curvature(steep))
-        result = -tension * steep
+        result = -self.tension * area_gradient(self.points, self.triangles, None if wet is None else 1.0 - wet)
+        self.pressure = self._balance(result)
+        result += self.pressure * volume_and_gradient(self.points, self.triangles, (), ())[1]
         if wet is not None:
             share, normals = self.wetness
             result += self.tension * self.cosine * area_gradient(self.points, self.triangles, wet)
@@ -214,40 +231,32 @@ class LiquidSurface:
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
             outward = 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
-            result[ring, :2] += self.tension * self._cosines(ring, outward, result)[:, None] * outward
+            result[ring, :2] += self.tension * self._cosines(outward, result[ring, :2])[:, None] * outward
             result[ring, 2] = 0.0
         return result
 
-    def _cosines(self, ring: Indices, outward: Floats, forces: Floats) -> Floats:
+    def _balance(self, forces: Floats) -> float:
+        """Return the pressure that balances forces of tension `(m, 3)` on the free surface in the mean [Pa]."""
+        area = self._outward()
+        for ring in self.rings:
+            area[ring] = 0.0
+        square = float((area**2).sum())
+        return -float((forces * area).sum()) / square if square else 0.0
+
+    def _cosines(self, outward: Floats, push: Floats) -> Floats:
         """Cosines of the contact angle along a contact line `(k,)`.
 
         Between advancing and receding angle the wall holds the line against what pulls at it: the free surface, and
         the pressure of a liquid at rest below it.
 
         Args:
-            ring: its vertices.
             outward: `(k, 2)` normal in the wall, as long as the line about each vertex [m].
-            forces: `(m, 3)` of the free surface [N].
+            push: `(k, 2)` forces on its vertices without that of the wall [N].
         """
         if self.bounds is None or not self.tension:
-            return np.full(len(ring), self.cosine)
-        _, area = volume_and_gradient(self.points, self.triangles, (), ())
-        free = np.linalg.norm(area, axis=1)
-        free[np.concatenate(self.rings)] = 0.0
-        pressure = -float((forces * area)[free > 0.0].sum() / (free**2).sum())
-        push = forces[ring, :2] + pressure * area[ring, :2]
+            return np.full(len(push), self.cosine)
         needed = -(push * outward).sum(axis=1) / (self.tension * (outward**2).sum(axis=1))
         return np.clip(needed, *self.bounds)
-
-    def _mean_curvature(self, steep: Floats) -> float:
-        """Mean over the surface of the sum of its curvatures [1/m]; ``steep`` is the gradient of the area."""
-        _, outward = volume_and_gradient(self.points, self.triangles, (), ())
-        for ring in self.rings:
-            outward[ring] = 0.0
-        area = np.linalg.norm(outward, axis=1)
-        normals = outward / np.maximum(area, 1e-300)[:, None]
-        free = area if self.ground is None else area * (1.0 - self.wetness[0])
-        return float((steep * normals).sum() / free.sum())
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
         """Move with the velocities of the particles `(3, n)` [m/s] over a time step [s].
@@ -271,20 +280,16 @@ class LiquidSurface:
         self._find_wetness()
 
     def _update_lists(self, liquid: Floats) -> None:
-        """Find the particles beside each vertex again when either has moved half the skin."""
-        together = np.concatenate((liquid.T, self.points))
-        if len(together) == len(self._built_at):
-            moved = ((together - self._built_at) ** 2).sum(axis=1).max()
-            if moved <= (0.5 * SKIN * self.law.spacing) ** 2:
-                return
-        self._list(together)
+        """Find the particles `(n, 3)` beside each vertex again when some have moved by the skin."""
+        together = np.concatenate((self.points, liquid))
+        skin = SKIN * self.law.spacing
+        if len(together) != len(self._built_at) or have_moved(together, self._built_at, skin):
+            self._list(together)
 
     def _list(self, together: Floats) -> None:
-        self._built_at = together
+        self._built_at, vertices = together, len(self.points)
         reach = SUPPORT * self.law.length + SKIN * self.law.spacing
-        self._lists = surface_loops.rows_of_vertices(
-            *find_neighbours(together, reach), len(together) - len(self.points)
-        )
+        self._lists = find_beside(together[:vertices], together[vertices:], reach)
 
     def _wet(self) -> None:
         """Keep vertices above the wall, contact lines on it; triangles that have come down on it are wet."""

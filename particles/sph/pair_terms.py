@@ -9,6 +9,10 @@ from numba import njit
 
 # Of h^2: keeps the term of viscosity finite where particles meet.
 SOFTENING = 0.01
+# Added to a square of a distance [m^2], far below rounding: to itself a particle does nothing, rather than 0 / 0.
+NOTHING = 1e-200
+# Added in the sums that shift particles, which it keeps from pairing (Monaghan 2000): factor; the power is 4.
+PAIRING = 0.2
 
 
 @njit(cache=True, error_model="numpy")
@@ -36,7 +40,7 @@ def pressure(pressure_i, pressure_j, slope, volume, density):
 @njit(cache=True, error_model="numpy")
 def artificial_viscosity(approach, distance2, slope, volume, density):
     """Artificial viscosity over alpha h c0 rho_0: (u_ij . r_ij) / r_ij^2 grad W V_j / rho_i (Antuono et al. 2012)."""
-    return approach / distance2 * slope * volume / density
+    return approach / (distance2 + NOTHING) * slope * volume / density
 
 
 @njit(cache=True, error_model="numpy")
@@ -72,3 +76,13 @@ def shear_viscosity(distance2, softened2, slope, volume, factor):
     ``factor`` = 2 mu / rho_i. It keeps momentum, but not angular momentum at free surfaces.
     """
     return factor * distance2 / softened2 * slope * volume
+
+
+@njit(cache=True, error_model="numpy")
+def crowding(level, next_one):
+    """Factor of grad W V_j in the gradient of concentration that shifts particles (Sun et al. 2017).
+
+    ``level`` = W, ``next_one`` = W of a spacing.
+    """
+    ratio2 = (level / next_one) ** 2
+    return 1.0 + PAIRING * ratio2 * ratio2

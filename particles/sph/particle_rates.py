@@ -1,44 +1,60 @@
 """Sums over the neighbours of one particle, written so that a GPU can compile them too.
 
-The order of the neighbours is the order of the sum, so that the number of threads changes nothing.
+The sum over a particle is the same whatever the number of threads. Indices are unsigned in the loops: they do not count
+from the end.
 """
 
 from math import floor, sqrt
 
-import numpy as np
-from numba import njit
+from numba import njit, uint32
 
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.smoothing import shape, slope
 
 # Of the determinant of the matrix of moments, which is one inside the liquid: with less the gradient is not resolved.
 FEWEST_MOMENTS = 0.05
-# Added in the sums that shift particles, which it keeps from pairing (Monaghan 2000): factor and power.
-PAIRING, POWER = 0.2, 4
+compiled = njit(cache=True, error_model="numpy")
+# Sums may be taken in any order, so that several pairs are computed at a time; the order does not depend on threads.
+summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def periods_of(law):
+    """Return the period [m] and one over it of each direction; zeros where there is none."""
+    x, y, z = law.period_x, law.period_y, law.period_z
+    return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
+
+
+@compiled
 def across(distance, period):
-    """Return a component of a vector between particles [m] to the nearest image; a period of 0 is none."""
-    return distance - period * floor(distance / period + 0.5) if period > 0.0 else distance
+    """Return a component of a vector between particles [m] to the nearest image."""
+    return distance - period[0] * floor(distance * period[1] + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def apart(place, j, side, fields, periods):
+    """Return the vector from a particle, or from its image where ``side`` is -1, to a place [m]."""
+    dx = across(place[0] - fields.x[j], periods[0])
+    dy = across(place[1] - fields.y[j], periods[1])
+    return dx, dy, across(place[2] - side * fields.z[j], periods[2])
+
+
+@compiled
 def positive(value):
-    """Return a value, or zero where it is negative; Numba 0.68 cannot compile `max` for a GPU."""
+    """Return a value, or zero where it is negative or no number; Numba 0.68 cannot compile `max` for a GPU."""
     return value if value > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
-def seen(n, i, neighbours, mirror):
-    """Return the n-th that a particle sees, and -1 for an image, else 1: two of each at a mirror, and its own."""
-    row = n >> mirror
-    if row == len(neighbours):
-        return np.int64(i), -1.0
-    return np.int64(neighbours[row]), 1.0 - 2.0 * (n & mirror)
+@summed
+def liquid_among(neighbours, fluids):
+    """Number of particles of the liquid in a row; they are its first ones."""
+    count = 0
+    for n in range(len(neighbours)):
+        count += neighbours[n] < fluids
+    return count
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def closing_in(k, velocity, d, fields):
     """Return (u_i - u_j) . d for the k-th particle of walls; what comes near one with a share meets its image."""
     u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
@@ -46,22 +62,29 @@ def closing_in(k, velocity, d, fields):
     return 2.0 * closing if fields.wall_room[k] > 0.0 else closing
 
 
-@njit(cache=True, error_model="numpy")
-def viscosity_between(i, j, fluids, fields, law):
-    """Return the viscosity between two particles [Pa s]; beside a wall it is the liquid's."""
-    if law.rheology == 0 or j >= fluids:
-        return fields.viscosity[i] if law.rheology else law.viscosity
-    return pair_terms.shared_viscosity(fields.viscosity[i], fields.viscosity[j])
+@compiled
+def pulls_not(law):
+    """Whether walls do not pull at liquid: where it has a surface that is not tracked."""
+    return law.has_surface and not law.tracked
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def own_viscosity(i, fields, law):
+    """Return the viscosity of a particle [Pa s]; 0 where viscosity does not act."""
+    return positive(fields.viscosity[i] if law.rheology else law.viscosity)
+
+
+@compiled
 def rates_of(i, fluids, neighbours, fields, law):
     """Return what a particle of the liquid is told by its neighbours.
+
+    A term whose coefficient is zero adds nothing. A particle is in its own row, for its image: to itself it does
+    nothing.
 
     Args:
         i: the particle.
         fluids: number of particles that are liquid.
-        neighbours: its list.
+        neighbours: its row, those of the liquid first.
         fields: `Fields`.
         law: `Law`.
 
@@ -69,103 +92,140 @@ def rates_of(i, fluids, neighbours, fields, law):
         rate of density, acceleration (3), renormalised gradient of the density (3), gradient of the concentration of
         particles (3) [1/m].
     """
+    liquid = liquid_among(neighbours, fluids)
+    rate, ax, ay, az, cx, cy, cz, bx, by, bz, xx, yy, zz, xy, yz, xz = _by_liquid(i, neighbours[:liquid], fields, law)
+    if liquid < len(neighbours):
+        wall = _by_walls(i, fluids, neighbours[liquid:], fields, law)
+        rate, ax, ay, az = rate + wall[0], ax + wall[1], ay + wall[2], az + wall[3]
+        cx, cy, cz = cx + wall[4], cy + wall[5], cz + wall[6]
+    if law.diffusion > 0.0:
+        bx, by, bz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
+    else:
+        bx = by = bz = 0.0
+    return rate, ax, ay, az, bx, by, bz, cx, cy, cz
+
+
+@summed
+def _by_liquid(i, neighbours, fields, law):
+    """Sums over the liquid and its images: rate of density, acceleration, concentration; jumps of density, moments.
+
+    Nothing branches at a pair, so that several are computed at a time.
+    """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     density, pressure = fields.density[i], fields.pressure[i]
     gx, gy, gz = fields.slope_x[i], fields.slope_y[i], fields.slope_z[i]
+    periods = periods_of(law)
     line = law.dimension == 1
     inverse = 1.0 / law.length
     scale = law.norm * inverse * inverse
     softening = pair_terms.SOFTENING * law.length * law.length
     level = shape(law.kernel, line, law.spacing * inverse)
+    diffusion, artificial, viscosity = positive(law.diffusion), positive(law.artificial), own_viscosity(i, fields, law)
+    along = 2.0 * (law.dimension + 2) / density if law.has_surface else 0.0  # over the viscosity of a pair
+    aside = 0.0 if law.has_surface else 2.0 / density
     rate = ax = ay = az = cx = cy = cz = 0.0
     bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
-    mirror = law.mirror if z < 2.0 * law.length else 0
-    for n in range((1 + mirror) * len(neighbours) + mirror):
-        j, side = seen(n, i, neighbours, mirror)
-        dx = across(x - fields.x[j], law.period_x)
-        dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - side * fields.z[j], law.period_z)
-        distance2 = dx * dx + dy * dy + dz * dz
-        q = sqrt(distance2) * inverse
-        if q >= 2.0:
-            continue
-        steep = scale * slope(law.kernel, line, q)
-        beside = fields.density[j]
-        volume = fields.mass[j] / beside
-        liquid = j < fluids
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
         hold = side if law.no_slip else 1.0  # an image moves on along the wall, or back
-        approach = (u - hold * fields.u[j]) * dx + (v - hold * fields.v[j]) * dy + (w - side * fields.w[j]) * dz
-        closing = approach + (hold - 1.0) * (fields.u[j] * dx + fields.v[j] * dy)
-        if not liquid:
-            closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
-            volume *= fields.wall_share[j - fluids]
-        rate += pair_terms.continuity(closing, steep, volume, density)
-        own = positive(pressure) if law.has_surface and not liquid else pressure  # walls do not pull
-        other = fields.pressure[j] + (side - 1.0) * law.gravity_z * fields.z[j] * beside  # an image has more weight
-        push = pair_terms.pressure(own, other, steep, volume, density)
-        if law.artificial > 0.0 and liquid:
-            push += law.artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
-        if law.viscosity > 0.0 and (liquid or law.no_slip):
-            softened2, double = distance2 + softening, 2.0 * viscosity_between(i, j, fluids, fields, law) / density
-            if law.has_surface:
-                factor = double * (law.dimension + 2)
-                push += pair_terms.central_viscosity(approach, softened2, steep, volume, factor)
-            else:
-                drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, double)
-                ax += drag * (u - fields.u[j])
-                ay += drag * (v - fields.v[j])
-                az += drag * (w - fields.w[j])
-        if law.diffusion > 0.0 and liquid:
+        weight_below = (side - 1.0) * law.gravity_z  # an image has more weight
+        for n in range(len(neighbours)):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            distance2 = dx * dx + dy * dy + dz * dz
+            q = sqrt(distance2) * inverse
+            steep = scale * slope(law.kernel, line, q)
+            beside = fields.density[j]
+            volume = fields.mass[j] / beside
+            uj, vj, wj = fields.u[j], fields.v[j], side * fields.w[j]
+            du, dv, dw = u - hold * uj, v - hold * vj, w - wj
+            approach = du * dx + dv * dy + dw * dz
+            closing = approach + (hold - 1.0) * (uj * dx + vj * dy)
+            rate += pair_terms.continuity(closing, steep, volume, density)
+            other = fields.pressure[j] + weight_below * fields.z[j] * beside
+            push = pair_terms.pressure(pressure, other, steep, volume, density)
+            push += artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
+            shared = pair_terms.shared_viscosity(viscosity, fields.viscosity[j]) if law.rheology else viscosity
+            softened2 = distance2 + softening
+            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along * shared)
+            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside * shared)
             jump = beside - density
             ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + side * fields.slope_z[j]
             rise = -0.5 * (ex * dx + ey * dy + ez * dz)
-            rate += law.diffusion * pair_terms.density_diffusion(jump, rise, steep, volume)
+            rate += diffusion * pair_terms.density_diffusion(jump, rise, steep, volume)
             weight = steep * volume
-            bx += jump * weight * dx
-            by += jump * weight * dy
-            bz += jump * weight * dz
-            xx -= weight * dx * dx
-            yy -= weight * dy * dy
-            zz -= weight * dz * dz
-            xy -= weight * dx * dy
-            yz -= weight * dy * dz
-            xz -= weight * dx * dz
-        if law.shifting > 0.0:
-            crowd = steep * volume * (1.0 + PAIRING * (shape(law.kernel, line, q) / level) ** POWER)
-            cx += crowd * dx
-            cy += crowd * dy
-            cz += crowd * dz
-        ax += push * dx
-        ay += push * dy
-        az += push * dz
-    if law.diffusion > 0.0:
-        bx, by, bz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
-    return rate, ax, ay, az, bx, by, bz, cx, cy, cz
+            crowd = weight * pair_terms.crowding(shape(law.kernel, line, q), level)
+            ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
+            cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
+            bx, by, bz = bx + jump * weight * dx, by + jump * weight * dy, bz + jump * weight * dz
+            xx, yy, zz = xx - weight * dx * dx, yy - weight * dy * dy, zz - weight * dz * dz
+            xy, yz, xz = xy - weight * dx * dy, yz - weight * dy * dz, xz - weight * dx * dz
+    return rate, ax, ay, az, cx, cy, cz, bx, by, bz, xx, yy, zz, xy, yz, xz
 
 
-@njit(cache=True, error_model="numpy")
+@summed
+def _by_walls(i, fluids, neighbours, fields, law):
+    """Sums over particles of walls, and their images: rate of density, acceleration, concentration of particles."""
+    x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
+    density, pressure = fields.density[i], fields.pressure[i]
+    periods = periods_of(law)
+    line = law.dimension == 1
+    inverse = 1.0 / law.length
+    scale = law.norm * inverse * inverse
+    softening = pair_terms.SOFTENING * law.length * law.length
+    level = shape(law.kernel, line, law.spacing * inverse)
+    own = positive(pressure) if pulls_not(law) else pressure
+    viscosity = own_viscosity(i, fields, law) / density if law.no_slip else 0.0
+    along = 2.0 * (law.dimension + 2) * viscosity if law.has_surface else 0.0
+    aside = 0.0 if law.has_surface else 2.0 * viscosity
+    rate = ax = ay = az = cx = cy = cz = 0.0
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
+        hold = side if law.no_slip else 1.0
+        weight_below = (side - 1.0) * law.gravity_z
+        for n in range(len(neighbours)):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            distance2 = dx * dx + dy * dy + dz * dz
+            q = sqrt(distance2) * inverse
+            steep = scale * slope(law.kernel, line, q)
+            beside = fields.density[j]
+            volume = fields.mass[j] / beside * fields.wall_share[j - fluids]
+            du, dv, dw = u - hold * fields.u[j], v - hold * fields.v[j], w - side * fields.w[j]
+            closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
+            rate += pair_terms.continuity(closing, steep, volume, density)
+            other = fields.pressure[j] + weight_below * fields.z[j] * beside
+            push = pair_terms.pressure(own, other, steep, volume, density)
+            softened2, approach = distance2 + softening, du * dx + dv * dy + dw * dz
+            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along)
+            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside)
+            crowd = steep * volume * pair_terms.crowding(shape(law.kernel, line, q), level)
+            ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
+            cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
+    return rate, ax, ay, az, cx, cy, cz
+
+
+@summed
 def drift_of(i, fluids, neighbours, fields, law):
     """Return the velocity (3) [m/s] that XSPH adds where it moves a particle of the liquid; momentum stays."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
+    periods = periods_of(law)
     inverse = 1.0 / law.length
     fu = fv = fw = 0.0
-    mirror = law.mirror if z < 2.0 * law.length else 0
-    for n in range((1 + mirror) * len(neighbours) + mirror):
-        j, side = seen(n, i, neighbours, mirror)
-        if j >= fluids:
-            continue
-        dx = across(x - fields.x[j], law.period_x)
-        dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - side * fields.z[j], law.period_z)
-        level = law.norm * shape(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-        weight = law.xsph * pair_terms.xsph(level, fields.mass[j], fields.density[i], fields.density[j])
-        fu += weight * (fields.u[j] - u)
-        fv += weight * (fields.v[j] - v)
-        fw += weight * (side * fields.w[j] - w)
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
+        for n in range(liquid_among(neighbours, fluids)):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            level = law.norm * shape(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            weight = law.xsph * pair_terms.xsph(level, fields.mass[j], fields.density[i], fields.density[j])
+            fu += weight * (fields.u[j] - u)
+            fv += weight * (fields.v[j] - v)
+            fw += weight * (side * fields.w[j] - w)
     return fu, fv, fw
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def solved(moments, sums, dimension):
     """Return the gradient `moments^-1 sums`, in a plane that of x and z; zero where neighbours do not resolve it."""
     xx, yy, zz, xy, yz, xz = moments
@@ -189,7 +249,7 @@ def solved(moments, sums, dimension):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@summed
 def wall_values(i, fluids, neighbours, fields, law):
     """Return pressure, velocity (3) and share of a particle of a wall, from the liquid beside it (Adami et al. 2012).
 
@@ -201,23 +261,21 @@ def wall_values(i, fluids, neighbours, fields, law):
     line = law.dimension == 1
     inverse = 1.0 / law.length
     total = liquid = pressure = u = v = w = 0.0
-    mirror = law.mirror if z < 2.0 * law.length else 0
-    for n in range((1 + mirror) * len(neighbours)):
-        j, side = seen(n, i, neighbours, mirror)
-        if j >= fluids:
-            continue
+    periods = periods_of(law)
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
         hold = side if law.no_slip else 1.0
-        dx = across(x - fields.x[j], law.period_x)
-        dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - side * fields.z[j], law.period_z)
-        weight = shape(law.kernel, line, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-        total += weight
-        liquid += weight * fields.mass[j] / fields.density[j]
-        fall = law.gravity_x * dx + law.gravity_y * dy + law.gravity_z * (z - fields.z[j])
-        pressure += weight * (fields.pressure[j] + fields.density[j] * fall)
-        u += weight * hold * fields.u[j]
-        v += weight * hold * fields.v[j]
-        w += weight * side * fields.w[j]
+        for n in range(liquid_among(neighbours, fluids)):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            weight = shape(law.kernel, line, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            total += weight
+            liquid += weight * fields.mass[j] / fields.density[j]
+            fall = law.gravity_x * dx + law.gravity_y * dy + law.gravity_z * (z - fields.z[j])
+            pressure += weight * (fields.pressure[j] + fields.density[j] * fall)
+            u += weight * hold * fields.u[j]
+            v += weight * hold * fields.v[j]
+            w += weight * side * fields.w[j]
     k = i - fluids
     if total <= 0.0:
         return 0.0, fields.wall_u[k], fields.wall_v[k], fields.wall_w[k], 0.0
@@ -226,4 +284,4 @@ def wall_values(i, fluids, neighbours, fields, law):
     room, share = fields.wall_room[k], 1.0
     if room > law.norm * liquid:
         share = law.norm * liquid / room
-    return positive(pressure) if law.has_surface else pressure, u, v, w, share
+    return positive(pressure) if pulls_not(law) else pressure, u, v, w, share

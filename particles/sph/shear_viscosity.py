@@ -5,16 +5,23 @@ The laws are those of `parameters/rheology.py`; the constants in `Law` say which
 
 from math import sqrt
 
-from numba import njit
+from numba import uint32
 
-from reflowshock.particles.sph.particle_rates import across, seen, solved
+from reflowshock.particles.sph.particle_rates import (
+    apart,
+    compiled,
+    liquid_among,
+    periods_of,
+    solved,
+    summed,
+)
 from reflowshock.particles.sph.smoothing import slope
 
 NEWTON, POWER_LAW, CARREAU = 0, 1, 2
 LAWS = {"power_law": POWER_LAW, "carreau": CARREAU}
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def viscosity_at(rate, law):
     """Return the viscosity [Pa s] at a rate of shear [1/s]."""
     ratio = rate / law.shear_rate
@@ -29,7 +36,7 @@ def viscosity_at(rate, law):
     return bounded if bounded < law.most_viscosity else law.most_viscosity
 
 
-@njit(cache=True, error_model="numpy")
+@summed
 def viscosity_of(i, fluids, neighbours, fields, law):
     """Return the viscosity [Pa s] of a particle of the liquid, from the renormalised gradient of velocity about it.
 
@@ -40,33 +47,22 @@ def viscosity_of(i, fluids, neighbours, fields, law):
     scale = law.norm * inverse * inverse
     ux = uy = uz = vx = vy = vz = wx = wy = wz = 0.0
     xx = yy = zz = xy = yz = xz = 0.0
-    mirror = law.mirror if z < 2.0 * law.length else 0
-    for n in range((1 + mirror) * len(neighbours) + mirror):
-        j, side = seen(n, i, neighbours, mirror)
-        if j >= fluids and not law.no_slip:
-            continue
-        dx = across(x - fields.x[j], law.period_x)
-        dy = across(y - fields.y[j], law.period_y)
-        dz = across(z - side * fields.z[j], law.period_z)
-        steep = scale * slope(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-        weight = steep * fields.mass[j] / fields.density[j]
+    periods = periods_of(law)
+    count = len(neighbours) if law.no_slip else liquid_among(neighbours, fluids)
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
         hold = side if law.no_slip else 1.0
-        ju, jv, jw = hold * fields.u[j] - u, hold * fields.v[j] - v, side * fields.w[j] - w
-        ux += weight * ju * dx
-        uy += weight * ju * dy
-        uz += weight * ju * dz
-        vx += weight * jv * dx
-        vy += weight * jv * dy
-        vz += weight * jv * dz
-        wx += weight * jw * dx
-        wy += weight * jw * dy
-        wz += weight * jw * dz
-        xx -= weight * dx * dx
-        yy -= weight * dy * dy
-        zz -= weight * dz * dz
-        xy -= weight * dx * dy
-        yz -= weight * dy * dz
-        xz -= weight * dx * dz
+        for n in range(count):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            steep = scale * slope(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            weight = steep * fields.mass[j] / fields.density[j]
+            ju, jv, jw = hold * fields.u[j] - u, hold * fields.v[j] - v, side * fields.w[j] - w
+            ux, uy, uz = ux + weight * ju * dx, uy + weight * ju * dy, uz + weight * ju * dz
+            vx, vy, vz = vx + weight * jv * dx, vy + weight * jv * dy, vz + weight * jv * dz
+            wx, wy, wz = wx + weight * jw * dx, wy + weight * jw * dy, wz + weight * jw * dz
+            xx, yy, zz = xx - weight * dx * dx, yy - weight * dy * dy, zz - weight * dz * dz
+            xy, yz, xz = xy - weight * dx * dy, yz - weight * dy * dz, xz - weight * dx * dz
     moments = (xx, yy, zz, xy, yz, xz)
     ux, uy, uz = solved(moments, (ux, uy, uz), law.dimension)
     vx, vy, vz = solved(moments, (vx, vy, vz), law.dimension)

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from numba import njit, prange
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.neighbours import find_beside, have_moved
 from reflowshock.particles.parameters.flows import largest_time_step
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
@@ -20,54 +21,63 @@ SKIN = 0.3
 RATES, WALL_VALUES = 10, 5
 
 
+@njit(cache=True, parallel=True)
+def _liquid_first(offsets, indices, fluids):
+    """Put the particles of the liquid to the front of each row."""
+    for i in prange(offsets.shape[0] - 1):
+        front = offsets[i]
+        for k in range(offsets[i], offsets[i + 1]):
+            if indices[k] < fluids:
+                indices[front], indices[k] = indices[k], indices[front]
+                front += 1
+
+
 @dataclass(slots=True)
 class Rows:
-    """Neighbours of every particle, found again when one has moved half the skin.
+    """Neighbours of every particle, those of the liquid first, found again when some have moved by the skin.
 
     Attributes:
         law: says support and periods.
         fluids: number of particles that are liquid; those of walls list them alone.
-        built_at: `(3, n)` positions when they were found [m].
-        lists: offsets `(n + 1,)`, indices.
+        built_at: `(n, 3)` positions when they were found [m].
+        lists: offsets `(n + 1,)`, indices; a particle of the liquid is in its own row.
         builds: how often they were found.
     """
 
     law: Law
     fluids: int
-    built_at: Floats = field(default_factory=lambda: np.empty((3, 0)))
+    built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
     lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     builds: int = 0
 
     def update(self, points: Floats) -> None:
-        """Make the lists valid for points `(3, n)` [m]."""
+        """Make the lists valid for points `(n, 3)` [m]."""
         skin = SKIN * self.law.length
-        if points.shape == self.built_at.shape:
-            moved = ((points - self.built_at) ** 2).sum(axis=0).max()
-            if moved <= (0.5 * skin) ** 2:
-                return
+        if points.shape == self.built_at.shape and not have_moved(points, self.built_at, skin):
+            return
         reach = SUPPORT * self.law.length + skin
         images, source = self._images(points, reach)
-        count = points.shape[1]
-        alone = images.shape[1] == count  # images are numbered behind the walls
-        offsets, indices = find_neighbours(images.T, reach, self.fluids if alone else None)
-        offsets = offsets[: count + 1]
-        self.lists = offsets, source[indices[: offsets[-1]]]
+        alone = len(images) == len(points)  # images are numbered behind the walls
+        offsets, indices = find_beside(images[: len(points)], images, reach, self.fluids if alone else None)
+        self.lists = offsets, indices if alone else source[indices]
+        if len(points) > self.fluids:
+            _liquid_first(*self.lists, self.fluids)
         self.built_at = points.copy()
         self.builds += 1
 
     def _images(self, points: Floats, reach: float) -> tuple[Floats, Indices]:
-        """Points with their images beyond the periods `(3, n + g)`, and whose each is."""
-        source = np.arange(points.shape[1], dtype=np.int32)
+        """Points with their images beyond the periods `(n + g, 3)`, and whose each is."""
+        source = np.arange(len(points), dtype=np.int32)
         for axis, period in enumerate((self.law.period_x, self.law.period_y, self.law.period_z)):
             if not period:
                 continue
-            place = points[axis] - period * np.floor(points[axis] / period)
+            place = points[:, axis] - period * np.floor(points[:, axis] / period)
             points = points.copy()
-            points[axis] = place
-            shift = np.zeros((3, 1))
+            points[:, axis] = place
+            shift = np.zeros(3)
             shift[axis] = period
             low, high = place < reach, place > period - reach
-            points = np.concatenate((points, points[:, low] + shift, points[:, high] - shift), axis=1)
+            points = np.concatenate((points, points[low] + shift, points[high] - shift))
             source = np.concatenate((source, source[low], source[high]))
         return points, source
 
@@ -135,6 +145,11 @@ class Simulation:
         u, v, w = (speed[: self.fluids] for speed in (self.fields.u, self.fields.v, self.fields.w))
         return float(np.sqrt((u * u + v * v + w * w).max()))
 
+    @property
+    def pressures(self) -> Floats:
+        """Of the particles of the liquid `(fluids,)` [Pa], with that of its surface."""
+        return self.fields.pressure[: self.fluids] + (self.surface.pressure if self.surface else 0.0)
+
     def saved(self) -> dict[str, Any]:
         """All of it, for a checkpoint."""
         return {
@@ -180,8 +195,7 @@ class Simulation:
             volume = float((fields.mass[carriers] / fields.density[carriers]).sum())
             velocity = np.pad(np.array(middle) + drift, ((0, 0), (0, self.held)))
             self.surface.move(velocity, time_step, volume)
-        if self.law.mirror:
-            self._reflect(middle)
+        self._reflect(middle[2])
         density = fields.density[liquid] + half * rates[0]
         fields.density[liquid] += time_step * rates[0]
         self._find_rates()
@@ -192,16 +206,18 @@ class Simulation:
         self.time += time_step
         self.steps += 1
 
-    def _reflect(self, middle: list[Floats]) -> None:
+    def _reflect(self, *speeds: Floats) -> None:
         """Let a particle that has passed through the mirror change places with its image, whose motion is its own."""
+        if not self.law.mirror:
+            return
         through = np.flatnonzero(self.fields.z[: self.fluids] < 0.0)
-        for across in (self.fields.z, self.fields.w, self.fields.slope_z, middle[2]):
+        for across in (self.fields.z, self.fields.w, self.fields.slope_z, *speeds):
             across[through] *= -1.0
 
     def _find_rates(self) -> None:
         """Find the rates of the present fields."""
         fields, law, liquid = self.fields, self.law, slice(self.fluids)
-        self.rows.update(np.array(fields[:3]))
+        self.rows.update(np.stack(fields[:3], axis=1))
         fields.pressure[liquid] = law.sound**2 * (fields.density[liquid] - law.rest_density)
         self._extend_to_walls()
         if law.rheology:
@@ -229,3 +245,4 @@ class Simulation:
         factor = 4.0 * law.shifting * self.fastest * law.length * time_step
         for axis in range(3):
             self.fields[axis][: self.fluids] -= factor * self.rates[7 + axis]
+        self._reflect()

@@ -30,32 +30,25 @@ def norm(kernel: int, dimension: int, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def shape(kernel, line, q):
-    """Return W / sigma at q >= 0; ``line`` says that the flow has one dimension."""
-    if q >= 2.0:
-        return 0.0
-    if kernel == CUBIC_SPLINE:
-        if q < 1.0:
-            return 1.0 - 1.5 * q * q * (1.0 - 0.5 * q)
-        return 0.25 * (2.0 - q) ** 3
-    rest = 1.0 - 0.5 * q
-    if line:
-        return rest**3 * (1.5 * q + 1.0)
-    return rest**4 * (2.0 * q + 1.0)
+    """Return W / sigma at q >= 0; ``line`` says that the flow has one dimension.
+
+    Every case is computed and one is taken, so that a loop can have several pairs at a time.
+    """
+    rest, half = 2.0 - q, 1.0 - 0.5 * q
+    spline = 1.0 - 1.5 * q * q * half if q < 1.0 else 0.25 * rest * rest * rest
+    wendland = half * half * half * (1.5 * q + 1.0 if line else half * (2.0 * q + 1.0))
+    inside = spline if kernel == CUBIC_SPLINE else wendland
+    return inside if q < 2.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
     """Return (dW / dq) / (sigma q) at q >= 0: times sigma / h^2 and the vector between the points it is grad W."""
-    if q >= 2.0:
-        return 0.0
-    if kernel == CUBIC_SPLINE:
-        if q < 1.0:
-            return -3.0 + 2.25 * q
-        return -0.75 * (2.0 - q) ** 2 / q
-    rest = 1.0 - 0.5 * q
-    if line:
-        return -3.0 * rest**2
-    return -5.0 * rest**3
+    rest, half = 2.0 - q, 1.0 - 0.5 * q
+    spline = -3.0 + 2.25 * q if q < 1.0 else -0.75 * rest * rest / q
+    wendland = half * half * (-3.0 if line else -5.0 * half)
+    inside = spline if kernel == CUBIC_SPLINE else wendland
+    return inside if q < 2.0 else 0.0
 
 
 def beyond_plane(kernel: int, distance: Floats) -> Floats:

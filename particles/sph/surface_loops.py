@@ -1,58 +1,34 @@
 """Loops between the vertices of a liquid's surface and the particles beside them.
 
-A vertex moves with the mean velocity of the particles within the support, weighted by Wendland's kernel; its force is
+A vertex moves with the mean velocity of the particles within the support, weighted by their kernel; its force is
 shared among the same particles by the same weights. So the work of the forces is that of the particles, and momentum
 is kept. Above a wall in z = 0 the images of particles count too: they move and are pushed as in a mirror.
 """
 
 from math import sqrt
 
-import numpy as np
 from numba import njit, prange
 
-from reflowshock.particles.sph.smoothing import WENDLAND_C2, shape
-
-
-@njit(cache=True)
-def rows_of_vertices(offsets, indices, liquid):
-    """Return offsets and indices of the particles beside each vertex, from lists of particles and vertices together."""
-    vertices = offsets.shape[0] - 1 - liquid
-    starts = np.zeros(vertices + 1, np.int32)
-    for v in range(vertices):
-        starts[v + 1] = starts[v]
-        for k in range(offsets[liquid + v], offsets[liquid + v + 1]):
-            starts[v + 1] += indices[k] < liquid
-    found, place = np.empty(starts[vertices], np.int32), 0
-    for k in range(offsets[liquid], offsets[liquid + vertices]):
-        if indices[k] < liquid:
-            found[place] = indices[k]
-            place += 1
-    return starts, found
+from reflowshock.particles.sph.smoothing import shape
 
 
 @njit(cache=True, parallel=True)
-def find_shares(points, lists, fields, law, shares):
-    """Write the weight of each particle beside a vertex into ``shares`` `(2, pairs)`; those of a vertex add to one.
+def find_weights(points, lists, fields, law, weights):
+    """Write the kernel W between each vertex and the particles beside it into ``weights`` `(2, pairs)` [1/m^3].
 
-    The first row is for components along a wall, the second for those across it, in which images are reversed. A vertex
-    without particles has weights of zero.
+    The first row is for components along a wall, the second for those across it, in which images are reversed.
     """
     offsets, indices = lists
     inverse = 1.0 / law.length
     for v in prange(points.shape[0]):
-        total = 0.0
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
             dx, dy, dz = points[v, 0] - fields.x[j], points[v, 1] - fields.y[j], points[v, 2] - fields.z[j]
-            own, image = shape(WENDLAND_C2, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse), 0.0
+            own, image = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse), 0.0
             if law.mirror:
                 dz = points[v, 2] + fields.z[j]
-                image = shape(WENDLAND_C2, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-            shares[0, k], shares[1, k] = own + image, own - image
-            total += own + image
-        for k in range(offsets[v], offsets[v + 1]):
-            shares[0, k] = shares[0, k] / total if total > 0.0 else 0.0
-            shares[1, k] = shares[1, k] / total if total > 0.0 else 0.0
+                image = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            weights[0, k], weights[1, k] = law.norm * (own + image), law.norm * (own - image)
 
 
 @njit(cache=True, parallel=True)
@@ -68,13 +44,12 @@ def carry(lists, shares, velocity, time_step, points):
 
 
 @njit(cache=True)
-def share_forces(lists, shares, forces, mass, pushes):
-    """Add the accelerations by forces on vertices `(m, 3)` to those of the particles, ``pushes`` `(3, n)`."""
+def share_out(lists, shares, vectors, found):
+    """Add what each particle has of the vectors of vertices `(m, 3)` to ``found`` `(3, n)`."""
     offsets, indices = lists
-    for v in range(forces.shape[0]):
+    for v in range(vectors.shape[0]):
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
-            along, across = shares[0, k] / mass[j], shares[1, k] / mass[j]
-            pushes[0, j] += along * forces[v, 0]
-            pushes[1, j] += along * forces[v, 1]
-            pushes[2, j] += across * forces[v, 2]
+            found[0, j] += shares[0, k] * vectors[v, 0]
+            found[1, j] += shares[0, k] * vectors[v, 1]
+            found[2, j] += shares[1, k] * vectors[v, 2]

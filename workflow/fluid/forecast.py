@@ -19,13 +19,13 @@ from reflowshock.workflow.fluid.case import FlowCase, micrometres
 from reflowshock.workflow.process.terminal import new_table
 
 # On one core of an AMD EPYC, in a plane: of a step and of each of its particles; processor times of cases/dam_break.
-SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 2.0e-4, 1.1e-6
+SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 1.3e-4, 2.9e-7
 # In space, with a surface: of a step of each particle, and of each of its triangles, cases/drop_impact.
-SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.5e-3, 3.4e-6
+SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 3.0e-4, 1.2e-6
 # What a solid particle within reach of the liquid costs, over a liquid one: cases/printing, 64 drops.
 SOLID_SHARE = 0.65
-# A step with a viscosity that depends on the rate of shear, over one without: an impact, 16 particles across.
-SHEAR_COST = 1.37
+# A step with a viscosity that depends on the rate of shear, over one without: an impact, 24 particles across.
+SHEAR_COST = 1.53
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
 BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
 

@@ -22,8 +22,7 @@ def two_drops(viscosity=0.5, **changes):
     one = droplet(scene)
     points, aside = np.array(one.fields[:3]), np.array([0.5 + 0.5 * EDGE * one.law.spacing, 0.0, 0.0])
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    pressure = np.full(both.shape[1], scene.laplace_pressure)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), pressure, one.law)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
     fields.u[:] = 0.3 * np.sign(-both[0])
     fields.w[:] = -scene.impact_speed
     surface = one.surface

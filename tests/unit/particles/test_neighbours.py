@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.core.neighbours import NeighbourList, find_neighbours
+from reflowshock.particles.core.neighbours import NeighbourList, find_beside, find_neighbours, have_moved
 
 
 def brute_force(points, radius):
@@ -16,6 +16,32 @@ def test_rows_equal_all_pairs(shape):
     offsets, indices = find_neighbours(points, 0.2)
     found = [set(indices[offsets[i] : offsets[i + 1]]) for i in range(len(points))]
     assert found == brute_force(points, 0.2)
+
+
+def test_points_beside_places_are_those_of_all_pairs_and_the_fixed_see_the_moving_alone():
+    random = np.random.default_rng(4)
+    places, points = random.uniform(-0.5, 1.5, (80, 3)), random.uniform(size=(200, 3))  # some far outside
+    distance = np.linalg.norm(places[:, None] - points[None], axis=2)
+    offsets, indices = find_beside(places, points, 0.3)
+    for i in range(80):
+        assert sorted(indices[offsets[i] : offsets[i + 1]]) == np.flatnonzero(distance[i] < 0.3).tolist()
+    offsets, indices = find_beside(points, points, 0.3, movers=60)
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    for i in range(200):
+        near = np.flatnonzero(distance[i] < 0.3)
+        assert sorted(indices[offsets[i] : offsets[i + 1]]) == [j for j in near if i < 60 or j < 60]
+
+
+def test_what_moves_all_alike_changes_no_list():
+    points = np.random.default_rng(6).uniform(size=(50, 3))
+    moved = points + [5.0, -1.0, 2.0]
+    assert not have_moved(moved, points, 0.1)
+    moved[3, 0] += 0.099
+    assert not have_moved(moved, points, 0.1)
+    moved[3, 0] += 0.003
+    assert have_moved(moved, points, 0.1)
+    moved[3, 0] = np.nan
+    assert have_moved(moved, points, 0.1)
 
 
 def test_list_is_rebuilt_only_past_half_the_skin():
