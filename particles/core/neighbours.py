@@ -93,20 +93,21 @@ def _rows(places, radius, grid, own, movers):
     return offsets, indices
 
 
-def find_neighbours(points: Points, radius: float) -> tuple[Indices, Indices]:
+def find_neighbours(points: Points, radius: float, rows: int | None = None) -> tuple[Indices, Indices]:
     """Find all pairs closer than a radius.
 
     Args:
         points: `(n, 3)` [m], finite.
         radius: search radius [m].
+        rows: how many points, the first ones, have a row. All where it is None.
 
     Returns:
-        offsets `(n + 1,)` and indices: row i lists the neighbours of point i, itself left out.
+        offsets `(rows + 1,)` and indices: row i lists the neighbours of point i, itself left out.
 
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    return _rows(points, radius, _grid(points, points, radius), False, len(points))
+    return _rows(points[:rows], radius, _grid(points, points, radius), False, len(points))
 
 
 def find_beside(places: Points, points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:

@@ -84,6 +84,25 @@ def _volume_and_gradient(points, triangles, gradient):
     return total
 
 
+@njit(cache=True)
+def _wall_volume_and_gradient(points, ring, sixth, gradient):
+    """Tetrahedra (origin, mean of the line, segment), times six and a sixth with a sign; adds their gradient."""
+    count = ring.shape[0]
+    centre, normals = np.zeros(3), np.zeros(3)
+    for k in range(count):
+        a, b = points[ring[k]], points[ring[(k + 1) % count]]
+        for d in range(3):
+            centre[d] += a[d] / count
+            normals[d] += a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3]
+    for k in range(count):
+        before, after = points[ring[k - 1]], points[ring[(k + 1) % count]]
+        for d in range(3):
+            e, f = (d + 1) % 3, (d + 2) % 3
+            across = (after[e] - before[e]) * centre[f] - (after[f] - before[f]) * centre[e]
+            gradient[ring[k], d] += sixth * (across + normals[d] / count)
+    return sixth * (centre[0] * normals[0] + centre[1] * normals[1] + centre[2] * normals[2])
+
+
 def _area_vector(points: Floats, ring: Indices) -> Floats:
     """Normal of the polygon of a contact line times its area, `(3,)` [m^2] (shoelace formula in space)."""
     x = points[ring] - points[ring].mean(axis=0)
@@ -121,11 +140,7 @@ def volume_and_gradient(
     gradient = np.zeros_like(points)
     volume = _volume_and_gradient(points, triangles, gradient)
     for ring, plate in zip(rings, plates, strict=True):
-        x, sixth = points[ring], plate.side / 6.0
-        centre, normals = x.mean(axis=0), np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
-        volume += sixth * float(centre @ normals)
-        edges = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
-        gradient[ring] += sixth * (np.cross(edges, centre) + normals / len(ring))
+        volume += _wall_volume_and_gradient(points, ring, plate.side / 6.0, gradient)
     return volume, gradient
 
 

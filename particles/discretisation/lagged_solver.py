@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from petsc4py import PETSc
 from scipy import sparse
 
 
@@ -21,10 +20,10 @@ class LaggedSolver:
 
     origin: sparse.csr_matrix | None = None
     iterations: int = 0
-    _solver: PETSc.KSP | None = field(default=None, repr=False)
+    _solver: Any = field(default=None, repr=False)
 
     def saved(self) -> dict[str, Any]:
-        """All but the PETSc objects, for a checkpoint."""
+        """All but what follows from the matrix, for a checkpoint."""
         origin = self.origin
         rows = None if origin is None else {name: getattr(origin, name) for name in ("data", "indices", "indptr")}
         return {"origin": rows, "iterations": self.iterations}

@@ -56,7 +56,7 @@ class Galerkin:
         for reach in REACHES:
             ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing, slips)
             points = np.concatenate((body.points, ghosts.points))
-            lists = find_neighbours(points, reach * spacing)
+            lists = find_neighbours(points, reach * spacing, rows=count)
             squares, lengths = kernels.supports(count, points, (*lists, reach * spacing), spacing)
             if (squares > 0.0).all():
                 break
@@ -90,6 +90,17 @@ class Galerkin:
         result = self._nothing()
         kernels.forces_of(self.starts, self.columns, self.weights, stress, result)
         return self._folded(result)
+
+    def resistance(self, field: Floats, factors: Floats) -> Floats:
+        """Forces `(n, 3)` [N] that resist a velocity `(n, 3)` [m/s]: of roughness, walls and viscosity.
+
+        Args:
+            field: the velocity.
+            factors: `(n, 3)` of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], each with a force
+                on what it resists, as `load_rough` and `load` have it.
+        """
+        images = self._with_images(field)
+        return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))
 
     def divergence(self, field: Floats) -> Floats:
         """Divergence of a velocity at the particles `(n,)` [1/s]."""

@@ -63,6 +63,7 @@ class GalerkinEquations:
         fluid: its density, viscosity and smoothing.
         basis: `(3 n, d)` admissible velocities, orthonormal columns, by particle.
         stiffness: `(n, n)` of the surface tension, gamma K [N/m].
+        rigid: `(k, 3 n)` rigid motions that walls admit, by particle, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
@@ -73,10 +74,17 @@ class GalerkinEquations:
     fluid: Flow
     basis: sparse.csr_matrix
     stiffness: sparse.csr_matrix
+    rigid: Floats
     drag: Floats
     unbalanced: Floats
     spacing: float
     time_step: float
+
+    @property
+    def factors(self) -> Floats:
+        """Of what resists velocities, `(n, 3)`: smoothing [kg/s], drag [kg/s] and viscosity [N m s]."""
+        smoothing, viscosity = self.fluid.smoothing * self.masses, self.fluid.viscosity * self.space.volumes
+        return np.column_stack((smoothing, self.drag, viscosity))
 
     @property
     def masses(self) -> Floats:
@@ -153,11 +161,18 @@ class GalerkinEquations:
 
     def operator(self, field: Floats) -> Floats:
         """m/dt + V + S + dt K of a velocity, [N]."""
-        space, gradient = self.space, self.space.gradient(field)
-        direct = self.momentum(field) / self.time_step + self.time_step * (self.stiffness @ field)
-        rough = space.rough(field)
-        drag = self.drag[:, None] * (field - rough)
-        return direct + drag + space.load_rough(self._friction(rough) - drag) + space.load(self._stress(gradient))
+        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
+        return direct + self.space.resistance(field, self.factors)
+
+    def tension(self, field: Floats) -> Floats:
+        """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, and no moment.
+
+        K alone resists turning, which a surface does not: a drop would be left turning on its wall.
+        """
+        rigid = self.rigid
+        moving = (rigid @ self.momentum(field).ravel()) @ rigid
+        pull = self.stiffness @ (field - moving.reshape(-1, 3))
+        return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""

@@ -180,6 +180,41 @@ def forces_of(starts, columns, weights, stress, result):
 
 
 @njit(cache=True)
+def resistance(starts, columns, weights, field, factors):
+    """Forces `(n + g, 3)` that resist velocities `(n + g, 3)`, in one pass over the rows.
+
+    Factors `(n, 3)` of each particle: of v - N v, with the same on v - N v [kg/s]; of N v, on N v [kg/s]; of the strain
+    rate, twice which is the stress times volume [N m s].
+    """
+    result = np.zeros(field.shape)
+    for i in range(starts.shape[0] - 1):
+        x0 = x1 = x2 = x3 = y0 = y1 = y2 = y3 = z0 = z1 = z2 = z3 = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            w0, w1, w2, w3 = weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3]
+            x, y, z = field[j, 0], field[j, 1], field[j, 2]
+            x0, x1, x2, x3 = x0 + w0 * x, x1 + w1 * x, x2 + w2 * x, x3 + w3 * x
+            y0, y1, y2, y3 = y0 + w0 * y, y1 + w1 * y, y2 + w2 * y, y3 + w3 * y
+            z0, z1, z2, z3 = z0 + w0 * z, z1 + w1 * z, z2 + w2 * z, z3 + w3 * z
+        rough, drag, viscous = factors[i, 0], factors[i, 1], factors[i, 2]
+        fx, fy, fz = rough * (field[i, 0] - x0), rough * (field[i, 1] - y0), rough * (field[i, 2] - z0)
+        result[i, 0] += fx
+        result[i, 1] += fy
+        result[i, 2] += fz
+        # Of each column: the force on N v and the stresses, by the weights of psi and its derivatives.
+        x0, y0, z0 = drag * x0 - fx, drag * y0 - fy, drag * z0 - fz
+        xy, xz, yz = viscous * (x2 + y1), viscous * (x3 + z1), viscous * (y3 + z2)
+        xx, yy, zz = 2.0 * viscous * x1, 2.0 * viscous * y2, 2.0 * viscous * z3
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            w0, w1, w2, w3 = weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3]
+            result[j, 0] += w0 * x0 + w1 * xx + w2 * xy + w3 * xz
+            result[j, 1] += w0 * y0 + w1 * xy + w2 * yy + w3 * yz
+            result[j, 2] += w0 * z0 + w1 * xz + w2 * yz + w3 * zz
+    return result
+
+
+@njit(cache=True)
 def divergence(starts, columns, weights, field):
     """Divergence `(n,)` of velocities `(n + g, 3)`."""
     count = starts.shape[0] - 1

@@ -108,9 +108,11 @@ class GalerkinPast:
         return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
 
     def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: they have the velocity there."""
+        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
         change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        return replace(self, points=body.points, velocity=physics.admit(body, self.velocity + change))
+        velocity = physics.admit(body, self.velocity + change)
+        history = self.history.stopped(physics.pinned(body))
+        return replace(self, points=body.points, velocity=velocity, history=history)
 
 
 @dataclass(slots=True)
@@ -162,7 +164,7 @@ class IspgStep:
             self.past = GalerkinPast.start(body, physics.energy(body), self.past.losses)
         else:
             self.past = self.past.carried_on(body, physics)
-        return PreparedIspgStep(self, body, physics, self.past)
+        return PreparedIspgStep(self, body, physics, self.past, admitted_motions(body, physics))
 
     @property
     def mass(self) -> sparse.csr_matrix:
@@ -200,12 +202,14 @@ class PreparedIspgStep:
         body: the liquid body.
         physics: what acts on it.
         past: of the particles where they are now.
+        admitted: `(6,)` which rigid motions walls admit.
     """
 
     solver: IspgStep
     body: Body
     physics: Physics
     past: GalerkinPast
+    admitted: NDArray[np.bool_]
 
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
@@ -221,9 +225,10 @@ class PreparedIspgStep:
         predicted = replace(body, points=base.points + base.time_step * guess)
         enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
+        motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past, base = self._with_momenta(equations, base)
-        force = self.physics.force(predicted) + base.time_step * (equations.stiffness @ guess)
+            past, base = self._with_momenta(equations, base, motions)
+        force = self.physics.force(predicted) + base.time_step * equations.tension(guess)
         start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
@@ -231,11 +236,11 @@ class PreparedIspgStep:
         points = base.points + base.time_step * velocity
         history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
-        momenta = rigid_momenta(rigid_motions(points), equations.masses, velocity)
+        momenta = rigid_momenta(motions, equations.masses, velocity)
         losses = self._carried_losses(equations, past.velocity)
         losses = _step_losses(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * (equations.stiffness @ start)
+        pull = force - base.time_step * equations.tension(start)
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
@@ -262,29 +267,25 @@ class PreparedIspgStep:
             iterations=self.solver.factors.iterations,
         )
 
-    def _with_momenta(self, equations: GalerkinEquations, base: Base) -> tuple[GalerkinPast, Base]:
-        """The last velocity, and that of the base, with the momenta of the last steps.
+    def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
+        """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
+        Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
+        drop would be left turning.
         """
-        past, kept = self.past, self._admitted_motions()
+        past, kept = self.past, self.admitted
+        motions = motions[kept]
 
         def corrected(velocity: Floats, momenta: Floats) -> Floats:
             if not kept.any():
                 return velocity
-            motions = rigid_motions(self.body.points)[kept]
             missing = momenta[kept] - rigid_momenta(motions, equations.masses, velocity)
             inertia = np.array([rigid_momenta(motions, equations.masses, motion) for motion in motions])
             return velocity + np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
 
         start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
         return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
-
-    def _admitted_motions(self) -> NDArray[np.bool_]:
-        """Which rigid motions walls admit, `(6,)`."""
-        motions = rigid_motions(self.body.points)
-        changes = [np.abs(self.physics.admit(self.body, motion) - motion).max() for motion in motions]
-        return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
@@ -306,12 +307,14 @@ class PreparedIspgStep:
         fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
         nothing = sparse.csr_matrix((len(body.points),) * 2)
+        rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             basis=basis,
             spacing=spacing,
             stiffness=sum((part.stiffness(body) for part in tensions), nothing),
+            rigid=_orthonormal(rigid, density * space.volumes),
             drag=friction * wall_shares(body, space.volumes),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
@@ -365,15 +368,31 @@ def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
     )
 
 
+def admitted_motions(body: Body, physics: Physics) -> NDArray[np.bool_]:
+    """Which rigid motions walls admit, `(6,)`."""
+    motions = rigid_motions(body.points)
+    changes = [np.abs(physics.admit(body, motion) - motion).max() for motion in motions]
+    return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
+
+
 def rigid_motions(points: Floats) -> Floats:
     """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
-    axes = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
-    return np.array([*axes, *(np.cross(axis, points) for axis in axes)])
+    motions = np.zeros((6, *points.shape))
+    for axis in range(3):
+        motions[axis, :, axis] = 1.0
+        motions[3 + axis, :, axis - 2], motions[3 + axis, :, axis - 1] = -points[:, axis - 1], points[:, axis - 2]
+    return motions
 
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
     return np.tensordot(motions, masses[:, None] * velocity, axes=2)
+
+
+def _orthonormal(motions: Floats, masses: Floats) -> Floats:
+    """A basis `(k, 3 n)` of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
+    flat = motions.reshape(len(motions), 3 * len(masses))
+    return np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
 
 
 def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:

@@ -4,18 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.discretisation.incompressibility import SolveFailed, cholesky
+from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.discretisation.lagged_solver import LaggedSolver
 
 Apply = Callable[[Floats], Floats]
 MAX_ITERATIONS = 500
 # Of the norm of the right-hand side: more than this is no solution.
 RESIDUAL_LIMIT = 1e-4
-# Factors cost as much as some fifty iterations.
-MANY_ITERATIONS = 25
+# Factors cost as much as some forty iterations.
+MANY_ITERATIONS = 16
 # Of the mean of the diagonal, added to it in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 
@@ -68,7 +68,10 @@ def conjugate_gradients(
 
 @dataclass(slots=True)
 class LaggedCholesky(LaggedSolver):
-    """Factors that are made anew when their last use took many iterations."""
+    """Factors that are made anew when their last use took many iterations.
+
+    They are dense: particles push on those two supports away, so that factors of a few thousand fill up anyhow.
+    """
 
     def solve(
         self, operator: Apply, matrix: Callable[[], sparse.csr_matrix], right: Floats, tolerance: Tolerance
@@ -76,20 +79,26 @@ class LaggedCholesky(LaggedSolver):
         """Solve A x = b from zero; `matrix` assembles A where new factors are needed.
 
         Raises:
-            SolveFailed: the true residual stays above the limit.
+            SolveFailed: the true residual stays above the limit, or A has no factors.
         """
         if self.origin is None or self.iterations > MANY_ITERATIONS or self.origin.shape[0] != len(right):
             self.origin, self._solver = matrix(), None
         if self._solver is None:
-            shift = SHIFT * self.origin.diagonal().mean()
-            self._solver = cholesky((self.origin + shift * sparse.identity(len(right))).tocsr())
-        solver = self._solver
-        found, known = solver.getOperators()[0].createVecs()
+            self._solver = _factored(self.origin)
+        factors = self._solver
 
         def precondition(residual: Floats) -> Floats:
-            known.setArray(residual)
-            solver.solve(known, found)
-            return found.getArray().copy()
+            return linalg.cho_solve(factors, residual, check_finite=False)
 
         solution, self.iterations = conjugate_gradients(operator, right, np.zeros_like(right), precondition, tolerance)
         return solution
+
+
+def _factored(matrix: sparse.csr_matrix) -> tuple[Floats, bool]:
+    """Factors of a symmetric positive semidefinite matrix, shifted."""
+    dense = matrix.toarray(order="F")
+    dense[np.diag_indices_from(dense)] += SHIFT * dense.diagonal().mean()
+    try:
+        return linalg.cho_factor(dense, lower=True, overwrite_a=True, check_finite=False)
+    except linalg.LinAlgError as error:
+        raise SolveFailed(f"Cholesky factors of {len(dense)} pressures: {error}") from error

@@ -26,9 +26,6 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         pitch: distance of neighbouring joints [m].
     """
     effects = decide_effects(next(iter(geometries.values())), solder)
-    found = ispg_problems(solder, "joints between plates")
-    if found:
-        return found
     found = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
     if found:
         return found
@@ -53,7 +50,7 @@ def ispg_problems(solder: Solder, place: str) -> list[Problem]:
     """Find the scheme ispg at a place where it does not hold, or is not verified; empty for other schemes."""
     if solder.numerics.scheme != "ispg":
         return []
-    message = f'the scheme "ispg" is for one drop on a uniform wall, with inertia; it is not verified for {place}'
+    message = f'the scheme "ispg" is for one drop on a wall or one joint, with inertia; it is not verified for {place}'
     return [Problem("solder.numerics.scheme", message, "ispg", "energy")]
 
 

@@ -11,7 +11,7 @@ from reflowshock.particles.parameters.estimate import particle_count
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
-from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+from reflowshock.particles.reference.young_laplace import NoMeridian, cap_angle, joint_meridian, sessile_meridian
 from reflowshock.problem import Problem
 
 FEWEST_PER_EDGE = 5
@@ -39,9 +39,9 @@ class HasWall(Protocol):
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    found = _flow_problems(drop, solder) or _ispg_problems(drop, solder)
+    found = _flow_problems(drop, solder) or _pad_problems(drop) or _ispg_problems(drop, solder)
     found = found or _resolution_problems(drop) or _symmetry_problems(drop, solder)
-    return found or _wall_problems(drop) or _pad_problems(drop) or free_problems(drop, solder)
+    return found or _wall_problems(drop) or free_problems(drop, solder)
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
@@ -58,11 +58,13 @@ def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
 
 def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what the scheme ispg is not verified for."""
+    if solder.numerics.scheme != "ispg":
+        return []
     inertia = decide_drop(solder, drop.is_free)["inertia"]
+    angle, few = _angle_at_rest(drop), drop.count < ISPG_FILM_EDGE
     places = {
         "free drops": drop.is_free,
-        "pads": drop.pad_radius is not None,
-        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(drop.contact_angle),
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
         "hysteresis": drop.hysteresis is not None,
         "walls that hold the liquid": solder.wall != "free-slip",
         "planes of symmetry": drop.symmetry != "none",
@@ -71,12 +73,32 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
             ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
         ),
         f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
-            drop.count < ISPG_FILM_EDGE
-            and drop.contact_angle is not None
-            and drop.contact_angle < ISPG_FILM_ANGLE - ROUNDING
+            few and angle is not None and angle < ISPG_FILM_ANGLE - ROUNDING
         ),
+        f"{drop.count} particles along an edge on a pad (at least {ISPG_FILM_EDGE})": few
+        and drop.pad_radius is not None,
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
+    """Find joints that the scheme ispg is not verified for."""
+    inertia = decide_effects(joint.geometry, solder)["inertia"]
+    places = {
+        "plates that are not parallel": joint.tilt != 0.0,
+        "packages that float": joint.package is not None,
+        "packages that are moved": joint.path is not None,
+        "walls that hold the liquid": solder.wall != "free-slip",
+        f"joints without inertia ({inertia['why']})": not inertia["on"],
+    }
+    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _angle_at_rest(drop: Drop) -> float | None:
+    """Contact angle [rad] of a drop at rest, that at the edge of its pad if this holds it; without its weight."""
+    if drop.pad_radius is None or drop.contact_angle is None:
+        return drop.contact_angle
+    return min(max(cap_angle(drop.volume, drop.pad_radius), drop.contact_angle), drop.mask_contact_angle)
 
 
 def _is_between(angle: float | None) -> bool:
@@ -148,7 +170,9 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = found or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    found = (
+        found or _ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    )
     return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 

@@ -212,6 +212,14 @@ def sphere_meridian(volume: float, surface_tension: float) -> Meridian:
     return Meridian(radius * np.sin(psi), -radius * np.cos(psi), pressure, 0.0, float("nan"), float("nan"))
 
 
+def cap_angle(volume: float, radius: float) -> float:
+    """Contact angle [rad] of the spherical cap of a volume [m^3] on a disc of a radius [m]."""
+    half, cube = 3.0 * volume / np.pi, radius**3  # of the height: h^3 + 3 r^2 h = 2 half
+    root = np.hypot(half, cube)
+    height = np.cbrt(half + root) + np.cbrt(half - root)
+    return float(2.0 * np.arctan2(height, radius))
+
+
 def pad_meridian(
     volume: float,
     pad_radius: float,

@@ -47,7 +47,8 @@ def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run
     reference = reference_meridian(geometry, solder, _weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
-    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | _cost_and_rest(solder, flow, run)
+    rest = _cost_and_rest(solder, flow, run) | _ledger(flow, run)
+    return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
 def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) -> Metrics:

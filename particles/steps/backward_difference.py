@@ -9,6 +9,7 @@ Euler. A mode of frequency omega is damped at a rate of omega^4 dt^3 / 4 and slo
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
@@ -48,6 +49,12 @@ class BackwardDifference:
     def start(cls, count: int) -> "BackwardDifference":
         """Start a body of `count` particles."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
+
+    def stopped(self, held: NDArray[np.bool_]) -> "BackwardDifference":
+        """The last step without the motion of particles `(n,)` that something has caught since."""
+        still = held[:, None]
+        displacement, change = (np.where(still, 0.0, field) for field in (self.displacement, self.velocity_change))
+        return BackwardDifference(displacement, change, self.time_step)
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:
         """Start of the equivalent step from positions and velocities `(n, 3)` now, for a time step [s]."""

@@ -5,6 +5,7 @@ import pytest
 
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.scenes import Drop
@@ -15,6 +16,7 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.free_drop import SECOND_MOMENT, fit_oscillation
+from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.time_step import TimeStep
@@ -56,6 +58,51 @@ def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
     assert min(metrics["viscous_loss"], metrics["smoothing_loss"]) > 0.005  # 0.009 at 5 an edge, 120 degrees
     # Of the cube's 1 mm; the caps of 120 and 148 degrees are 0.98 and 1.16 mm high: their swing alone is left.
     assert np.ptp(history["height"]) > (0.15e-3 if degrees > 100.0 else 0.5e-3)
+
+
+def liquid(**kept):
+    """Solder with the paper's values and inertia, without gravity."""
+    effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
+    return Solder(effects=effects, process_time=0.1, **PAPER, **kept)
+
+
+BALLS = [
+    pytest.param(*row, marks=pytest.mark.long)
+    for row in ((0.0564, 7), (0.1077, 7), (0.1218, 7), (0.2298, 7), (0.2298, 11))
+]
+
+
+@pytest.mark.parametrize(("volume", "count"), [(0.0141, 6), *BALLS])
+def test_a_ball_swings_and_comes_to_rest_on_its_pad(volume, count):
+    """Example 4.2: caps pinned at the pad's edge, the largest on the mask; the bar is 2 % in height and width."""
+    drop = Drop(volume=volume * 1e-9, contact_angle=np.radians(5.0), pad_radius=2e-4, particles_per_edge=count)
+    numerics = SolderNumerics(scheme="ispg", spacing=drop.resolution, time_step_limit=100.0)
+    shape = drop_to_rest(drop, liquid(volume=drop.volume, numerics=numerics, **drop.contact_angles)).shape
+    metrics = {name: value for name, (value, _) in shape.metrics.items()}
+    assert shape.verdict == ("overflow" if volume > 0.2 else "ok")
+    assert metrics["at_rest"] == 1.0
+    assert metrics["particles_lost"] == 0
+    assert abs(metrics["height_error"]) < 0.01
+    assert abs(metrics["max_width_error"]) < 0.002
+    assert abs(metrics["contact_angle_error"]) < 1.5
+    assert abs(metrics["volume_drift"]) < 1e-12
+    assert abs(metrics["energy_imbalance"]) < 0.002
+
+
+@pytest.mark.parametrize("gap", [0.35e-3, pytest.param(0.45e-3, marks=pytest.mark.long)])
+def test_a_joint_swings_and_comes_to_rest(gap):
+    """A barrel, part of a sphere but for its force, and a neck, against Young-Laplace."""
+    numerics, radius = SolderNumerics(scheme="ispg", spacing=6e-5, time_step_limit=100.0), 0.24e-3
+    solder = liquid(volume=np.pi * radius**2 * 0.4e-3, numerics=numerics)
+    shape = solve_joint(JointGeometry(gap, radius, radius), solder)
+    metrics = {name: value for name, (value, _) in shape.metrics.items()}
+    assert shape.verdict == "ok"
+    assert metrics["at_rest"] == 1.0
+    assert metrics["particles_lost"] == 0
+    assert max(abs(metrics["width_error"]), abs(metrics["waist_error"])) < 0.002
+    assert abs(metrics["axial_force_error"]) < 0.005
+    assert abs(metrics["volume_drift"]) < 1e-8
+    assert abs(metrics["energy_imbalance"]) < 0.001
 
 
 @pytest.mark.long

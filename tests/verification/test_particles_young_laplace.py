@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian, sessile_meridian
+from reflowshock.particles.reference.young_laplace import NoMeridian, cap_angle, joint_meridian, sessile_meridian
 
 GAMMA, RADIUS = 0.4985, 0.24e-3
 
@@ -82,6 +82,7 @@ def test_drop_without_weight_is_a_spherical_cap(degrees):
     assert drop.height == pytest.approx(radius * (1 - c), rel=1e-6)
     assert drop.r[0] == pytest.approx(radius * np.sqrt(1 - c * c), rel=1e-6)
     assert drop.pressure == pytest.approx(2 / radius, rel=1e-6)
+    assert cap_angle(1.0, float(drop.r[0])) == pytest.approx(np.radians(degrees), rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,8 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     pads = pad_table(package, case.board, case.warpage)
     geometries = joint_geometries(pads)
     heated = thermal_checks.problems(thermal, case.materials.by_role, case.warpage.corner) if thermal else []
-    of_solder = particles_checks.problems(case.solder, geometries, package.pitch)
+    of_solder = particles_checks.ispg_problems(case.solder, "the joints of a package")
+    of_solder = of_solder or particles_checks.problems(case.solder, geometries, package.pitch)
     if thermal:
         of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
     return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))

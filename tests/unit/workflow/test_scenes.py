@@ -54,7 +54,7 @@ BAD_VALUES = {
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
     "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
     "ispg without inertia": (DROP, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "without inertia", "energy"]),
-    "ispg of a joint": (JOINT, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "not verified for joints"]),
+    "ispg of a joint at rest": (JOINT, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "joints without inertia"]),
     "ispg of two drops": (PAIR, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "not verified for two drops"]),
     "no surface tension": (JOINT, "solder.effects.surface_tension=off", ["effects.surface_tension", "to rest"]),
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
@@ -201,7 +201,7 @@ ISPG = ("drop.particles_per_edge=11",)
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
-        ("drop.pad_radius=0.5 mm", "pads"),
+        ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
         ("drop.symmetry=half", "planes of symmetry"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
         ("solder.wall=no-slip", "walls that hold the liquid"),
@@ -218,6 +218,27 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG]
     assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(DROP, *asked, setting)
+
+
+@pytest.mark.parametrize(
+    ("setting", "place"),
+    [
+        ("joint.tilt=3 deg", "plates that are not parallel"),
+        ("joint.package.load=0.1 mN", "packages that float"),
+        ("joint.path.standoff=0.4 mm", "packages that are moved"),
+        ("solder.wall=no-slip", "walls that hold the liquid"),
+    ],
+)
+def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setting, place):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    assert read_case(JOINT, asked).molten.numerics.scheme == "ispg"
+    assert place in problems_of(JOINT, *asked, setting)
+
+
+def test_the_scheme_ispg_takes_a_pad_that_holds_the_drop():
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    assert read_case(BALL, asked).molten.numerics.scheme == "ispg"
+    assert "on a pad (at least 6)" in problems_of(BALL, *asked, "drop.pad_radius=0.3 mm", "drop.particles_per_edge=5")
 
 
 def test_motion_that_matters_costs_all_steps_allowed():
