@@ -14,12 +14,15 @@ Parts, each by itself where it is named; figures of earlier calls stay:
 - ``two_scales``: core seconds of a simulated second over those of one model, with three joints fine and with one, in
   finite rotation, solder that yields; ``errors``: their histories on a smaller board under a shorter pulse, in
   which solder flows.
+- ``implicit``: one model in implicit steps (``support/newton_steps.py``) on that board, under its pulse and one five
+  times as long: processor seconds and errors against explicit steps, beside those of two scales.
 - ``drift``: energy over 1e5 windows of two models in finite rotation, elastic, no damping, by each scheme.
 - ``growth``: of one window of every scheme, over the grid of coupling_stability.py, where the models have turned by 40
   degrees and strained by half a per cent, and the block flows: its elements have their tangents. One-point elements;
   ``growth_of_modes``, ``errors_of_modes``: those with incompatible modes.
 
-Sides take turns; ratios are of processor seconds. Bars that stand in ``not_measured`` need longer runs.
+Sides take turns; ratios are of processor seconds. Wall times of whole cases are those of their runs in ``runs``; where
+there is none, ``not_measured`` has the command.
 """
 
 import argparse
@@ -43,7 +46,9 @@ from benchmarks.support import turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.kept_rows import KeptRows
+from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
+from benchmarks.support.whole_runs import found_in_runs
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
 from reflowshock.cases.hard.trials.bodies import motion_of, nonlinear_body
@@ -83,6 +88,7 @@ DRIFTING = {
     "impulse": Pair(3, 3.0),
     "gravouil_combescure": Pair(3, 3.0),
 }
+SPARSE, STEPS_A_PULSE = 60, (50, 100)  # samples, and steps, of implicit runs
 ROUNDS = 5
 TURN = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.0], [0.0, 0.0, 1.0]])
 STRETCHED = np.array([[1.0, 0.3, 0.0], [0.3, -0.36, 0.0], [0.0, 0.0, -0.36]])
@@ -93,10 +99,6 @@ PEERS = {  # law -> material, strain, peers that have it, elements of this progr
     "plastic": (IDEAL_SOLDER, 3e-3, ("kratos",), ("one_point", "incompatible_modes")),
 }
 PEER_BAR, SAME_FORCES = 20.0, 1e-3  # of J2 and of Green's strain instead of the stretch: of the order of the strain
-NOT_MEASURED = {
-    "default case, answer complete": "its run folder tells: reflowshock run cases/jedec_bga/case.toml",
-    "hu_bga_drop, full size, finite + J2, two scales": "its run folder tells: --set scale=physical",
-}
 Bars = dict[str, dict[str, Any]]
 
 
@@ -276,6 +278,32 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
     return bars, found
 
 
+def implicit() -> tuple[Bars, dict]:
+    """Return what implicit steps cost and miss, of the pulse of ``errors`` and of one five times as long."""
+    found: dict[str, dict] = {}
+    for pulse in (PULSE, 5.0 * PULSE):
+        shock = FINITE | {"peak_acceleration": PEAK, "pulse_duration": pulse, "history_samples": SPARSE}
+        with tempfile.TemporaryDirectory() as folder:
+            scene = DropScene.write(Path(folder), (*SHORT, MATERIAL))
+            request = partial(scene.request, shock=shock | {"duration": DURATION / PULSE * pulse})
+            runs = {"explicit": request("dns", HELD | {"fine_joints": "all"})}
+            runs |= {name: request("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
+            runs |= {f"{count} steps a pulse": runs["explicit"] for count in STEPS_A_PULSE}
+            for name, given in runs.items():
+                run = ProgramRun(given)
+                if given is runs["explicit"] and name != "explicit":
+                    take_implicit_steps(run, pulse / int(name.split()[0]))
+                arrays, seconds = run.to_end()
+                path = Path(folder) / f"{name}.npz"
+                np.savez(path, **arrays)
+                errors_found = compare_histories(
+                    path, Path(folder) / "explicit.npz", list(FINE.get(name, CRITICAL[:1]))
+                )
+                found[f"{name}, pulse of {pulse:g} s"] = {"seconds": seconds, **errors_found}
+                print(name, pulse, seconds, errors_found, flush=True)
+    return {}, found
+
+
 def drift() -> tuple[Bars, dict]:
     """Return the drift of energy over many windows in finite rotation, of each scheme."""
     bars, found = {}, {}
@@ -336,7 +364,7 @@ def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, fl
 
 PARTS = {
     part.__name__: part
-    for part in (forces, against_peers, bending, effects, interpreter, two_scales, errors, drift, growth)
+    for part in (forces, against_peers, bending, effects, interpreter, two_scales, errors, implicit, drift, growth)
 }
 PARTS |= {f"{part.__name__}_of_modes": partial(part, formulation="incompatible_modes") for part in (errors, growth)}
 
@@ -348,11 +376,13 @@ def main() -> None:
     options = parser.parse_args()
     parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
-    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}, "not_measured": NOT_MEASURED}
+    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}}
     for name in chosen:
         bars, rest = parts[name]()
         found["bars"] |= bars
         found[name] = rest
+        bars, found["not_measured"] = found_in_runs()
+        found["bars"] |= bars
         turns.write("nonlinear", found)
 
 

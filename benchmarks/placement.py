@@ -1,9 +1,10 @@
 """Placements of two models on ranks: predicted and measured windows, how busy ranks are, what coupling costs.
 
-    PYTHONPATH=. python benchmarks/placement.py [RANKS ...]  (default 1 2; two minutes; writes results/placement.json)
+    PYTHONPATH=. python benchmarks/placement.py [RANKS ...]  (default 1 2; three minutes; writes results/placement.json)
 
-The package of ``cases/bga_drop`` on its board, copper at its true mass, all joints fine, with both schemes. The script
-starts itself on the ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts
+The package of ``cases/bga_drop`` on its board, linear, copper at its true mass, all joints fine, with both schemes; and
+``cases/jedec_bga``, turning and yielding, masses scaled as there, one joint fine. The script starts itself on the
+ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts
 twice: figures are means over the fastest twentieth of the windows, and so are predictions of the least of few samples.
 """
 
@@ -32,6 +33,8 @@ from reflowshock.fem.run.time_loop import run_window
 from reflowshock.workflow.process.launch import mpi_command
 
 SCHEMES = ("held_velocity", "local_steps")
+SCALED = ("shock.numerics.mass_scaled=['copper', 'solder', 'column']",)
+NONLINEAR = {"kinematics": "corotational", "plasticity": "on", "duration": 1e-3}
 WINDOWS, FASTEST = 300, 15
 PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
 
@@ -64,24 +67,34 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
     }
 
 
-def requests(scene: DropScene, size: int) -> dict[str, str]:
-    """Return the inputs of all placements of both schemes on some ranks."""
-    found = {}
-    for scheme in SCHEMES:
-        for placement in ("shared", "disjoint") if size > 1 else ("shared",):
-            request = scene.request("two_scale", {"scheme": scheme, "fine_joints": "all"}, {})
-            shock = request.shock.model_copy(update={"ranks": Ranks(total=size, placement=placement)})
-            name = f"{scheme}, {placement}, {size}"
-            found[name] = request.model_copy(update={"shock": shock}).model_dump_json()
+def requests(folder: Path) -> dict[str, RunInput]:
+    """Return the inputs of both schemes and of the nonlinear case, on one rank; meshes are written to a folder."""
+    for name in ("linear", "nonlinear"):
+        (folder / name).mkdir()
+    scene = DropScene.write(folder / "linear")
+    found = {name: scene.request("two_scale", {"scheme": name, "fine_joints": "all"}, {}) for name in SCHEMES}
+    scene = DropScene.write(folder / "nonlinear", SCALED, "jedec_bga")
+    found["jedec_bga"] = scene.request("two_scale", {"fine_joints": ["A10"], "levels": 1}, NONLINEAR)
     return found
+
+
+def placed(found: dict[str, RunInput], size: int) -> dict[str, str]:
+    """Return inputs with all placements on some ranks."""
+    table = {}
+    for name, request in found.items():
+        for placement in ("shared", "disjoint") if size > 1 else ("shared",):
+            shock = request.shock.model_copy(update={"ranks": Ranks(total=size, placement=placement)})
+            text = request.model_copy(update={"shock": shock}).model_dump_json()
+            table[f"{name}, {placement}, {size}"] = text
+    return table
 
 
 def main(counts: list[int]) -> None:
     table: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
-        scene, path = DropScene.write(Path(folder)), Path(folder) / "requests.json"
+        found, path = requests(Path(folder)), Path(folder) / "requests.json"
         for count in counts:
-            path.write_text(json.dumps(requests(scene, count)))
+            path.write_text(json.dumps(placed(found, count)))
             program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
             command = mpi_command(count, program, oversubscribe=True)
             subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.DEVNULL, check=True)

@@ -28,7 +28,7 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SILICON
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.problem.thermal import Thermal
@@ -76,7 +76,7 @@ def ours(mesh: MeshData) -> tuple[float, dict]:
     """Return the warpage by the program's hexahedra, and costs; a cell of board lies apart, as tables want one."""
     board = mesh_of(*grid([0.0, SUBSTRATE], [0.0, SUBSTRATE], [-2e-3, -1e-3]), "board", {"symmetry_x": on(0, 0.0)})
     both = append([board, mesh])
-    model = Thermoelastic(MPI.COMM_SELF, both, thermal_tables(both, np.zeros(3)), Materials())
+    model = Thermoelastic(MPI.COMM_SELF, both, thermal_tables(both, np.zeros(3)), ELASTIC)
     moved = np.empty_like(both.points)
     moved[model.body.local.nodes] = RISE * model.displacement(model.expansion)
     costs = {"equations": model.equations, "factor_bytes": model.cost.memory}
@@ -173,7 +173,7 @@ def boards(quick: bool) -> list[dict]:
             write = write_assembly if size else write_heated_assembly
             elements = sum(write(case.package, board, path).values())
             rows.append(
-                {"board": name, "elements": elements} | board_row(Assembly(path, pads, Materials(), Thermal(), 9.81))
+                {"board": name, "elements": elements} | board_row(Assembly(path, pads, ELASTIC, Thermal(), 9.81))
             )
             print(
                 "{board:>32} {elements:7} elements {equations:7} equations {factor_mb:6.0f} MB".format(**rows[-1]),

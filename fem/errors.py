@@ -49,10 +49,6 @@ class CheckpointError(RuntimeError):
     """Checkpoint files that lack a part of the model."""
 
 
-class RecordingError(ValueError):
-    """Recorded messages that do not fit the participant that wants them."""
-
-
 class ModesError(RuntimeError):
     """Incompatible modes of an element that find no equilibrium."""
 

@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCE = 1e-6
 MEASURED_UNITS = {"1/s", "MB", "B"}
-MEASURED = ("seconds", "time_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
+MEASURED = ("seconds", "time_ratio", "core_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
 ONE_RANK = ("shock.ranks.total=1",)  # the shares of two follow speeds that are measured
 HEATED = (
     "warpage.corner=0 mm", "thermal.melting=100 degC", "thermal.peak=200 degC", "thermal.solidification=200 degC",
@@ -35,10 +35,11 @@ HEATED = (
 # A drop in which solder that has cooled hardly flows would amplify rounding: its plastic work starts with the drop.
 COOLED = (
     "thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405",
-    "shock.peak_acceleration=15000 G",
+    "shock.numerics.plasticity=on", "shock.peak_acceleration=15000 G",
 )  # fmt: skip
 QUICK = ("scale=quick",)
 COARSE_DROP = ("drop.particles_per_edge=7",)
+ISPG = ("solder.numerics.scheme=ispg", "solder.parameters=paper", "solder.effects.inertia=on")
 COARSE_BOARD = (
     "scale=linear", "structure.cells=[12,8]", "dynamics.duration=0.5 ms", "dynamics.modes=3",
     "dynamics.numerics.field_samples=4",
@@ -65,6 +66,18 @@ EVERY_CASE = CASES | {
     "two_scale_bar": ("cases/two_scale_bar/case.toml", ()),
     "bga_drop": ("cases/bga_drop/case.toml", QUICK),
     "hu_bga_reflow": ("cases/hu_bga_reflow/case.toml", QUICK),
+    "hu_bga_drop": (
+        "cases/hu_bga_drop/case.toml",
+        QUICK + ("shock.duration=0.05 ms", "shock.numerics.dns_duration=0.05 ms"),
+    ),
+    "jedec_bga": ("cases/jedec_bga/case.toml", QUICK),
+    "measured_strip": ("cases/measured_strip/case.toml", ()),
+    "sessile_drop_ispg": ("cases/sessile_drop/case.toml", COARSE_DROP + ISPG),
+    **{flow: (f"cases/{flow}/case.toml", ()) for flow in ("poiseuille", "taylor_green")},
+    **{
+        flow: (f"cases/{flow}/case.toml", QUICK)
+        for flow in ("dam_break", "drop_impact", "printing", "static_caps", "young_laplace")
+    },
 }
 
 

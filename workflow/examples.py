@@ -1,7 +1,7 @@
 """Examples of each command, which end its help text and stand on the site; a test parses each with the real parser."""
 
 EXAMPLES = {
-    "new": ("reflowshock new mine", "reflowshock new mine --template jedec_bga"),
+    "new": ("reflowshock new mine", "reflowshock new mine --template sessile_drop"),
     "init": (
         "reflowshock init",
         'reflowshock init --name mine --array "6 x 6 at 0.8 mm" --ball usual --board "132 x 77 x 1 mm" --drop B',

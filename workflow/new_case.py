@@ -12,7 +12,7 @@ from reflowshock.workflow.process.terminal import console, print_error
 
 def new(
     name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
-    template: Annotated[str, typer.Option(help="case to start from")] = "bga_drop",
+    template: Annotated[str, typer.Option(help="case to start from")] = "jedec_bga",
 ) -> None:
     """Write a complete, commented case file."""
     from reflowshock.workflow.pipeline.template import write_new_case

@@ -117,7 +117,7 @@ class WindowMotion(ExplicitMotion):
         extra_mass: NDArray[np.float64],
     ) -> None:
         """Start at rest; ``held`` and ``extra_mass`` as those of ``ExplicitMotion``."""
-        self._substeps = plan.substeps
+        self._substeps, self._known = plan.substeps, (np.nan, np.zeros(3))
         super().__init__(body, loads, plan.step, held, extra_mass)
 
     def body_acceleration(self, time: float) -> NDArray[np.float64]:
@@ -128,14 +128,20 @@ class WindowMotion(ExplicitMotion):
         before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
         return now + 0.5 * (self._substeps - 1) * (now - before)
 
-    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
+    def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
         """Return the same at the ends of all substeps of a window: but for the last one it does not change."""
-        first, last = self.body_acceleration(times[0]), self.body_acceleration(times[-1])
-        return [*[first] * (len(times) - 1), last]
+        found = np.empty((len(times), 3))
+        found[:] = self.window_acceleration(self.time)
+        now = self.window_acceleration(times[-1])
+        found[-1] = now + 0.5 * (self._substeps - 1) * (now - found[0])
+        return found
 
     def window_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""
-        return super().body_acceleration(time - round(time / self.step) % self._substeps * self.step)
+        begin = time - round(time / self.step) % self._substeps * self.step
+        if begin != self._known[0]:  # a window asks several times
+            self._known = begin, super().body_acceleration(begin)
+        return self._known[1]
 
 
 class Driven(Continued):
@@ -150,6 +156,8 @@ class Driven(Continued):
         self.plan = plan
         self.interface_work = 0.0
         self._interface, self._counted = local_interface(body), counted_interface(body)
+        owned = body.shared.owned[self._interface]
+        self._owned = slice(None) if owned.all() else owned
         self._zero = np.zeros((len(body.mass), 3))
         self._lags = plan.step * (np.arange(plan.substeps) - 0.5 * (plan.substeps - 1))
         ends = 0.5 * plan.step * np.ones(2)  # a substep's work is that of the mean force
@@ -163,16 +171,14 @@ class Driven(Continued):
         motion, counted = self.motion, self._counted
         self._channels.velocities.receive(motion.velocity)
         given, acceleration = motion.velocity[self._interface], motion.window_acceleration(motion.time)
-        change, impulses = np.outer(self._lags, acceleration), np.zeros((2, len(counted), 3))
-        push = motion.push()
-        for weight, sum_so_far in zip(self._weights[0], impulses, strict=True):
-            add_impulse(counted, push, weight, sum_so_far)
+        change, impulses = self._lags[:, None] * acceleration, np.zeros((2, len(counted), 3))
         motion.take_steps(
             self.plan.substeps, Interface(self._interface, counted, given, change, self._weights, impulses)
         )
         motion.velocity[self._interface] = given
         impulse, lagging = impulses
-        return -float(np.sum(impulse * motion.velocity[counted]) + lagging.sum(axis=0) @ acceleration)
+        lag = lagging.sum(axis=0) @ acceleration if acceleration.any() else 0.0
+        return -float(np.vdot(impulse, given[self._owned]) + lag)
 
     def finish_window(self) -> None:
         """Do nothing: the window is done."""

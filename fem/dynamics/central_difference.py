@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce, no_interface
 from reflowshock.fem.forces.force import TermWithPath
-from reflowshock.fem.kernels.levels import Interface, add_pushed
-from reflowshock.fem.kernels.motion import add_impulse, advance
+from reflowshock.fem.kernels.levels import Interface, count_impulses
+from reflowshock.fem.kernels.motion import add_pushed, advance
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
@@ -148,26 +148,26 @@ class ExplicitMotion(Motion):
         ends = [self.time]
         for _ in range(count):
             ends.append(ends[-1] + self.step)
-        accelerations = np.array([self.gravity, *self.accelerations(ends[1:])])
+        accelerations = np.concatenate([self.gravity[None], self.accelerations(ends[1:])])
         state = self._state, self.ahead
         self._body_work += self._at_once.take(self, state, interface or no_interface(count), accelerations)
         self.gravity = accelerations[-1]
 
-    def accelerations(self, times: Sequence[float]) -> Sequence[NDArray[np.float64]]:
-        """Return ``body_acceleration`` at the ends [s] of the steps of a window."""
-        return [self.body_acceleration(time) for time in times]
+    def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
+        """Return ``body_acceleration`` at the ends [s] of the m steps of a window: ``(m, 3)`` [m/s^2]."""
+        return np.array([self.body_acceleration(time) for time in times])
 
     def _take_each(self, count: int, interface: Interface | None) -> None:
         """Take steps one by one."""
+        if interface is not None:
+            count_impulses(interface, 0, self.push())
         for k in range(count):
             if interface is not None:
                 self.velocity[interface.rows] = interface.given + interface.change[k]
             self.advance()
             self.update_force()
             if interface is not None:
-                push = self.push()
-                for weight, impulse in zip(interface.weights[k + 1], interface.impulses, strict=True):
-                    add_impulse(interface.counted, push, weight, impulse)
+                count_impulses(interface, k + 1, self.push())
 
     def push(self) -> NDArray[np.float64]:
         """Return the impulse over dt ``(n, 3)`` [N] of the step that begins: the force, and what acts for others."""

@@ -79,7 +79,7 @@ class ImplicitMotion(Motion):
             AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
         """
         self._scheme = HHTScheme(step, alpha)
-        agreed(comm, lambda: check_linear(body))
+        agreed(comm, lambda: self.check(body))
         self.body, self.step, self.time = body, step, 0.0
         self._loads = [load for load in loads if not isinstance(load, RayleighDamping)]
         damping = [load for load in loads if isinstance(load, RayleighDamping)]
@@ -99,6 +99,11 @@ class ImplicitMotion(Motion):
         self.factor = self._factorise()
         self._works = np.zeros(3)  # of external forces, by damping, of the start
         self._begin()
+
+    @staticmethod
+    def check(body: Body) -> None:
+        """Raise ``ValueError`` where one solution a step is not enough."""
+        check_linear(body)
 
     def _factorise(self) -> Factorisation:
         """Return the factor of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
@@ -163,14 +168,19 @@ class ImplicitMotion(Motion):
         for load in self._loads:
             load.add(self)
         self._nodal[:] = self.force
-        self._update_force()  # of the predicted motion
+        self._solve(before)
+        self._acceleration[self._prescribed] = ((following - mean) / h)[self._prescribed]
+
+    def _solve(self, before: NDArray[np.float64]) -> None:
+        """Find the accelerations of the predicted motion and add what they move; ``before`` all forces a step ago."""
+        h, scheme = self.step, self._scheme
+        self._update_force()
         right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
         self._right.array = right[self._equations.own]
         self.factor.solve(self._right, self._solution)
         self._equations.spread(self._solution, self._acceleration)
         self.displacement += h**2 * scheme.beta * self._acceleration
         self.velocity += h * scheme.gamma * self._acceleration
-        self._acceleration[self._prescribed] = ((following - mean) / h)[self._prescribed]
 
     def update_force(self) -> None:
         """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""

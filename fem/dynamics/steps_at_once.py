@@ -66,7 +66,7 @@ class StepsAtOnce:
 
     Attributes:
         forces: Its force terms by pace.
-        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, ``tied`` in this order, and ``moved`` as there.
+        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, ``tied`` in this order; others as there.
         terms: By pace, entry of ``ForceArrays`` -> the term.
     """
 
@@ -74,6 +74,7 @@ class StepsAtOnce:
     order: np.ndarray
     tied: tuple[np.ndarray, np.ndarray, np.ndarray]
     moved: np.ndarray
+    ends: np.ndarray
     terms: list[dict[str, Any]]
 
     @classmethod
@@ -90,17 +91,16 @@ class StepsAtOnce:
             alike |= dict.fromkeys(arrays, term)
         if len(found) > PACES or any(acts_at_nodes(load) for load in loads):
             return None
-        entries = [{name: term.arrays[name] for name, term in alike.items()} for alike in found.values()]
-        rest = PACES - len(found)
+        paces, rest = sorted(found), PACES - len(found)
+        entries = [{name: term.arrays[name] for name, term in found[pace].items()} for pace in paces]
         arrays = tuple(forces_of(NOTHING._replace(**own)) for own in [*entries, *[{}] * rest])
-        slowest = np.full(len(body.mass), max(found, default=1))
-        if len(body.element_paces):
-            np.minimum.at(slowest, body.elements.cells, body.element_paces[:, None])
-        every, own = np.array([*found, *[0] * rest]), slowest[body.tie.slave]
+        every, tie = np.array([*paces, *[0] * rest]), body.tie
+        own, node = body.node_paces
+        order = np.argsort(own, kind="stable")
         moved = np.sum(own[:, None] <= every, axis=0)
-        order, tie = np.argsort(own, kind="stable"), body.tie
+        ends = np.array([*(1 + np.flatnonzero(node <= pace)[-1] for pace in paces[:-1]), *[len(node)] * (1 + rest)])
         tied = tie.slave[order], tie.master[order], tie.weight[order]
-        return cls(paced_forces_of(arrays, every), order, tied, moved, list(found.values()))
+        return cls(paced_forces_of(arrays, every), order, tied, moved, ends, [found[pace] for pace in paces])
 
     def take(
         self, motion: Motion, state: tuple[np.ndarray, np.ndarray], interface: Interface, accelerations: np.ndarray
@@ -116,10 +116,14 @@ class StepsAtOnce:
         Raises:
             InvertedElementError: An element is turned inside out; the motion's time is that of the step.
         """
-        force = motion.slave_force[self.order]
-        steps = StepArrays(*state, motion.mobility, motion.counted_mass, *self.tied, self.moved, force)
+        steps = StepArrays(
+            *(*state, motion.mobility, motion.counted_mass, *self.tied),
+            order=self.order,
+            moved=self.moved,
+            ends=self.ends,
+            slave_force=motion.slave_force,
+        )
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
-        motion.slave_force[self.order] = force
         for _ in range(taken):
             motion.time += motion.step
         if which != ALL_FINE:

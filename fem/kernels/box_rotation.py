@@ -320,7 +320,7 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
     Returns:
         ``UPRIGHT``, or the first block with a box that is turned inside out; then the force is not complete.
     """
-    w = np.zeros(TURNED_SLOTS)
+    w = np.empty(TURNED_SLOTS)
     for b in range(len(cells)):
         gather_lanes(cells[b], displacement, w)
         transform_corners(w)

@@ -151,22 +151,6 @@ def scaled(factor, m):
 
 
 @njit(**LANE_OPTIONS)
-def plus(m, n):
-    """Return the sum of two matrices."""
-    return (
-        m[0] + n[0],
-        m[1] + n[1],
-        m[2] + n[2],
-        m[3] + n[3],
-        m[4] + n[4],
-        m[5] + n[5],
-        m[6] + n[6],
-        m[7] + n[7],
-        m[8] + n[8],
-    )
-
-
-@njit(**LANE_OPTIONS)
 def cofactor(m):
     """Return the matrix of cofactors, det(m) m^-T."""
     return (

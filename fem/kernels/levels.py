@@ -14,8 +14,17 @@ from numpy.typing import NDArray
 from reflowshock.fem.kernels.box_rotation import add_turned_block_forces, add_turned_row_forces
 from reflowshock.fem.kernels.box_rows import add_row_forces, read_lines, subtract_lines
 from reflowshock.fem.kernels.force import add_block_force
-from reflowshock.fem.kernels.hexahedron import FINITE
-from reflowshock.fem.kernels.motion import add_impulse, advance, gather_from_slaves, spread_to_slaves
+from reflowshock.fem.kernels.motion import (
+    add_ahead,
+    add_impulse,
+    add_pushed,
+    first_moment,
+    gather_from_slaves,
+    kicks_of,
+    move,
+    spread_to_slaves,
+    work_of_changes,
+)
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
@@ -97,8 +106,10 @@ class StepArrays(NamedTuple):
         mobility: ``(n, 3)`` [1/kg].
         counted_mass: ``(n,)`` [kg].
         slave, master, weight: See ``fem.mesh.tie``; first those of elements that act most often.
+        order: ``(ns,)`` their numbers in the tie.
         moved: ``(PACES,)`` how many of them elements of each pace and of smaller ones have.
-        slave_force: ``(ns, 3)`` [N] of the elements on them, when they acted last.
+        ends: ``(PACES,)`` how many of the first nodes have all those of elements of each pace and of smaller ones.
+        slave_force: ``(ns, 3)`` [N] of the elements on them when all of these acted last, in the order of the tie.
     """
 
     state: NDArray[np.float64]
@@ -108,7 +119,9 @@ class StepArrays(NamedTuple):
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
     weight: NDArray[np.float64]
+    order: NDArray[np.int64]
     moved: NDArray[np.int64]
+    ends: NDArray[np.int64]
     slave_force: NDArray[np.float64]
 
 
@@ -164,19 +177,23 @@ def add_forces(arrays, displacement, force):
     block = add_one_point_force(arrays.one_point, arrays.path, displacement, force)
     if block >= 0:
         return 5, block
-    block = add_hexahedron_force(arrays.hexahedron, arrays.path, displacement, force)
-    if block >= 0:
-        return 6, block
+    if len(arrays.hexahedron.cells):  # or it would make room to work in
+        block = add_hexahedron_force(arrays.hexahedron, arrays.path, displacement, force)
+        if block >= 0:
+            return 6, block
     return ALL_FINE, 0
 
 
 @njit(cache=True)
 def take_steps(motion, forces, interface, accelerations, step):
-    """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do, in the same order.
+    """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
+
+    Nodes on which nothing acts for some steps take these at once. A steady body force does its work on what all masses
+    have moved; what changes beside it is counted step by step.
 
     Args:
         motion: ``StepArrays``.
-        forces: ``PacedForces``; all of them have just acted.
+        forces: ``PacedForces``; all of them have just acted, and act again after the last step.
         interface: ``Interface``.
         accelerations: ``(m + 1, 3)`` [m/s^2] of all masses as each step begins, and after the last.
         step: dt [s].
@@ -185,112 +202,119 @@ def take_steps(motion, forces, interface, accelerations, step):
         Work of the accelerations [J]; steps taken; what ``add_forces`` returned last; at which pace that was.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
-    pushed, due = np.zeros_like(motion.ahead), len(motion.ahead) > 0
-    work, last = 0.0, len(accelerations) - 2
-    place = first_moment(motion.counted_mass, displacement)
-    for k in range(last + 1):
-        move_interface(interface, k, velocity)
-        if due:
-            add_ahead(motion.ahead, force)
-        advance(motion.state, motion.mobility, accelerations[k], step)
-        moved = slaves_moved(motion, forces, k + 1)
+    last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
+    means = 0.5 * (accelerations[:-1] + accelerations[1:])
+    steady = means[last // 2].copy()
+    body, work = (accelerations, means - steady), 0.0
+    start = first_moment(motion.counted_mass, displacement)
+    add_ahead(motion.ahead, force)
+    count_impulses(interface, 0, force)
+    held = interface.rows.min() if len(interface.rows) else len(velocity)
+    for k in range(1, last + 1):
+        reach = moved = begin = 0
+        for pace in range(PACES):
+            if acts(forces, pace, k):
+                reach, moved, block = motion.ends[pace], motion.moved[pace], (begin, motion.ends[pace], every[pace], k)
+                if reach > held:
+                    move_interface(interface, block, velocity)
+                work += move_nodes(motion, block, body, step)
+            begin = motion.ends[pace]
         spread_to_slaves(motion.slave[:moved], motion.master[:moved], motion.weight[:moved], displacement)
-        mean = accelerations[k] + accelerations[k + 1]
-        if k == last or np.any(mean != accelerations[k + 1] + accelerations[k + 2]):
-            before, place = place, first_moment(motion.counted_mass, displacement)
-            for c in range(3):  # of all steps since the mean changed: the sum of dt v is what the nodes have moved
-                work += 0.5 * mean[c] * (place[c] - before[c])
-        which, block, pace, due = add_paced_forces(motion, forces, k + 1, pushed)
+        which, place, pace = add_paced_forces(motion, forces, k, pushed, k == last)
         if which != ALL_FINE:
-            return work, k + 1, which, block, pace
-        gather_forces(motion, moved, due)
-        for j in range(2):
-            add_impulse(interface.counted, force, interface.weights[k + 1, j], interface.impulses[j])
-            if due:
-                add_impulse(interface.counted, motion.ahead, interface.weights[k + 1, j], interface.impulses[j])
-    return work, last + 1, ALL_FINE, 0, 0
+            return work, k, which, place, pace
+        gather_forces(motion, moved, k == last)
+        if reach > held:
+            count_impulses(interface, k, force[:reach])
+    count_impulses(interface, last, motion.ahead)
+    move_interface(interface, (0, len(velocity), 1, last), velocity)
+    end = first_moment(motion.counted_mass, displacement)
+    for c in range(3):
+        work += steady[c] * (end[c] - start[c])
+    return work, last, ALL_FINE, 0, 0
 
 
 @njit(cache=True)
-def move_interface(interface, substep, velocity):
-    """Prescribe the velocities of an ``Interface`` in a step."""
+def count_impulses(interface, substep, force):
+    """Add to the impulses of an ``Interface`` what a force of the first nodes ``(k, 3)`` gives after a step."""
+    for j in range(2):
+        add_impulse(interface.counted, force, interface.weights[substep, j], interface.impulses[j])
+
+
+@njit(cache=True)
+def acts(forces, pace, substep):
+    """Return whether terms of a pace act after a step."""
+    return forces.every[pace] > 0 and substep % forces.every[pace] == 0
+
+
+@njit(cache=True)
+def move_nodes(motion, block, body, step):
+    """Move some nodes by the steps since something acted on them, and zero their force.
+
+    Args:
+        motion: As in ``take_steps``.
+        block: First node, end, steps to be taken and the number of the last of them.
+        body: Accelerations, and what their means over steps have beside the steady part.
+        step: dt [s].
+
+    Returns:
+        Work of the latter [J].
+    """
+    begin, end, count, substep = block
+    velocity, kicks = motion.state[1], np.empty((3, 3))
+    accelerations, changes = body[0][substep - count : substep], body[1][substep - count : substep]
+    kicks_of(accelerations, step, kicks)
+    move(motion.state, motion.mobility, (begin, end), kicks, (step, count))
+    motion.state[2, begin:end] = 0.0
+    nodes = motion.counted_mass[begin:end], velocity[begin:end], motion.mobility[begin:end]
+    return work_of_changes(nodes, changes, accelerations, step)
+
+
+@njit(cache=True)
+def move_interface(interface, block, velocity):
+    """Prescribe the mean velocities of an ``Interface`` in some steps; ``block`` as above."""
+    begin, end, count, substep = block
+    x = y = z = 0.0
+    for k in range(substep - count, substep):
+        x, y, z = x + interface.change[k, 0], y + interface.change[k, 1], z + interface.change[k, 2]
+    x, y, z = x / count, y / count, z / count
     for i in range(len(interface.rows)):
-        for c in range(3):
-            velocity[interface.rows[i], c] = interface.given[i, c] + interface.change[substep, c]
-
-
-@njit(cache=True)
-def add_ahead(ahead, force):
-    """Add to the force ``(n, 3)`` [N] what has acted for the steps that follow, and zero it."""
-    total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
-    for i in range(len(total)):
-        total[i] += rest[i]
-        rest[i] = 0.0
-
-
-@njit(cache=True)
-def slaves_moved(motion, forces, substep):
-    """Return how many of the slaves elements have that act after a step."""
-    moved = 0
-    for pace in range(PACES):
-        if forces.every[pace] and substep % forces.every[pace] == 0:
-            moved = max(moved, motion.moved[pace])
-    return moved
+        row = interface.rows[i]
+        if begin <= row < end:
+            velocity[row, 0] = interface.given[i, 0] + x
+            velocity[row, 1] = interface.given[i, 1] + y
+            velocity[row, 2] = interface.given[i, 2] + z
 
 
 @njit(inline="always")
-def add_paced_forces(motion, forces, substep, pushed):
-    """Put the forces that act after a step into those of a motion; ``pushed (n, 3)`` is zero between calls.
+def add_paced_forces(motion, forces, substep, pushed, final):
+    """Add the forces that act after a step for all steps that they act for; if final, those of later ones to ``ahead``.
 
-    Returns:
-        What ``add_forces`` returned last, at which pace, and whether something acts for steps that follow.
+    ``pushed (n, 3)`` is zero between calls. Returns what ``add_forces`` returned last, and at which pace.
     """
-    force, due = motion.state[2], False
-    force[:] = 0.0
+    force = motion.state[2]
     for pace in range(PACES):
-        every = forces.every[pace]
-        if every and substep % every == 0:
+        if acts(forces, pace, substep):
+            every, nodes = forces.every[pace], motion.ends[pace]
             which, block = add_forces(forces.arrays[pace], motion.state[0], force if every == 1 else pushed)
             if which != ALL_FINE:
-                return which, block, pace, due
+                return which, block, pace
             if every > 1:
-                due = True
-                add_pushed(pushed, every, force, motion.ahead)
-    return ALL_FINE, 0, 0, due
+                add_pushed(pushed[:nodes], every, force, motion.ahead if final else motion.ahead[:0])
+    return ALL_FINE, 0, 0
 
 
 @njit(cache=True)
-def add_pushed(pushed, every, force, ahead):
-    """Add to the force ``(n, 3)`` [N] what acts once in some steps, to ``ahead`` its share of the others; zero it."""
-    own, total, rest = pushed.reshape(-1), force.reshape(-1), ahead.reshape(-1)
-    for i in range(len(own)):
-        total[i] += own[i]
-        rest[i] += (every - 1) * own[i]
-        own[i] = 0.0
-
-
-@njit(cache=True)
-def gather_forces(motion, moved, due):
-    """Keep the forces of the first slaves, and move them to their masters; those for steps that follow, too."""
+def gather_forces(motion, moved, final):
+    """Move the forces of the first slaves to their masters; of all, if final, keep them, and move what is ahead."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
-    for i in range(moved):
+    for i in range(moved if final else 0):
         for c in range(3):
-            motion.slave_force[i, c] = force[slave[i], c]
+            motion.slave_force[motion.order[i], c] = force[slave[i], c]
     gather_from_slaves(slave, master, weight, force)
-    if due:
+    if final and len(motion.ahead):
         gather_from_slaves(slave, master, weight, motion.ahead)
-
-
-@njit(cache=True, fastmath=FINITE)
-def first_moment(mass, places):
-    """Return the sum of masses ``(n,)`` times places ``(n, 3)``."""
-    x = y = z = 0.0
-    for i in range(len(mass)):
-        x += mass[i] * places[i, 0]
-        y += mass[i] * places[i, 1]
-        z += mass[i] * places[i, 2]
-    return x, y, z
 
 
 @njit(cache=True)

@@ -5,16 +5,12 @@ from numba import njit
 
 from reflowshock.fem.kernels.hexahedron import FINITE
 
-STRIP = 384  # degrees of freedom: whole nodes and whole vectors
+STRIP = 192  # degrees of freedom: whole nodes and whole vectors
 
 
 @njit(cache=True)
 def advance(state, mobility, acceleration, step):
     """Take one step of central differences: v += dt (f / m + g), u += dt v, at free degrees of freedom.
-
-    The loop runs over strips of all components together, which fill vectors; g comes from a strip of its own. No
-    operation may be reordered or fused: the rest of a strip would round otherwise than its vectors, and copies of a
-    node on several ranks drift apart.
 
     Args:
         state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
@@ -22,18 +18,92 @@ def advance(state, mobility, acceleration, step):
         acceleration: ``(3,)`` [m/s^2], of the body force.
         step: dt [s].
     """
+    kicks = np.zeros((3, 3))
+    for c in range(3):
+        kicks[0, c] = step * acceleration[c]
+    move(state, mobility, (0, len(mobility)), kicks, (step, 1))
+
+
+@njit(cache=True)
+def move(state, mobility, nodes, kicks, steps):
+    """Take steps in the first of which a force acts, and in all of them a body force; only some nodes.
+
+    The loop runs over strips of all components together, which fill vectors; what the body force does comes from
+    strips of its own. No operation may be reordered or fused: the rest of a strip would round otherwise than its
+    vectors, and copies of a node on several ranks drift apart.
+
+    Args:
+        state: As in ``advance``.
+        mobility: As there.
+        nodes: The first of them, and the end.
+        kicks: ``(3, 3)`` of the body force: velocity in the first step, and in the others [m/s]; displacement [m] from
+            the latter.
+        steps: dt [s] and their number.
+    """
+    step, span = steps[0], steps[0] * steps[1]
+    strips = np.empty((3, STRIP))
+    for k in range(3):
+        for i in range(0, STRIP, 3):
+            strips[k, i], strips[k, i + 1], strips[k, i + 2] = kicks[k, 0], kicks[k, 1], kicks[k, 2]
+    first, others, drift = strips[0], strips[1], strips[2]
     flat, inverse = state.reshape(3, -1), mobility.reshape(-1)
-    kick = np.empty(STRIP)
-    for i in range(STRIP):
-        kick[i] = step * acceleration[i % 3]
-    for begin in range(0, len(inverse), STRIP):
-        end = min(begin + STRIP, len(inverse))
-        displacement, velocity, force = flat[0, begin:end], flat[1, begin:end], flat[2, begin:end]
-        factor = inverse[begin:end]
+    for begin in range(3 * nodes[0], 3 * nodes[1], STRIP):
+        end = min(begin + STRIP, 3 * nodes[1])
+        u, v, f, factor = flat[0, begin:end], flat[1, begin:end], flat[2, begin:end], inverse[begin:end]
         for i in range(end - begin):
-            new = velocity[i] + (step * factor[i] * force[i] + (kick[i] if factor[i] > 0.0 else 0.0))
-            velocity[i] = new
-            displacement[i] += step * new
+            free = factor[i] > 0.0
+            new = v[i] + (step * factor[i] * f[i] + (first[i] if free else 0.0))
+            v[i] = new + (others[i] if free else 0.0)
+            u[i] += span * new + (drift[i] if free else 0.0)
+
+
+@njit(cache=True)
+def kicks_of(accelerations, step, kicks):
+    """Write what ``move`` takes for body forces ``(k, 3)`` [m/s^2] as each of its steps begins."""
+    for c in range(3):
+        gained = drift = 0.0
+        for k in range(1, len(accelerations)):
+            gained += step * accelerations[k, c]
+            drift += step * gained
+        kicks[0, c], kicks[1, c], kicks[2, c] = step * accelerations[0, c], gained, drift
+
+
+@njit(cache=True, fastmath=FINITE)
+def first_moment(mass, places):
+    """Return the sum of masses ``(n,)`` times places, or velocities, ``(n, 3)``."""
+    x = y = z = 0.0
+    for i in range(len(mass)):
+        x += mass[i] * places[i, 0]
+        y += mass[i] * places[i, 1]
+        z += mass[i] * places[i, 2]
+    return x, y, z
+
+
+@njit(cache=True)
+def work_of_changes(nodes, changes, accelerations, step):
+    """Return the work of a part of the body force in steps that ``move`` has taken at once.
+
+    Args:
+        nodes: Masses ``(n,)`` [kg] that count, velocities ``(n, 3)`` [m/s] at the end, mobility ``(n, 3)``.
+        changes: ``(k, 3)`` [m/s^2] mean of this part in each step.
+        accelerations: ``(k, 3)`` [m/s^2] of the whole as each step begins.
+        step: dt [s].
+    """
+    if not np.any(changes):
+        return 0.0
+    mass, velocity, mobility = nodes
+    momentum, work, count = first_moment(mass, velocity), 0.0, len(changes)
+    for c in range(3):
+        if not np.any(changes[:, c]):
+            continue
+        moved = 0.0
+        for i in range(len(mass) if count > 1 else 0):
+            moved += mass[i] if mobility[i, c] > 0.0 else 0.0
+        present = momentum[c]
+        for k in range(count - 1, -1, -1):
+            work += step * changes[k, c] * present
+            present -= step * accelerations[k, c] * moved
+    return work
 
 
 @njit(cache=True)
@@ -107,10 +177,36 @@ def sum_in_rank_order(rows, pointer, source, buffer, values):
 
 @njit(cache=True)
 def add_impulse(rows, force, scale, impulse):
-    """Add scale times the force at some nodes to an impulse ``(len(rows), 3)``."""
+    """Add scale times the force at some nodes to an impulse ``(len(rows), 3)``; rows past the force are left out."""
     for i in range(len(rows)):
-        for c in range(3):
-            impulse[i, c] += scale * force[rows[i], c]
+        if rows[i] < len(force):
+            for c in range(3):
+                impulse[i, c] += scale * force[rows[i], c]
+
+
+@njit(cache=True)
+def add_ahead(ahead, force):
+    """Add to the force ``(n, 3)`` [N] what has acted for the steps that follow, and zero it."""
+    total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
+    for i in range(len(rest)):
+        total[i] += rest[i]
+        rest[i] = 0.0
+
+
+@njit(cache=True)
+def add_pushed(pushed, every, force, ahead):
+    """Add to the force ``(n, 3)`` what acts once in some steps, to ``ahead`` its share of the others; zero it.
+
+    Without ``ahead`` all of it is added to the force.
+    """
+    own, total, rest = pushed.reshape(-1), force.reshape(-1), ahead.reshape(-1)
+    share = 1 if len(rest) else every
+    for i in range(len(own)):
+        total[i] += share * own[i]
+    for i in range(len(own) if len(rest) else 0):
+        rest[i] += (every - 1) * own[i]
+    for i in range(len(own)):
+        own[i] = 0.0
 
 
 @njit(cache=True)

@@ -228,7 +228,7 @@ def add_one_point_force(blocks, path, displacement, force):
     Returns:
         ``FINE``, or the first block with an element that is turned inside out; then the force is not complete.
     """
-    w, before, unit = np.zeros(SLOTS), np.empty(LANES), 1.0 if path.finite else 0.0
+    w, before, unit = np.empty(SLOTS), np.empty(LANES), 1.0 if path.finite else 0.0
     do_not_turn(w)
     for b in range(len(blocks.cells)):
         k, weight = blocks.constants[blocks.pattern[b]], blocks.weight[blocks.pattern[b], 0]

@@ -196,7 +196,7 @@ def add_turned_forces(cells, filled, constants, displacement, force):
     Returns:
         ``UPRIGHT``, or the first block with an element that is turned inside out; then the force is not complete.
     """
-    w = np.zeros(SLOTS)
+    w = np.empty(SLOTS)
     for b in range(len(cells)):
         if not read_block(cells[b], displacement, constants[b], w):
             return b

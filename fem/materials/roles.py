@@ -43,16 +43,19 @@ NamedMaterial = Annotated[Material, ByName(LIBRARY)]
 class Materials(Parameters):
     """The material of each role that a part of the mesh can have.
 
-    Each is a name of the library, such as "SAC305", or a table. Solder of the library yields; the default one does not.
+    Each is a name of the library, such as "SAC305", or a table. Solder of the library yields, where the shock lets it.
     """
 
     board: NamedMaterial = FR4
     substrate: NamedMaterial = FR4
     die: NamedMaterial = SILICON
     copper: NamedMaterial = COPPER
-    solder: NamedMaterial = SAC405.elastic
+    solder: NamedMaterial = SAC405
 
     @property
     def by_role(self) -> dict[str, Material]:
         """Return role -> its material."""
         return {role: getattr(self, role) for role in type(self).model_fields}
+
+
+ELASTIC = Materials(solder=SAC405.elastic)  # nothing yields, as steps at several levels of linear elements want it

@@ -61,9 +61,34 @@ class Body:
         return list(zip(self.terms, (*self.paces, *(1,) * (len(self.terms) - len(self.paces))), strict=True))
 
     @property
+    def node_paces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the smallest pace of the elements of each slave ``(ns,)`` and of each node ``(n,)``."""
+        return paces_of_nodes(self.elements.cells, self.element_paces, self.tie, len(self.mass), max(self.schedule))
+
+    @property
     def turns(self) -> bool:
         """Return whether rotations of elements on this rank are more than small."""
         return any(
             isinstance(term, Corotational) or (isinstance(term, NonlinearElements) and term.finite)
             for term in self.terms
         )
+
+
+def paces_of_nodes(
+    cells: NDArray[np.integer], paces: NDArray[np.int32], tie: Tie, count: int, largest: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the smallest pace of the elements of each slave ``(ns,)`` and of each of ``count`` nodes.
+
+    Args:
+        cells: ``(ne, k)`` nodes.
+        paces: ``(ne,)`` of the elements, or none.
+        tie: Elements of slaves act on their masters, too.
+        count: Number of nodes.
+        largest: What nodes without elements have.
+    """
+    node = np.full(count, largest, np.int32)
+    if len(paces):
+        np.minimum.at(node, cells, paces[:, None])
+    slave = node[tie.slave]
+    np.minimum.at(node, tie.master, slave[:, None])
+    return slave, node

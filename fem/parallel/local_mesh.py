@@ -16,7 +16,7 @@ class LocalMesh:
     """The cells of one rank and all nodes that it computes with.
 
     Attributes:
-        mesh: The distributed mesh; its geometry nodes are the first ones here.
+        mesh: The distributed mesh; its cells are those here, its nodes may have other numbers.
         nodes: ``(n,)`` input node numbers.
         points: ``(n, 3)`` [m].
         cells: ``(ne, k)`` int32 local nodes, order as in ``MeshData``.
@@ -48,6 +48,12 @@ class LocalMesh:
             self.cells,
             self.cell_numbers,
         )
+
+    def reordered(self, order: NDArray[np.integer]) -> "LocalMesh":
+        """Return the same mesh with its nodes in another ``order (n,)``."""
+        place = np.empty(len(order), np.int32)
+        place[order] = np.arange(len(order))
+        return LocalMesh(self.mesh, self.nodes[order], self.points[order], place[self.cells], self.cell_numbers)
 
 
 def positions(haystack: NDArray[np.integer], needles: NDArray[np.integer]) -> NDArray[np.int32]:

@@ -127,8 +127,8 @@ class ShockNumerics(Parameters):
     dns_duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     step_fraction: float = Field(0.9, gt=0, le=0.95)
     critical_step: Literal["element", "power_iteration"] = "element"
-    kinematics: Literal["auto"] | Kinematics = "small"
-    plasticity: Switch = "on"
+    kinematics: Literal["auto"] | Kinematics = "auto"
+    plasticity: Switch = "auto"
     formulation: Literal["incompatible_modes", "one_point"] = "incompatible_modes"
     mass_scaled: tuple[Literal["board", "substrate", "die", "copper", "solder", "column"], ...] = ()
     mass_scaled_step: Annotated[float | None, Quantity("ns")] = Field(None, gt=0)

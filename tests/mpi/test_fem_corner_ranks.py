@@ -14,7 +14,7 @@ from reflowshock.fem.coupling.participants import couple
 from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.division.tables import model_inputs
@@ -39,7 +39,7 @@ def moved(scheme):
         centre = item.mesh.points[item.mesh.cells].mean(axis=1)
         ranks = quarters(centre, corner if role == "macro" else corner / 3)
         mesh = (item.mesh, ranks) if world.rank == 0 else (None, None)
-        pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, Materials())
+        pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, ELASTIC)
         step = division.plan.window if role == "macro" else division.meso_step
         factor = np.ones(len(pieces.steps))
         bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, ForceOptions(step=step))

@@ -16,7 +16,7 @@ from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.division.tables import prepare
@@ -27,7 +27,7 @@ for name, kind in KINDS.items():
     points, cells = box(kind, np.linspace(0, 4e-3, 5), np.linspace(0, 2e-3, 3), np.linspace(0, 1e-3, 3))
     item = prepare(MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {}), "dns")["dns"]
     local = distribute(comm, item.mesh if comm.rank == 0 else None)
-    pieces = make_pieces(local, item.tables, Materials(), name if kind.nodes == 8 else "incompatible_modes")
+    pieces = make_pieces(local, item.tables, ELASTIC, name if kind.nodes == 8 else "incompatible_modes")
     body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
     body.free[body.local.points[:, 0] < 1e-9] = False
     step = 0.9 * comm.allreduce(float(pieces.steps.min(initial=np.inf)), MPI.MIN)

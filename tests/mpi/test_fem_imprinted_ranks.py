@@ -23,7 +23,7 @@ SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
     "duration": 1.2e-5,
-    "numerics": {"history_samples": 20, "field_samples": 2},
+    "numerics": {"kinematics": "small", "history_samples": 20, "field_samples": 2},
 }
 RUNS = {"one": ("dns", 1), "two": ("dns", 2), "scales": ("two_scale", 1)}  # mode and ranks
 FOUND = ("section_board", "section_package", "peel_board", "von_mises_board", "von_mises_package", "von_mises_max")
@@ -56,6 +56,7 @@ def ended(tmp_path_factory) -> dict[str, tuple[dict, dict]]:
     for name, (mode, ranks) in RUNS.items():
         shock = SHOCK | {"ranks": {"total": ranks}}
         scene = {"mode": mode, "meshes": meshes, "shock": shock, "output": str(folder / name)}
+        scene |= {"materials": {"solder": "SAC405_elastic"}}
         (folder / f"{name}.json").write_text(json.dumps(scene))
         inputs.append((ranks, folder / f"{name}.json"))
     run_programs(inputs)

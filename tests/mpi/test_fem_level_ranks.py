@@ -7,7 +7,7 @@ from mpi4py import MPI
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import NodalForces, half_sine_drop
 from reflowshock.fem.loads.pulse import HalfSine
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from tests.support.fem_levels import joint_on_board, levelled
 from tests.support.fem_program import run_warm
 
@@ -16,7 +16,7 @@ RATIOS, WINDOWS = (4, 3, 3), 20
 
 def moved(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
     """Return input numbers of this rank's nodes and their displacements after some windows under loads at many."""
-    model = levelled(joint_on_board(), Materials(), RATIOS, comm=comm)
+    model = levelled(joint_on_board(), ELASTIC, RATIOS, comm=comm)
     body = model.body
     nodes = np.arange(0, comm.allreduce(int(body.local.nodes.max()), MPI.MAX), 5)
     push = NodalForces.build(body, nodes, np.sin(np.arange(3 * len(nodes))).reshape(-1, 3), HalfSine(1.0, 1e-6))

@@ -15,13 +15,13 @@ from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.dynamics.modal import natural_modes
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.division.tables import prepare
 from tests.support.fem_models import small_assembly
 
 comm = MPI.COMM_WORLD
 item = prepare(append(small_assembly(2, size=1e-3)), "dns")["dns"]
-pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials())
+pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, ELASTIC)
 body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
 equations = Equations.of(comm, body)
 motion = ImplicitMotion(comm, body, [half_sine_drop(1e4, 5e-5)], 2e-6)

@@ -13,7 +13,7 @@ SHOCK = {
     "peak_acceleration": 2e7,
     "pulse_duration": 2e-5,
     "duration": 1e-5,
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2},
+    "numerics": {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2},
 }
 
 

@@ -62,9 +62,16 @@ def assembly(tmp_path_factory) -> Path:
         "service_condition": "B",
         "duration": 2e-5,
         "ranks": {"total": 2, "placement": "disjoint"},
-        "numerics": {"history_samples": 100, "field_samples": 2, "checkpoint_seconds": 1e-9, "watchdog_seconds": 2.0},
+        "numerics": {
+            "kinematics": "small",
+            "history_samples": 100,
+            "field_samples": 2,
+            "checkpoint_seconds": 1e-9,
+            "watchdog_seconds": 2.0,
+        },
     }
     request = {"mode": "two_scale", "meshes": meshes, "shock": shock, "output": str(directory / "out")}
+    request |= {"materials": {"solder": "SAC405_elastic"}}
     (directory / "input.json").write_text(json.dumps(request))
     (directory / "script.py").write_text(SCRIPT)
     return directory

@@ -17,7 +17,7 @@ SHOCK = {
     "pulse_duration": 5e-4,
     "duration": 2e-5,
     "picture_times": [1e-5, 2e-5],
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
+    "numerics": {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
 }
 
 # A gauge across the models' interface, one whose middle lies on a plane of symmetry, a mass and another package.
@@ -46,7 +46,8 @@ FITTED = {
 def write_input(path: Path, directory: Path, **changes) -> Path:
     """Write an input for the meshes of a directory; changes replace its keys."""
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
-    request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | FITTED | changes
+    request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | FITTED
+    request |= {"materials": {"solder": "SAC405_elastic"}} | changes
     path.write_text(json.dumps(request))
     return path
 

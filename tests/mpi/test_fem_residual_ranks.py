@@ -16,7 +16,13 @@ SHOCK = {
     "pulse_duration": 2e-5,
     "duration": 1e-5,
     "gravity": "off",
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2, "formulation": "one_point"},
+    "numerics": {
+        "kinematics": "small",
+        "mass_scaled": ["copper"],
+        "history_samples": 20,
+        "field_samples": 2,
+        "formulation": "one_point",
+    },
 }
 
 

@@ -26,7 +26,13 @@ SHOCK = {
     "gravity": "on",
     "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
     "ranks": {"placement": "disjoint"},
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 100, "field_samples": 4, "checkpoint_seconds": 1e-9},
+    "numerics": {
+        "kinematics": "small",
+        "mass_scaled": ["copper"],
+        "history_samples": 100,
+        "field_samples": 4,
+        "checkpoint_seconds": 1e-9,
+    },
 }
 
 
@@ -41,7 +47,8 @@ def start(directory: Path, mode: str, output: Path, python: str = sys.executable
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     gauge, watch = {"at": [9e-3, 2e-3]}, {"at": [0.0, 0.0, -1e-3]}
     fitted = {"gauges": {"far": gauge}, "watch": {"under": watch}}
-    request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)} | fitted
+    request = {"mode": mode, "meshes": meshes, "shock": SHOCK, "output": str(output)}
+    request |= {"materials": {"solder": "SAC405_elastic"}} | fitted
     path = directory / f"{output.name}.json"
     path.write_text(json.dumps(request | {"checkpoints": str(directory / f"{mode}.checkpoints")}))
     return subprocess.Popen(

@@ -116,7 +116,7 @@ def write_package(directory: Path) -> None:
         "picture_times": [5e-8, 1e-6],
         "gravity": "on",
         "damping": {"stiffness_coefficient": 1e-10, "mass_coefficient": 10.0},
-        "numerics": NUMERICS | {"mass_scaled": ["copper"]},
+        "numerics": NUMERICS | {"kinematics": "small", "mass_scaled": ["copper"]},
     }
     scene = {"mode": "two_scale", "meshes": meshes, "materials": {"solder": "SAC405"}}
     (directory / "input.json").write_text(json.dumps(scene))

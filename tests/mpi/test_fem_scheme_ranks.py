@@ -13,7 +13,7 @@ SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
     "duration": 1e-5,
-    "numerics": {"mass_scaled": ["copper"], "history_samples": 25, "field_samples": 2},
+    "numerics": {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 25, "field_samples": 2},
 }
 WATCHED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package", "board_strain")
 
@@ -37,7 +37,8 @@ def write_input(directory: Path, scheme: str, ranks: dict) -> Path:
     shock = SHOCK | {"coupling": {"scheme": scheme}, "ranks": ranks}
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     path = output.with_suffix(".json")
-    path.write_text(json.dumps({"mode": "two_scale", "meshes": meshes, "shock": shock, "output": str(output)}))
+    request = {"mode": "two_scale", "meshes": meshes, "shock": shock, "output": str(output)}
+    path.write_text(json.dumps(request | {"materials": {"solder": "SAC405_elastic"}}))
     return path
 
 

@@ -10,7 +10,8 @@ from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_programs
 
 LONGEST = 1.2e-4
-NUMERICS = {"mass_scaled": ["copper"], "history_samples": 60, "field_samples": 3, "checkpoint_seconds": 0.02}
+NUMERICS = {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 60, "field_samples": 3}
+NUMERICS |= {"checkpoint_seconds": 0.02}
 
 
 def pulse(time: float) -> float:

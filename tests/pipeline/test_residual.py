@@ -20,7 +20,7 @@ COOLED = (
     "shock.ranks.total=1",
     "thermal.effects.residual_stress=on",
     "thermal.effects.flexible=off",
-    "materials.solder=SAC405",
+    "shock.numerics.plasticity=on",
 )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow import cli
+from reflowshock.workflow.board_drop.shock_effects import shock_effects
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.study.command import read_points_of
@@ -46,6 +47,14 @@ def run_here(line: str, monkeypatch) -> None:
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert not ended.value.code, line
+
+
+def test_the_case_of_the_readme_is_complete_and_takes_what_its_scene_calls_for(tmp_path):
+    text = (ROOT / "README.md").read_text()
+    lines = text[text.index("    case.name") :].split("\n\n")[0].splitlines()
+    (tmp_path / "case.toml").write_text("\n".join(line.removeprefix("    ") for line in lines))
+    effects = shock_effects(read_case(tmp_path / "case.toml", (), True))
+    assert effects["finite_rotation"]["on"] and effects["plasticity"]["on"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)

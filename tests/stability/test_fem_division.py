@@ -12,14 +12,14 @@ from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import cut_nodes, divide, held
 from reflowshock.fem.division.whole import touching
 from reflowshock.fem.errors import CouplingError
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.problem.shock import Coupling
 
 
 def radius(mesh: MeshData, scheme: str) -> float:
-    models = models_of(mesh, Materials(), Coupling(scheme=scheme), 0.9)
+    models = models_of(mesh, ELASTIC, Coupling(scheme=scheme), 0.9)
     assert models.division.plan.substeps > 3
     return Coupled(models.bodies(), models.division.plan, scheme_of(scheme)).spectral_radius()
 
@@ -69,7 +69,7 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
     foot.points[:] += off
     scene = surveyed(append([board(), foot]))
     assert 0.0 < scene[0].moved < 2e-9
-    models = models_of(append([board(), foot]), Materials(), Coupling(scheme="held_velocity"), 0.9)
+    models = models_of(append([board(), foot]), ELASTIC, Coupling(scheme="held_velocity"), 0.9)
     bodies = models.bodies()
     channels = InterfaceChannels.open(
         MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
@@ -81,7 +81,7 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
 
 
 def test_self_check_sees_a_weight_that_is_wrong():
-    models = models_of(append([board(), joint(0.5e-3, 0.5e-3)]), Materials(), Coupling(scheme="held_velocity"), 0.9)
+    models = models_of(append([board(), joint(0.5e-3, 0.5e-3)]), ELASTIC, Coupling(scheme="held_velocity"), 0.9)
     bodies = models.bodies()
     channels = InterfaceChannels.open(
         MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False

@@ -15,7 +15,7 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.materials.library import SAC405
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.power_iteration import highest_frequency
 from tests.support.fem_levels import joint_on_board, levelled
@@ -122,13 +122,13 @@ def test_joint_tied_to_a_board_does_not_grow(impedance, ratios):
 
 @pytest.mark.parametrize("edges", [1, 3, 6], ids=["ratio 1.2", "ratio 3.8", "ratio 7.5"])
 def test_mesh_ratios_do_not_grow(edges):
-    model = levelled(joint_on_board(solder=5, edges=edges), Materials(), (6, 3))
+    model = levelled(joint_on_board(solder=5, edges=edges), ELASTIC, (6, 3))
     body = model.body
     assert highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass).critical_step >= model.window
 
 
 def test_energy_stays_over_many_windows():
-    model = levelled(joint_on_board(solder=4), Materials(), (5, 3))
+    model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3))
     body = model.body
     motion = ExplicitMotion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
@@ -144,7 +144,7 @@ def test_energy_stays_over_many_windows():
 @pytest.mark.parametrize("damping", [0.006, 0.03])
 def test_damping_takes_the_energy_that_is_missing(damping):
     """As strong as levels bear: the highest modes, to which it does most, must fall as well."""
-    model = levelled(joint_on_board(solder=4), Materials(), (5, 3), damping=damping)
+    model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3), damping=damping)
     loads = [RayleighDamping.build(model.body, (0.0, damping * model.window))]
     motion = ExplicitMotion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))

@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.errors import RecordingError
 from reflowshock.fem.parallel.exchange import InterfaceChannels, MessageClock, Messages
 
 CHANNELS, WAYS = ("velocities", "forces"), ("sent", "received")
+
+
+class RecordingError(ValueError):
+    """Recorded messages that do not fit the participant that wants them."""
 
 
 @dataclass(slots=True)

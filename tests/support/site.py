@@ -1,7 +1,6 @@
 """Commands that the site shows: those of its pages, and those of READMEs, which are pages of it as they are."""
 
 import re
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,9 +25,9 @@ def shown(page: Path) -> list[str]:
 
 
 def in_readmes() -> Iterator[tuple[Path, str]]:
-    """Yield the program's commands in all READMEs and other pages at the top."""
-    listed = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
-    for path in (ROOT / name for name in listed.splitlines() if not name.startswith("docs/")):
+    """Yield the program's commands in the READMEs at the top, of the rooms and of the cases."""
+    rooms = ("benchmarks", "cases", "fem", "meshing", "particles", "workflow")
+    for path in (*ROOT.glob("*.md"), *(page for room in rooms for page in (ROOT / room).rglob("*.md"))):
         for line in INDENTED.findall(path.read_text()):
             if OURS.match(line):
                 yield path, line.partition("  #")[0].rstrip()

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import COPPER, GAP, grid, mesh_of, on
 from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
@@ -74,4 +74,4 @@ def small_pads(radius: float = 0.2e-3) -> Pads:
 def small_structure(folder: Path, gravity: float = 9.81, **thermal) -> Assembly:
     """Write the quarter package on its board of ``fem_models``; fields of ``Thermal`` as keywords."""
     mesh = write_small_assembly(folder)[0]
-    return Assembly(mesh, small_pads(), Materials(), Thermal.model_validate(thermal), gravity)
+    return Assembly(mesh, small_pads(), ELASTIC, Thermal.model_validate(thermal), gravity)

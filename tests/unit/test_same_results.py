@@ -5,7 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from tests.same_results import compare, compare_exactly
+from tests.same_results import EVERY_CASE, ROOT, compare, compare_exactly
+
+
+def test_every_case_is_compared():
+    cases = {str(path.relative_to(ROOT)) for path in (ROOT / "cases").glob("*/case.toml")}
+    assert cases <= {path for path, _ in EVERY_CASE.values()}
 
 
 def write_results(folder, value, array):

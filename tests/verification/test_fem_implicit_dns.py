@@ -4,6 +4,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
@@ -14,11 +15,12 @@ from tests.support.fem_models import write_small_assembly
 def dns(meshes: list[Path], directory: Path, solver: str) -> Path:
     """Run a DNS of a part of the pulse; return its history."""
     directory.mkdir()
-    numerics = {"mass_scaled": ("copper",), "history_samples": 20, "field_samples": 2, "dns_solver": solver}
+    numerics = {"kinematics": "small", "mass_scaled": ("copper",), "history_samples": 20, "field_samples": 2}
+    numerics |= {"dns_solver": solver}
     shock = Shock(service_condition="B", duration=1e-5, numerics=numerics)
     run(
         MPI.COMM_SELF,
-        RunInput(mode="dns", meshes=meshes, shock=shock, output=directory),
+        RunInput(mode="dns", meshes=meshes, materials=ELASTIC, shock=shock, output=directory),
     )
     return directory / "history.npz"
 

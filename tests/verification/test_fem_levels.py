@@ -14,7 +14,7 @@ from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.step_levels import Levels, SubsteppedElements
 from tests.support.fem_bodies import dense_stiffness
@@ -40,7 +40,7 @@ def at_step(model: Levelled, step: float) -> Levelled:
 
 @pytest.mark.parametrize("ratios", [(14,), (5, 3), (2, 3, 3)], ids=str)
 def test_displacement_is_of_second_order_in_the_window(ratios):
-    model = levelled(MESH, Materials(), ratios)
+    model = levelled(MESH, ELASTIC, ratios)
     body = model.plain
     free = body.free.ravel()
     stiffness = dense_stiffness(body)[np.ix_(free, free)]
@@ -64,7 +64,7 @@ def test_displacement_is_of_second_order_in_the_window(ratios):
 
 
 def test_momentum_of_a_free_body_stays():
-    model = levelled(joint_on_board(solder=4, held=False), Materials(), (5, 3))
+    model = levelled(joint_on_board(solder=4, held=False), ELASTIC, (5, 3))
     body, points = model.body, model.body.local.points
     start = 1e-6 * np.sin(3e3 * points @ np.array([[1.0, 2.0, 0.5], [-1.0, 0.7, 1.0], [0.3, 1.0, -2.0]]))
     body.tie.spread(start)
@@ -85,13 +85,13 @@ def test_momentum_of_a_free_body_stays():
 @pytest.mark.parametrize("ratios", [(14,), (5, 3)], ids=str)
 def test_two_models_that_share_the_levels_move_as_one(ratios):
     """The meso model has the elements of all levels below the window; its interface is the ring of the first level."""
-    whole = levelled(MESH, Materials(), ratios)
+    whole = levelled(MESH, ELASTIC, ratios)
     level = np.empty_like(whole.level)
     level[whole.body.local.cell_numbers] = whole.level
     plan = WindowPlan(whole.window, int(np.prod(ratios)), 200, 1)
     division = Division("local_steps", level == 0, level > 0, level, ratios, plan)
     inputs = model_inputs(joined(MESH), division)
-    models = Models({role: pieces_of(item, Materials()) for role, item in inputs.items()}, division)
+    models = Models({role: pieces_of(item, ELASTIC) for role, item in inputs.items()}, division)
     pair = Coupled(models.bodies(), plan, scheme_of("local_steps"))
     alone = motion_of(whole.body, whole.window)
     for motion in (alone, pair.macro.motion, pair.meso.motion):

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.state import Assembly, HeatedState
@@ -28,7 +28,7 @@ def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple
     lower = np.array([(site.x, site.y, site.z_board) for site in sites])
     centres = np.stack([lower, lower + [0.0, 0.0, parts.standoff]], axis=1)
     pads = Pads([site.name for site in sites], centres, np.full((len(sites), 2), 0.24 * MM))
-    structure = ThermalStructure.build(MPI.COMM_SELF, Assembly(folder / "heated.msh", pads, Materials(), thermal, 9.81))
+    structure = ThermalStructure.build(MPI.COMM_SELF, Assembly(folder / "heated.msh", pads, ELASTIC, thermal, 9.81))
     wrenches = np.zeros((len(sites), 2, 6))
     wrenches[:, 1, :3], wrenches[:, 0, :3] = -lower - [0.0, 0.0, 1e-3], lower + [0.0, 0.0, 1e-3]
     return pads, structure.solve(473.15, -5e-5, wrenches, np.zeros(len(structure.rigid_modes.names)))

@@ -7,7 +7,7 @@ from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly
@@ -24,7 +24,7 @@ def board_only() -> MeshData:
 
 def test_one_substep_a_window_is_the_dns():
     """The exchange is without lag: macro and meso model with m = 1 are one model, to round-off."""
-    window = Window(board_only(), Materials(), 0.9, by_patch, [PULSE])
+    window = Window(board_only(), ELASTIC, 0.9, by_patch, [PULSE])
     assert window.plan.substeps == 1
     body, _ = dns_body(board_only())
     dns = motion_of(body, window.plan.step, [PULSE])

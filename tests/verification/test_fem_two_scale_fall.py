@@ -8,7 +8,7 @@ import pytest
 from reflowshock.cases.hard.trials.coupled import Coupled, models_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
 from tests.support.fem_models import small_assembly
@@ -27,7 +27,7 @@ def test_a_body_acceleration_moves_both_models_alike(scheme, limit):
     """
     mesh = append(small_assembly(size=1e-3))
     loose = replace(mesh, facets={name: facets for name, facets in mesh.facets.items() if name != "mounting_holes"})
-    models = models_of(loose, Materials(), Coupling(scheme=scheme), 0.9)
+    models = models_of(loose, ELASTIC, Coupling(scheme=scheme), 0.9)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(scheme), [PULSE])
     assert models.division.plan.substeps > 10
     for _ in range(60):

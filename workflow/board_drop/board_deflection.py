@@ -138,7 +138,7 @@ class DropScene:
         given = self.case.materials
         if given.solder.plasticity is None or self.yielding["on"]:
             return given
-        return given.model_copy(update={"solder": given.solder.model_copy(update={"plasticity": None})})
+        return given.model_copy(update={"solder": given.solder.elastic})
 
     @property
     def thickness(self) -> float:

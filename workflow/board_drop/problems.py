@@ -30,11 +30,17 @@ def board_drop_problems(case: BoardDropCase) -> list[Problem]:
     found += unreadable_pulses(case.pulse_tables)
     found += _in_words(case, fittings.problems(case))
     if case.shock.numerics.kinematics == "auto" and not found:
-        found += _in_words(case, shock_checks.problems(decided(case).shock))
+        found += _in_words(case, map(_as_decided, shock_checks.problems(decided(case).shock)))
     if found:
         return found
     found = [*identical_joints.problems(case), *shock_cooling.problems(case), *_of_flow(case), *_of_coupling(case)]
     return found or list(step_problems(case))
+
+
+def _as_decided(problem: Problem) -> Problem:
+    """Say of kinematics that the scene has decided that the case did not ask for them."""
+    is_decided = problem.key == "shock.numerics.kinematics"
+    return replace(problem, value=f"auto, here {problem.value}") if is_decided else problem
 
 
 def _of_geometry(case: PackageCase) -> list[Problem]:

@@ -8,6 +8,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from reflowshock.fem.materials.roles import ByName
 from reflowshock.names import nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import CASES, Case, Title
@@ -31,7 +32,8 @@ COMMENT_COLUMN = 44
 HEADER = """\
 #:schema reflowshock.schema.json
 # Case "{name}", from the template "{template}".
-# Every parameter is here. A quantity is a string with a unit, any unit of its dimension ("0.48 mm", "480 um").
+# Every parameter is here, but for the constants of materials that have a name. A quantity is a string with a unit, any
+# unit of its dimension ("0.48 mm", "480 um").
 # Tables named "numerics" say how something is computed, all others what. Lines that repeat a default can be removed.
 """
 
@@ -88,7 +90,10 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
     lines, tables, absent = [], [], []
     for name, field in type(parameters).model_fields.items():
         value = getattr(parameters, name)
-        if isinstance(value, BaseModel):
+        if known := _library_name(value, field):
+            remark = f" # a name of the library, or a table; default {_library_name(field.default, field)}"
+            lines.append(f'{name} = "{known}"'.ljust(COMMENT_COLUMN) + remark)
+        elif isinstance(value, BaseModel):
             tables.append((f"{key}.{name}".lstrip("."), value))
         elif holds_named_tables(field) and not models_of(field):
             lines.append(f"{name} = {{ {', '.join(f'{own} = {as_toml(item)}' for own, item in value.items())} }}")
@@ -105,6 +110,12 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
     own = getattr(parameters, "kind", "")
     for name, table in sorted(tables, key=lambda item: item[0] not in ("case", own)):
         _add_table(blocks, name, table)
+
+
+def _library_name(value: object, field: FieldInfo) -> str | None:
+    """Return the name of a material of the library, which says more than its constants."""
+    choices = next((item.choices for item in field.metadata if isinstance(item, ByName)), {})
+    return next((name for name, material in choices.items() if material == value), None)
 
 
 def _absent_table(key: str, model: type[BaseModel]) -> str:

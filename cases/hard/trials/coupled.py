@@ -23,7 +23,7 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
@@ -34,7 +34,7 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.shock import Coupling
 
 Divide = Callable[[Whole, Survey, Rules], Division]
-DEFAULTS, HELD = Materials(), Coupling(scheme="held_velocity", levels=1)
+DEFAULTS, HELD = ELASTIC, Coupling(scheme="held_velocity", levels=1)
 DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
 
 

@@ -8,7 +8,7 @@ from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.cases.hard.trials.pairs import FRACTION
 from reflowshock.cases.hard.trials.windows import through
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.problem.shock import Coupling
 
@@ -21,7 +21,7 @@ def layout(given: Layout) -> dict[str, float]:
     Raises:
         CouplingError: The layout cannot be divided in this way.
     """
-    models = models_of(LAYOUTS[given.layout](), Materials(), Coupling(scheme=given.scheme), FRACTION)
+    models = models_of(LAYOUTS[given.layout](), ELASTIC, Coupling(scheme=given.scheme), FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))
     found = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
     return found | through(models)

@@ -10,7 +10,7 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.tetrahedron import EDGES
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.kernels.hexahedron import SIDES
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
@@ -97,7 +97,7 @@ def test_dolfinx_keeps_nodes_and_writes_fields(box, tmp_path):
     local = distribute(MPI.COMM_SELF, item.mesh)
     assert np.array_equal(local.nodes[local.cells], item.mesh.cells[local.cell_numbers])
     assert np.array_equal(local.points, item.mesh.points[local.nodes])
-    pieces = make_pieces(local, item.tables, Materials())
+    pieces = make_pieces(local, item.tables, ELASTIC)
     body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
     fields = Fields(MPI.COMM_SELF, body, item.tables.part[local.cell_numbers], tmp_path / "fields.pvd")
     fields.write(fields.sample(1e-3 * local.points, 0.0))

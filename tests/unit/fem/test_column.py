@@ -8,7 +8,7 @@ from reflowshock.fem.division.tables import joined
 from reflowshock.fem.division.whole import Treatment, survey
 from reflowshock.fem.errors import MeshError, StepError
 from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh import column
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
 from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
@@ -132,12 +132,12 @@ def test_faces_on_a_plane_of_symmetry_are_held_there():
 def test_masses_of_a_column_are_scaled_to_the_step_of_the_boxes_or_as_far_as_wanted(whole):
     """Below the wanted step all of the column is heavier, to just that step; nothing else is."""
     mesh, given = whole.mesh, ("column", "solder", "copper")
-    plain, full = (survey(mesh, Materials(), Treatment(mass_scaled=scaled)) for scaled in ((), given))
+    plain, full = (survey(mesh, ELASTIC, Treatment(mass_scaled=scaled)) for scaled in ((), given))
     boxes = mesh.in_parts(lambda name: "@" not in name)
     assert np.array_equal(full.factor[boxes], np.ones(boxes.sum()))
     assert full.step.min() == pytest.approx(plain.plain_step[boxes].min(), rel=1e-12)
     wanted = 0.5 * (plain.plain_step.min() + plain.plain_step[boxes].min())
-    some = survey(mesh, Materials(), Treatment(mass_scaled=given, scaled_step=wanted))
+    some = survey(mesh, ELASTIC, Treatment(mass_scaled=given, scaled_step=wanted))
     assert some.step.min() == pytest.approx(wanted, rel=1e-12)
     assert np.array_equal(some.factor > 1.0, ~boxes & (plain.plain_step < wanted))
     assert 0.0 < some.added_mass.sum() < full.added_mass.sum()
@@ -146,7 +146,5 @@ def test_masses_of_a_column_are_scaled_to_the_step_of_the_boxes_or_as_far_as_wan
 def test_all_that_is_scaled_has_no_step_but_a_wanted_one(whole):
     every = ("board", "substrate", "copper", "solder")
     with pytest.raises(StepError, match="leaves no role to take the step from"):
-        survey(whole.mesh, Materials(), Treatment(mass_scaled=every))
-    assert survey(whole.mesh, Materials(), Treatment(mass_scaled=every, scaled_step=1e-8)).step.min() >= 1e-8 * (
-        1 - 1e-12
-    )
+        survey(whole.mesh, ELASTIC, Treatment(mass_scaled=every))
+    assert survey(whole.mesh, ELASTIC, Treatment(mass_scaled=every, scaled_step=1e-8)).step.min() >= 1e-8 * (1 - 1e-12)

@@ -12,13 +12,13 @@ from reflowshock.fem.division.split import interface_between, part_of
 from reflowshock.fem.division.tables import model_inputs
 from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.materials.library import SAC305
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.steps import steps_of_division
 from reflowshock.fem.problem.shock import Coupling
 from tests.support.fem_models import small_assembly
 
-ELASTIC, YIELDING = Materials(), Materials(solder=SAC305)
+ELASTIC, YIELDING = ELASTIC, Materials(solder=SAC305)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from petsc4py import PETSc
 
 from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.fem.errors import AgreedError
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
@@ -16,7 +16,7 @@ from tests.support.fem_models import bar, small_assembly
 
 @pytest.fixture(scope="module")
 def tied() -> Body:
-    return dns_body(append(small_assembly(1, size=1e-3)), materials=Materials())[0]
+    return dns_body(append(small_assembly(1, size=1e-3)), materials=ELASTIC)[0]
 
 
 def random_field(body: Body, seed: int) -> np.ndarray:

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import COPPER, GAP
 from reflowshock.fem.estimates.estimate import WindowPlan, shortened
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.output.joint_interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
@@ -19,7 +20,7 @@ from reflowshock.fem.run.package import run
 from tests.support.fem_models import SITES, write_small_assembly
 
 TIMES = 4e-6, 1e-5
-NUMERICS = {"mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2}
+NUMERICS = {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 20, "field_samples": 2}
 SHOCK = {
     "peak_acceleration": 14709.975,
     "pulse_duration": 5e-4,
@@ -41,7 +42,7 @@ def results(files: Path, name: str, mode: str, numerics: dict | None = None, **c
     output.mkdir(exist_ok=True)
     shock = SHOCK | {"numerics": NUMERICS | (numerics or {})}
     meshes = (files / "assembly.msh", files / "joints.msh")
-    run(MPI.COMM_SELF, RunInput(mode=mode, meshes=meshes, shock=shock, output=output, **changes))
+    run(MPI.COMM_SELF, RunInput(mode=mode, meshes=meshes, materials=ELASTIC, shock=shock, output=output, **changes))
     return output
 
 

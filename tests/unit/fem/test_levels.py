@@ -18,7 +18,7 @@ from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.load import PrescribedVelocity
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.tie import Tie, net_load
 from reflowshock.fem.model.step_levels import Levels, SubsteppedElements, check_elastic, levels_of
 from tests.support.fem_bodies import dense_stiffness
@@ -27,7 +27,7 @@ from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_
 
 @pytest.fixture(scope="module", params=[(12,), (7, 3), (4, 3, 3)], ids=str)
 def model(request) -> Levelled:
-    made = levelled(joint_on_board(), Materials(), request.param)
+    made = levelled(joint_on_board(), ELASTIC, request.param)
     assert np.bincount(made.level).min() > 0
     return made
 
@@ -92,14 +92,14 @@ def test_only_supports_bear_a_falling_body(model):
     carried = body.terms[-1].carry(np.zeros((len(body.mass), 3)), fall)
     assert np.abs(carried).max() > 0.0
     assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * np.abs(carried).sum()
-    loose = levelled(joint_on_board(held=False), Materials(), model.ratios).body
+    loose = levelled(joint_on_board(held=False), ELASTIC, model.ratios).body
     assert np.all(loose.terms[-1].carry(np.zeros((len(loose.mass), 3)), fall) == 0.0)
 
 
 def test_what_a_motion_prescribes_does_not_move_in_substeps():
     """Held in the motion or held in the body: the same force."""
     mesh, ratios = joint_on_board(), (7, 3)
-    model, held = levelled(mesh, Materials(), ratios), levelled(mesh, Materials(), ratios)
+    model, held = levelled(mesh, ELASTIC, ratios), levelled(mesh, ELASTIC, ratios)
     body = model.body
     top = np.flatnonzero(body.local.points[:, 2] == body.local.points[:, 2].max())
     held.body.free[top, 0] = False
@@ -116,7 +116,7 @@ def test_what_a_motion_prescribes_does_not_move_in_substeps():
 
 
 def test_one_substep_is_the_plain_force():
-    model = levelled(joint_on_board(), Materials(), (12,))
+    model = levelled(joint_on_board(), ELASTIC, (12,))
     once = SubsteppedElements.build(MPI.COMM_SELF, model.body, Levels(model.level, (1,), model.window))
     body = replace(model.body, terms=[*model.body.terms[:-1], once])
     plain = dense_stiffness(model.plain)
@@ -132,7 +132,7 @@ def test_energy_is_that_of_the_effective_stiffness(model):
 
 
 def test_hourglass_energy_is_told_apart():
-    model = levelled(joint_on_board(solder=4), Materials(), (5, 3))
+    model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3))
     body = replace(model.plain, elements=replace(model.plain.elements, kind=ONE_POINT))
     displacement = 1e-6 * np.sin(np.arange(3 * len(body.mass))).reshape(-1, 3)
     body.tie.spread(displacement)

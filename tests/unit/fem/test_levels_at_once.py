@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.step_levels import SubsteppedElements, levels_of
 from tests.support.fem_levels import joint_on_board, levelled
@@ -36,7 +36,7 @@ def nested(level: SubsteppedElements) -> list[SubsteppedElements]:
     ("ratios", "calls"), [((12,), [1]), ((7, 3), [2, 1]), ((4, 3, 3), [0, 2, 1])], ids=["one", "two", "boxes outside"]
 )
 def test_all_substeps_at_once_are_those_one_by_one(ratios, calls):
-    body = levelled(barrel(), Materials(), ratios).body
+    body = levelled(barrel(), ELASTIC, ratios).body
     (level,) = levels_of(body.terms)
     assert [len(item.at_once) for item in nested(level)] == calls
     displacement = 1e-6 * np.sin(np.arange(body.mass.size * 3.0)).reshape(-1, 3)
@@ -52,7 +52,7 @@ def test_all_substeps_at_once_are_those_one_by_one(ratios, calls):
 
 def test_levels_follow_the_motion_in_either_way():
     """Held nodes of a motion are held in the arrays of the compiled call, too."""
-    (level,) = levels_of(levelled(barrel(), Materials(), (7, 3)).body.terms)
+    (level,) = levels_of(levelled(barrel(), ELASTIC, (7, 3)).body.terms)
     before = level.at_once[0][3].copy()
     level.follow(np.full((int(level.rows.max()) + 1, 3), 2.0))
     assert level.at_once[0][3] is level.inverse

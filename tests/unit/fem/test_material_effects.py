@@ -8,7 +8,7 @@ from reflowshock.effect import decided
 from reflowshock.fem.estimates.drop_effects import Failing
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS
 from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.problem.failure import Failure, Life
 
 
@@ -27,7 +27,7 @@ def test_life_follows_the_law_within_its_scatter():
 
 
 def test_effects_name_the_materials_that_call_for_them():
-    off = decided(MATERIAL_EFFECTS, SimpleNamespace(materials=Materials().by_role))
+    off = decided(MATERIAL_EFFECTS, SimpleNamespace(materials=ELASTIC.by_role))
     assert not any(effect["on"] for effect in off.values())
     hot = SNPB.model_copy(update={"temperature": 398.15})
     on = decided(MATERIAL_EFFECTS, SimpleNamespace(materials={"solder": hot, "bump": SAC305, "die": SILICON}))

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from reflowshock.fem.kernels.motion import STRIP, add_rows, advance, sum_in_rank_order
+from reflowshock.fem.kernels.motion import (
+    STRIP,
+    add_rows,
+    advance,
+    kicks_of,
+    move,
+    sum_in_rank_order,
+    work_of_changes,
+)
 from reflowshock.fem.parallel.exchange import rank_order
 
 
@@ -19,6 +27,30 @@ def test_step_of_central_differences(count):
     advance(state, mobility, gravity, step)
     assert np.allclose(state, [displacement, velocity, force], rtol=1e-14, atol=1e-15)
     assert np.array_equal(state[2], force)
+
+
+def test_steps_without_a_new_force_are_those_one_by_one():
+    random = np.random.default_rng(5)
+    count, first, end, step = 4, 3, STRIP // 3 + 9, 0.1
+    state = random.uniform(-1, 1, (3, STRIP, 3))
+    mobility = random.uniform(1, 2, (STRIP, 3)) * (random.uniform(size=(STRIP, 3)) < 0.7)
+    state[1][mobility == 0.0] = 0.0
+    accelerations, changes = random.uniform(-1, 1, (2, count, 3))
+    mass, each, work = random.uniform(1, 2, STRIP), state.copy(), 0.0
+    each[2] *= count  # an impulse, in the first step
+    for k in range(count):
+        advance(each, mobility, accelerations[k], step)
+        each[2] = 0.0
+        work += step * changes[k] @ (mass[first:end] @ each[1, first:end])
+    whole, kicks = state.copy(), np.empty((3, 3))
+    whole[2] *= count
+    kicks_of(accelerations, step, kicks)
+    move(whole, mobility, (first, end), kicks, (step, count))
+    assert np.allclose(whole[:2, first:end], each[:2, first:end], rtol=1e-13, atol=1e-14)
+    assert np.array_equal(whole[:2, :first], state[:2, :first])
+    assert np.array_equal(whole[:2, end:], state[:2, end:])
+    nodes = mass[first:end], whole[1, first:end], mobility[first:end]
+    assert work_of_changes(nodes, changes, accelerations, step) == pytest.approx(work, rel=1e-12)
 
 
 def test_sums_over_shared_nodes_are_taken_in_the_order_of_ranks():

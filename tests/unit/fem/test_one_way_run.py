@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock_checks import problems
@@ -21,7 +22,7 @@ SHOCK = {
     "pulse_duration": 5e-4,
     "duration": 2e-5,
     "ranks": {"total": 1},
-    "numerics": {"history_samples": 50, "field_samples": 2},
+    "numerics": {"kinematics": "small", "history_samples": 50, "field_samples": 2},
 }
 
 
@@ -42,6 +43,7 @@ def files(tmp_path_factory) -> Path:
 def request(files: Path, name: str, **coupling) -> RunInput:
     return RunInput(
         mode="two_scale",
+        materials=ELASTIC,
         meshes=(files / "assembly.msh", files / "joints.msh"),
         coarse_joints=files / "coarse.msh",
         shock=SHOCK | {"coupling": coupling},

@@ -9,10 +9,9 @@ from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
 from reflowshock.fem.coupling.held_velocity import HeldVelocity, local_interface
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.dynamics.participant import explicit_motion
-from reflowshock.fem.errors import RecordingError
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from tests.support.recording import record, replay, save_recording
+from tests.support.recording import RecordingError, record, replay, save_recording
 from tests.support.scripted import ScriptedDriver, ScriptedMacro, ScriptedMeso, scripted_interface
 
 WINDOWS = 20

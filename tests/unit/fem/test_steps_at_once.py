@@ -85,6 +85,14 @@ def test_steps_at_once_are_those_one_by_one(name, pace):
     assert motion.internal_energy().plastic > 0.0
 
 
+def test_nodes_that_move_most_often_come_first():
+    body = body_of(*SETTINGS["turning"][:2], pace=3)
+    _, node = body.node_paces
+    assert np.all(np.diff(node) >= 0)
+    ends = StepsAtOnce.of(body, []).ends
+    assert ends.tolist() == [np.sum(node == 1), len(node), len(node)]
+
+
 def test_inverted_elements_are_told_alike():
     told = []
     for take in (ExplicitMotion.take_steps, ExplicitMotion._take_each):

@@ -19,7 +19,7 @@ from reflowshock.fem.estimates.thermal_effects import (
     warpage_number,
 )
 from reflowshock.fem.materials.library import FR4, SILICON
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.plates import RigidPlates
@@ -67,7 +67,7 @@ def test_warpage_stays_below_its_number(tmp_path, die, flexible):
 
 @pytest.mark.parametrize(("tension", "acts"), [(0.5, False), (500.0, True)])
 def test_bending_by_the_solder_stays_below_its_number(tmp_path, tension, acts):
-    materials, pull = Materials(), 2.0 * np.pi * SIZES.pad_radius * tension
+    materials, pull = ELASTIC, 2.0 * np.pi * SIZES.pad_radius * tension
     number = solder_force_number(materials.by_role, SIZES, tension)
     assert (number > NEGLIGIBLE) == acts
     structure = ThermalStructure.build(MPI.COMM_SELF, small_structure(tmp_path))
@@ -81,7 +81,7 @@ def test_bending_by_the_solder_stays_below_its_number(tmp_path, tension, acts):
 
 
 def test_switches_are_followed_and_rigid_plates_take_no_force():
-    roles = Materials().by_role
+    roles = ELASTIC.by_role
 
     def decide(thermal: Thermal, surface_tension: float) -> dict:
         return decided(HEATED_EFFECTS, Heated(thermal, roles, SIZES, surface_tension, [thermal.peak]))
@@ -160,8 +160,8 @@ def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path, 
     pads = Pads([str(number) for number in range(len(lower))], centres, np.full((len(lower), 2), 0.24 * MM))
     sizes = replace(SIZES, die=thickness * MM, reach=np.hypot(4.5, 4.5) * MM, standoff=parts.standoff)
     structure = ThermalStructure.build(
-        MPI.COMM_SELF, Assembly(tmp_path / "heated.msh", pads, Materials(), Thermal(), gravity=9.81)
+        MPI.COMM_SELF, Assembly(tmp_path / "heated.msh", pads, ELASTIC, Thermal(), gravity=9.81)
     )
     change = gaps(structure, Thermal().peak) - gaps(structure, REFERENCE)
-    number = warpage_number(Thermal(), Materials().by_role, sizes)
+    number = warpage_number(Thermal(), ELASTIC.by_role, sizes)
     assert 0.4 * number < np.ptp(change[:, 2]) / parts.standoff < number

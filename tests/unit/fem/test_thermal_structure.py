@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.errors import AgreedError, MeshError
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.statics.pads import disc_rule, pad_matrix
 from reflowshock.fem.statics.structure import ThermalStructure
@@ -109,7 +109,7 @@ def test_a_quarter_package_floats_up_and_down(floating):
     assert modes.names == ("z",)
     assert modes.pad_motion[0, :, 1] == pytest.approx(np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (4, 1)), abs=1e-10)
     assert np.abs(modes.pad_motion[0, :, 0]).max() == 0.0
-    materials, side = Materials(), 2.5e-3
+    materials, side = ELASTIC, 2.5e-3
     mass = 0.4e-3 * side**2 * materials.substrate.density + 0.4e-3 * (2e-3) ** 2 * materials.die.density
     assert modes.weight == pytest.approx([-9.81 * mass], rel=1e-10)
 
@@ -146,7 +146,7 @@ def test_moved_corners_are_where_they_should_be_and_bear_the_weight(moved):
     top = np.flatnonzero(moved.points[:, 2] > moved.points[:, 2].max() - 1e-9)
     corner = top[np.argmax(moved.points[top, :2].sum(axis=1))]
     assert state.displacement[corner, 2] == pytest.approx(-1e-4, rel=1e-12)
-    materials = Materials()
+    materials = ELASTIC
     mass = 0.4e-3 * (2.5e-3) ** 2 * materials.substrate.density + 0.4e-3 * (2e-3) ** 2 * materials.die.density
     assert state.corner_force == pytest.approx([9.81 * mass - wrenches[:, 1, 2].sum()], rel=1e-9)
 

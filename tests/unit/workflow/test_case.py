@@ -89,8 +89,13 @@ BAD_VALUES = {
         ["shock.failure.life.scatter", "out of range", ">= 1"],
     ),
     "linear steps of solder that yields": (
-        'materials.solder={ plasticity = { A = "38 MPa" } }\nshock.numerics.dns_solver=implicit',
+        "shock.numerics.plasticity=on\nshock.numerics.dns_solver=implicit",
         ['shock.numerics.dns_solver = "implicit"', "solder yields", "allowed: explicit"],
+    ),
+    "linear steps of a board that turns": (
+        "shock.numerics.kinematics=auto\nshock.pulse_duration=0.5 ms\nshock.duration=0.9 ms"
+        "\nshock.numerics.dns_solver=implicit",
+        ['shock.numerics.kinematics = "auto, here corotational"', "linear", "allowed: small, or dns_solver"],
     ),
     "unknown constant of plasticity": ("materials.solder.plasticity.D=1", ["unknown key", "one of A, B, n, C"]),
     "table below a value": ("package.rows.all=1", ["package.rows.all", "cannot be set: the key above it has a value"]),

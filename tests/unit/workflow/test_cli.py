@@ -8,6 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.examples import EXAMPLES
@@ -20,6 +21,7 @@ from tests.support.workflow_command import command_line
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 CASE = CASES / "bga_drop" / "case.toml"
+DEFAULT = CASES / "jedec_bga" / "case.toml"  # the template of a new case
 
 
 @pytest.fixture
@@ -41,10 +43,14 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     code, _, _ = call("new", "mine")
     assert code == 0
     path = tmp_path / "mine.toml"
-    mine, template = (display_values(read_case(file)) for file in (path, CASE))
+    mine, template = (display_values(read_case(file)) for file in (path, DEFAULT))
     assert mine == template | {"case.name": "mine"}
-    given = [key for key, _ in flat(tomllib.loads(path.read_text())) if not key.startswith("scales.")]
-    assert set(given) == set(mine)
+    given = dict(flat(tomllib.loads(path.read_text())))
+    names = {key: name for key, name in given.items() if key.startswith("materials.")}
+    materials = read_case(path).materials.by_role
+    assert {role: LIBRARY[names[f"materials.{role}"]] for role in materials} == materials
+    others = [{key for key in keys if not key.startswith(("scales.", "materials."))} for keys in (given, mine)]
+    assert others[0] == others[1]
 
 
 def flat(table: dict, prefix: str = ""):

@@ -7,7 +7,7 @@ from reflowshock.workflow.case.run import Findings
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
-COOLED = ["thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405"]
+COOLED = ["thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "shock.numerics.plasticity=on"]
 
 
 def test_checks_of_all_coolings_are_told(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from reflowshock.fem.division.path_levels import MOST_LEVELS
 from reflowshock.fem.kernels.levels import PACES
 from reflowshock.meshing.board.estimate import count_elements
+from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.forecast import forecast
 from reflowshock.workflow.board_drop.part_forecast import forecast_parts, two_scale_parts
 from reflowshock.workflow.board_drop.shock_forecast import (
@@ -24,7 +25,7 @@ CASES = Path(__file__).resolve().parents[3] / "cases"
 
 
 def predicted(*settings: str):
-    case = read_case(SMALL_CASE, settings, oversubscribe=True)
+    case = decided(read_case(SMALL_CASE, settings, oversubscribe=True))
     return forecast_shock(case, forecast_parts(case))
 
 
@@ -69,7 +70,7 @@ def test_one_level_is_one_ratio():
     assert len(predicted("shock.numerics.mass_scaled=[]", "shock.coupling.levels=1").levels) == 2
 
 
-@pytest.mark.parametrize("setting", ["materials.solder=SAC405", "shock.numerics.kinematics=finite"])
+@pytest.mark.parametrize("setting", ["shock.numerics.plasticity=on", "shock.numerics.kinematics=finite"])
 def test_what_has_a_path_is_driven_by_held_velocity(setting):
     shock = predicted(setting)
     assert shock.scheme[0] == "held_velocity"
@@ -78,7 +79,7 @@ def test_what_has_a_path_is_driven_by_held_velocity(setting):
     assert implicit_seconds(read_case(SMALL_CASE, [setting])) is None
 
 
-PATH = ("materials.solder=SAC405", "shock.numerics.mass_scaled=[]")
+PATH = ("shock.numerics.plasticity=on", "shock.numerics.mass_scaled=[]")
 
 
 def test_levels_along_a_path_have_layers_of_solder_with_the_copper():
@@ -131,10 +132,12 @@ def test_the_wanted_scheme_is_taken():
 
 
 def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
-    seconds = implicit_seconds(read_case(SMALL_CASE))
+    seconds = implicit_seconds(decided(read_case(SMALL_CASE)))
     assert seconds > 0.0
     early = read_case(SMALL_CASE, ["shock.numerics.dns_duration=0.01 ms"])
-    assert implicit_seconds(early) == seconds  # of the whole shock: beside the two-scale run, which does not end early
+    assert (
+        implicit_seconds(decided(early)) == seconds
+    )  # of the whole shock: beside the two-scale run, which does not end early
 
 
 def test_one_way_the_coarse_model_takes_the_window_of_all_its_parts():

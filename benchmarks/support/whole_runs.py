@@ -1,0 +1,28 @@
+"""Wall times of whole cases, from what their runs have left in ``runs``."""
+
+import json
+from pathlib import Path
+
+from benchmarks.support import turns
+
+RUNS = Path(__file__).parents[2] / "runs"
+FIGURES = {  # figure -> folder of its run, limit [s], elements of the board that it has at least
+    "default case, answer complete [s]": ("jedec_bga", 180.0, 1),
+    "hu_bga_drop, full size, finite + J2, two scales [s]": ("hu_bga_drop", 1800.0, 100_000),
+}
+COMMANDS = {"jedec_bga": "make demo", "hu_bga_drop": "reflowshock run cases/hu_bga_drop/case.toml --set scale=physical"}
+
+
+def found_in_runs(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
+    """Return the figures of runs that are there, with their limits, and the commands that make the others."""
+    bars, missing = {}, {}
+    for name, (case, limit, elements) in FIGURES.items():
+        path = folder / case / "summary.json"
+        summary = json.loads(path.read_text()) if path.exists() else {"metrics": {}}
+        metrics = summary["metrics"]
+        yields = "layer_plastic_work" in metrics
+        if yields and metrics["elements_board"]["value"] >= elements:
+            bars[name] = turns.bar(sum(summary["timings"].values()), limit, False)
+        else:
+            missing[name] = COMMANDS[case]
+    return bars, missing
