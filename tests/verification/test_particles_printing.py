@@ -7,7 +7,6 @@ import pyvista
 from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import SOLID, Body, Deposit
-from reflowshock.particles.scenes.droplet import base_width
 from reflowshock.particles.sph import flow
 
 LAYERS = 5
@@ -41,25 +40,32 @@ def open_box(half, top):
 
 
 def errors_on_slab(degrees, units):
-    """Height and base against the cap after so many sqrt(rho D^3 / gamma)."""
+    """Height, and mean radius of the profile over that of the base, against the cap after sqrt(rho D^3 / gamma) units.
+
+    At 8 particles a diameter the base itself, continued from 1.5 spacings on, is 9 % too narrow on the plate, too,
+    where the profile is the exact one within 2 %.
+    """
     scene, deposit, top = on_slab(degrees)
     unit = np.sqrt(scene.density * scene.length**3 / scene.surface_tension)
     while deposit.time < units * unit:
         deposit.step(1.0)
     points = deposit.surface.points - [0.0, 0.0, top]
-    base, height = cap(scene.contact_angle)
-    widths = base_width(points, deposit.law.spacing) / scene.length
+    half, height = np.array(cap(scene.contact_angle)) * scene.length * [0.5, 1.0]
+    sphere = (half**2 + height**2) / (2.0 * height)
+    read = (points[:, 2] > 0.5 * deposit.law.spacing) & (points[:, 2] < 0.9 * height)
+    exact = np.sqrt(sphere**2 - (points[read, 2] - height + sphere) ** 2)
+    radius = np.linalg.norm(points[read, :2], axis=1)
     assert deposit.simulation.kinetic_energy < 1e-3 * np.pi * scene.length**2 * scene.surface_tension
-    return points[:, 2].max() / scene.length / height - 1.0, widths / base - 1.0
+    return points[:, 2].max() / height - 1.0, (radius - exact).mean() / half
 
 
 def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
-    height, base = errors_on_slab(90.0, 1.5)
-    assert abs(height) < 0.05 and abs(base) < 0.08  # as on the plate; without shares of walls 0.18 and 0.2
+    height, profile = errors_on_slab(90.0, 1.5)
+    assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; without shares of walls 0.18 and 0.2
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("degrees", "units"), [(60.0, 4.0), (120.0, 3.0)])
 def test_drops_on_cured_ink_that_they_wet_or_not(degrees, units):
-    height, base = errors_on_slab(degrees, units)
-    assert abs(height) < 0.04 and abs(base) < 0.06
+    height, profile = errors_on_slab(degrees, units)
+    assert abs(height) < 0.04 and abs(profile) < 0.04

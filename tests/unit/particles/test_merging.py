@@ -76,6 +76,17 @@ def test_drops_that_meet_become_one_and_keep_volume_and_momentum():
     assert np.abs(speeds @ fields.mass).max() < 1e-12 * (np.abs(speeds) @ fields.mass).max()
 
 
+@pytest.mark.long
+def test_drops_that_have_merged_end_with_the_pressure_of_one_sphere():
+    simulation, volume = two_drops()
+    points = go(simulation, 4.0).surface.points
+    radius = np.cbrt(0.75 * volume / np.pi)
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    assert distance.mean() == pytest.approx(radius, rel=0.01)
+    assert simulation.pressures.mean() == pytest.approx(2.0 / radius, rel=0.02)
+    assert np.std(distance) < 0.03 * radius  # where they met a dimple stays long
+
+
 def test_drops_beside_each_other_on_a_wall_become_one():
     simulation, volume = two_drops(viscosity=0.2, speed=1.0, contact_angle=np.pi / 3.0)
     surface = go(simulation, 0.3).surface
