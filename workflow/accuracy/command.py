@@ -264,13 +264,13 @@ def unproved(accuracy: Accuracy) -> list[str]:
 
 
 def _unhealthy(accuracy: Accuracy, runner: StudyRunner) -> list[str]:
-    """Say which checks of the recommended run do not hold, for which `run` would call it a failure."""
-    chosen = accuracy.recommended
-    if chosen is None or chosen.found is None or chosen.found.failed:
-        return []
-    point = runner.points[chosen.run.name]
-    missed = failed_checks(runner.stores[0], point, runner.study.until)
-    return [f"Failed checks of the recommended run: {'; '.join(missed)}."] if missed else []
+    """Say which checks of runs do not hold, for which `run` would call them failures."""
+    store, texts = runner.stores[0], []
+    for one in tables.every_run(accuracy):
+        missed = [] if one.failed else failed_checks(store, runner.points[one.run], runner.study.until)
+        if missed:
+            texts.append(f"Failed checks of {one.run}: {'; '.join(missed)}.")
+    return texts
 
 
 def _own_size(request: AccuracyRequest, accuracy: Accuracy) -> list[str]:

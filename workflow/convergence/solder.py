@@ -4,13 +4,17 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import ceil
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from reflowshock.particles.parameters.effects import decide_drop
 from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 from reflowshock.workflow.store.product import read_record
+
+Settings = Mapping[str, str]
 
 SECOND = 2.0  # order in the spacing of a surface that minimises a discrete area
 PER_EDGE = (6, 7, 9, 11, 13, 15, 17, 21, 27, 41)
@@ -28,6 +32,16 @@ MOVING = {  # what Hu et al. print: so viscous that a drop with inertia comes to
     "solder.process_time": "0.1 s",
     "solder.numerics.max_steps": "20000",
 }
+SCHEMES = {
+    "relaxation": {
+        "solder.numerics.scheme": "energy",
+        "solder.effects.inertia": "off",
+        "solder.effects.viscosity": "off",
+    },
+    "tetrahedra": {"solder.numerics.scheme": "energy", "solder.effects.inertia": "on"},
+    "ISPG": {"solder.numerics.scheme": "ispg", "solder.effects.inertia": "on"},
+}
+SCHEME_EDGES = (5, 7, 9)  # particles per edge
 GRIPC = MOVING | {
     "solder.numerics.scheme": "gripc",
     "solder.numerics.time_step_limit": "0.5",
@@ -68,44 +82,66 @@ def _study(
 
 
 def drop_study(case: DropCase) -> ConvergenceStudy:
-    """Particles along the edge of the cube that a drop starts as; half of them left out by symmetry; time steps."""
+    """Particles along the edge of the cube that a drop starts as; half of them left out by symmetry; schemes; steps.
+
+    A drop with inertia costs more: its schemes have a few coarse runs, with the values of the case.
+    """
     drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
-    divisible = drop.symmetry == "none" and not drop.is_free
-    parameters = (_spacing_of_drop(case), _spacing_of_quarter(case)) if divisible else (_spacing_of_drop(case),)
-    base = _per_edge(case, WHERE)
-    steps = [
+    exact = "sphere" if drop.is_free else "Young-Laplace"
+    if decide_drop(case.molten, drop.is_free)["inertia"]["on"]:
+        own = "ISPG" if case.molten.numerics.scheme == "ispg" else "tetrahedra"
+        return _study(exact, errors, (_spacing_of_drop(case, SCHEME_EDGES), *_other_schemes(case, own, {})))
+    parameters, choices = [_spacing_of_drop(case, PER_EDGE)], _steps_of_drop(case)
+    if drop.symmetry == "none" and not drop.is_free:
+        parameters.append(_spacing_of_drop(case, OF_A_QUARTER, "quarter", {"drop.symmetry": "quarter"}))
+    if not drop.is_free:
+        parameters += _other_schemes(case, "relaxation", MOVING)
+        choices += _printed_scheme(case)
+    return _study(exact, errors, tuple(parameters), tuple(choices))
+
+
+def _steps_of_drop(case: DropCase) -> list[StudyRun]:
+    base, own = _per_edge(case, WHERE), case.molten.numerics.time_step_limit
+    return [
         StudyRun(f"steps {limit:g} x", "time step", base | {"solder.numerics.time_step_limit": f"{limit:g}"})
         for limit in TIME_STEPS
-        if limit != case.molten.numerics.time_step_limit
+        if limit != own
     ]
-    coarse = _per_edge(case, PER_EDGE[1])
-    others = [StudyRun(f"inertia, {PER_EDGE[1]} per edge", "effects", coarse | MOVING)]
-    for basis in ("linear", "quadratic"):
-        others.append(StudyRun(f"gripc, {basis}", "scheme", coarse | GRIPC | {"solder.numerics.basis": basis}))
-    exact = "sphere" if drop.is_free else "Young-Laplace"
-    choices = (*steps, *(() if drop.is_free else others))
-    return _study(exact, errors, parameters, choices)
 
 
-def _spacing_of_drop(case: DropCase) -> Parameter:
-    """The spacing over the edge of the cube."""
+def _printed_scheme(case: DropCase) -> list[StudyRun]:
+    base = _per_edge(case, PER_EDGE[1]) | GRIPC
+    return [
+        StudyRun(f"gripc, {basis}", "scheme", base | {"solder.numerics.basis": basis})
+        for basis in ("linear", "quadratic")
+    ]
+
+
+def _other_schemes(case: DropCase, own: str, base: Settings) -> list[Parameter]:
+    """The spacing under each other scheme. What one is not for is refused with the reason when a run's case is read."""
+    return [
+        _spacing_of_drop(case, SCHEME_EDGES, name, {**base, **settings})
+        for name, settings in SCHEMES.items()
+        if name != own
+    ]
+
+
+def _spacing_of_drop(
+    case: DropCase, counts: tuple[int, ...], variant: str = "", settings: Settings = MappingProxyType({})
+) -> Parameter:
+    """The spacing over the edge of the cube, of the case or of a variant of it.
+
+    Particles lie in the planes of a quarter if there is an odd number along an edge.
+    """
+    name, suffix = (f"particle spacing, {variant}", f", {variant}") if variant else ("particle spacing", "")
+    multiple = 2 if variant == "quarter" else 1
 
     def at(value: float) -> StudyRun:
-        count = _count(value, 1)
-        return StudyRun(f"{count} per edge", "particle spacing", _per_edge(case, count), 1.0 / (count - 1))
+        count = _count(value, multiple)
+        every = {**_per_edge(case, count), **settings}
+        return StudyRun(f"{count} per edge{suffix}", name, every, 1.0 / (count - 1))
 
-    return Parameter("particle spacing", tuple(1.0 / (count - 1) for count in PER_EDGE), at, SECOND)
-
-
-def _spacing_of_quarter(case: DropCase) -> Parameter:
-    """The same of a quarter of the drop, in whose planes particles lie if there is an odd number along an edge."""
-
-    def at(value: float) -> StudyRun:
-        count = _count(value, 2)
-        settings = _per_edge(case, count) | {"drop.symmetry": "quarter"}
-        return StudyRun(f"{count} per edge, quarter", "particle spacing of a quarter", settings, 1.0 / (count - 1))
-
-    return Parameter("particle spacing of a quarter", tuple(1.0 / (count - 1) for count in OF_A_QUARTER), at, SECOND)
+    return Parameter(name, tuple(1.0 / (count - 1) for count in counts), at, SECOND)
 
 
 def _count(value: float, multiple: int) -> int:

@@ -1,10 +1,11 @@
-"""Convergence studies of structures and packages: runs that can be run, and answers read from their products."""
+"""Convergence studies of drops, structures and packages: runs that can be run, and answers read from their products."""
 
 import json
 
 import numpy as np
 import pytest
 
+from reflowshock.particles.parameters.effects import decide_drop
 from reflowshock.workflow.accuracy.recommend import Goal, recommend
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
@@ -12,6 +13,7 @@ from reflowshock.workflow.convergence.errors import Error, errors_of
 from reflowshock.workflow.convergence.measured import Measurement, StageCost, fits_of
 from reflowshock.workflow.convergence.packages import SAME_MESH, package_study
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun, at_same_times
+from reflowshock.workflow.convergence.solder import drop_study
 from reflowshock.workflow.convergence.structures import structure_study
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.structure.findings import exact_velocities, wave_points
@@ -30,6 +32,57 @@ def bar():
 @pytest.fixture(scope="module")
 def package():
     return case_of("bga_drop", "scale=quick")
+
+
+def schemes_of(name, *settings):
+    """Parameter of the study of a drop -> runs that can be read, and the reasons why others are refused."""
+    found, refused = {}, []
+    for run in drop_study(case_of(name, *settings)).runs:
+        try:
+            found.setdefault(run.parameter, {})[run.name] = case_of(
+                name, *settings, *(f"{key}={value}" for key, value in run.settings.items())
+            )
+        except CaseError as error:
+            refused.append(f"{run.name}: {error}")
+    return found, refused
+
+
+def test_schemes_of_a_drop_are_compared_at_the_same_spacings():
+    found, refused = schemes_of("sessile_drop", "solder.effects.inertia=on", "solder.parameters=paper")
+    names = ["particle spacing", "particle spacing, relaxation", "particle spacing, ISPG"]
+    assert list(found) == names and not refused
+    for name, inertia, scheme in zip(names, (True, False, True), ("energy", "energy", "ispg"), strict=True):
+        cases = found[name].values()
+        assert [case.drop.particles_per_edge for case in cases] == [5, 7, 9]
+        assert {case.molten.numerics.scheme for case in cases} == {scheme}
+        assert {case.molten.viscosity for case in cases} == {0.227}
+        for case in cases:
+            effects = decide_drop(case.molten, is_free=False)
+            assert effects["inertia"]["on"] == effects["viscosity"]["on"] == inertia
+
+
+def test_a_drop_without_inertia_is_compared_with_schemes_that_have_it():
+    study = drop_study(case_of("sessile_drop"))
+    assert [parameter.name.partition(", ")[2] for parameter in study.parameters] == [
+        "", "quarter", "tetrahedra", "ISPG",
+    ]  # fmt: skip
+    (run,) = (run for run in study.runs if run.name == "7 per edge, ISPG")
+    assert run.settings["solder.parameters"] == "paper"
+
+
+@pytest.mark.parametrize(
+    ("setting", "schemes", "count", "reason"),
+    [
+        ("drop.contact_angle=20 deg", {"ISPG"}, 3, "contact angles outside 30 deg to 148 deg"),
+        ("drop.contact_angle=30 deg", {"ISPG"}, 1, "5 particles along an edge below 60 deg"),
+        ("drop.symmetry=quarter", {"ISPG", "tetrahedra", "gripc", "6"}, 9, "symmetry needs a drop that relaxes"),
+    ],
+)
+def test_schemes_that_a_drop_refuses_are_left_out_with_the_reason(setting, schemes, count, reason):
+    _found, refused = schemes_of("sessile_drop", setting)
+    assert len(refused) == count
+    assert all(any(scheme in one for scheme in schemes) for one in refused)
+    assert any(reason in one for one in refused)
 
 
 def test_histories_of_other_steps_are_compared_at_the_same_times():
