@@ -1,6 +1,6 @@
 """A droplet in space by delta-SPH: free, at rest on a wall, or striking it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import cos, pi, sqrt
 
@@ -16,11 +16,12 @@ from reflowshock.particles.sph.flow import FlowResult, Metrics
 from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
-    "surface_energy", "surface_volume",
+    "surface_energy", "surface_volume", "foot", "parts",
 )  # fmt: skip
 # Share of the radius within which the pressure of a free drop is averaged: the surface is far.
 CORE = 0.5
@@ -152,6 +153,7 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
         _height(scene, surface.points) / scene.diameter, simulation.fastest,
         simulation.kinetic_energy, surface.energy, surface.volume / scene.volume,
+        2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(parts_of(surface.triangles)),
     )  # fmt: skip
 
 
@@ -179,6 +181,16 @@ def base_width(points: Floats, spacing: float) -> float:
     offset = points[:, :2] - points[:, :2].mean(axis=0)
     at_wall = float(np.polynomial.Polynomial.fit(height[read], (offset[read] ** 2).sum(axis=1), 2)(0.0))
     return 2.0 * sqrt(max(at_wall, 0.0))
+
+
+def outcome(history: Mapping[str, Floats]) -> str:
+    """Tell in words what became of a drop that struck a wall, from its history."""
+    wets, in_parts = history["foot"] > 0.0, history["parts"][-1] > 1.0
+    if not wets.any():
+        return "does not touch the wall"
+    if wets[-1]:
+        return "a part rebounds" if in_parts else "stays on the wall"
+    return "rebounds in parts" if in_parts else "rebounds"
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
@@ -214,4 +226,7 @@ def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
         found["weber"], found["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
         found["spread_max"] = (float(history["spread"][widest]), "")
         found["time_of_spread_max"] = (float(history["time"][widest]), "s")
+        wets = np.flatnonzero(history["foot"] > 0.0)
+        if len(wets) and wets[-1] + 1 < len(history["time"]):
+            found["contact_time"] = (float(history["time"][wets[-1] + 1] - history["time"][wets[0]]), "s")
     return found

@@ -14,7 +14,8 @@ Particles that no pressure spreads draw together where it is negative: they are 
 A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
 have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
 Parts that come as near to each other as particles stand, of two drops or of one, become one: the gap between them is
-closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched.
+closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched. A foot on the wall that
+has become thinner than particles fill leaves it where the liquid moves away: a drop that rebounds.
 
 On a solid body (`ground`) the surface stays closed: where it lies on it its tension is -gamma cos(theta) in place of
 gamma, along the ground, which makes the contact angle there as on the wall.
@@ -35,7 +36,7 @@ from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, between, boundary_loops, mirrored
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, between, boundary_loops, mirrored
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
 
@@ -46,6 +47,8 @@ TOUCH = 0.3
 # The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
 # tried where contact lines would meet in a point.
 MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
+# The same: a foot narrower than the first leaves the wall, with all liquid that is thinner than the second.
+FOOT, THIN = 2.0, 3.0
 # Steps after which triangles are evened out.
 CARE = 10
 # Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
@@ -132,7 +135,7 @@ class LiquidSurface:
     @property
     def wetted_area(self) -> float:
         """Area within the contact lines [m^2]."""
-        return sum(_area_within(self.points[ring]) for ring in self.rings)
+        return sum(area_within(self.points[ring]) for ring in self.rings)
 
     @property
     def energy(self) -> float:
@@ -195,9 +198,9 @@ class LiquidSurface:
             SurfaceLost: there are no particles beside a vertex.
         """
         self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
-        weights, (offsets, indices) = np.empty((2, len(self._lists[1]))), self._lists
+        weights, offsets = np.empty((2, len(self._lists[1]))), self._lists[0]
         surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
-        level = np.add.reduceat(weights[0], offsets[:-1]) if len(indices) else np.zeros(1)
+        level = np.add.reduceat(np.append(weights[0], 0.0), offsets[:-1])
         if (np.diff(offsets) == 0).any() or not level.all():
             raise SurfaceLost("the liquid has left its surface")
         self._shares = weights / np.repeat(level, np.diff(offsets))
@@ -274,6 +277,8 @@ class LiquidSurface:
             self._even_out()
             if self._meets():
                 self._make_anew(CLOSED)
+            elif self._leaves(velocity):
+                self._make_anew((-THIN,))
             elif self._is_worn():
                 self._make_anew()
             self.enclose(volume)
@@ -356,6 +361,11 @@ class LiquidSurface:
             normals[ring] /= np.linalg.norm(normals[ring], axis=1)[:, None]
         return narrowest_gap(self.points, normals, MEETING * spacing, spacing) < MEETING * spacing
 
+    def _leaves(self, velocity: Floats) -> bool:
+        """Whether liquid moves away from the wall on a foot that is too thin for its particles."""
+        is_thin = 0.0 < self.wetted_area < 0.25 * np.pi * (FOOT * self.law.spacing) ** 2
+        return is_thin and self.ground is None and bool(velocity[2].mean() > 0.0)
+
     def _make_anew(self, gaps: Sequence[float] = (0.0,)) -> None:
         """Triangulate the same surface anew, without gaps narrower than the first of `gaps` [spacings] that it can."""
         self.rebuilds += 1
@@ -386,9 +396,3 @@ class LiquidSurface:
         normals = gradient / np.maximum(size, 1e-300)[:, None]
         self.points += (volume - enclosed) / size.sum() * normals
         np.maximum(self.points[:, 2], 0.0 if self.law.mirror else -np.inf, out=self.points[:, 2])
-
-
-def _area_within(line: Floats) -> float:
-    """Area within a closed line `(k, 3)` in a plane z = const. [m^2], negative where it runs clockwise."""
-    x, y = line[:, 0], line[:, 1]
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())

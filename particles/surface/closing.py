@@ -33,12 +33,14 @@ def narrowest_gap(points: Floats, normals: Floats, gap: float, aside: float) -> 
 
 
 def closed_level(level: LevelSet, gap: float) -> LevelSet:
-    """Return a level set whose gaps narrower than ``gap`` [m] are filled.
+    """Return a level set whose gaps narrower than ``gap`` [m] are filled; if negative, without what is thinner.
 
-    What is within half of it is added, and what is then within half of it of the outside is taken away again.
+    What is within half of it is added, and what is then within half of it of the outside is taken away again; or first
+    taken away, and then added.
     """
     wider = signed_distance(*extract_surface(LevelSet(level.grid, level.values - 0.5 * gap)), level.grid)
-    return LevelSet(level.grid, np.minimum(level.values, wider.values + 0.5 * gap))
+    least = np.minimum if gap > 0.0 else np.maximum
+    return LevelSet(level.grid, least(level.values, wider.values + 0.5 * gap))
 
 
 def part_of_vertex(triangles: Indices, count: int) -> Indices:

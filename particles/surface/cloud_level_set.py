@@ -137,3 +137,9 @@ def _interior(level: LevelSet, walls: Sequence[Plate]) -> Floats:
         axes[2] = np.linspace(heights[0], heights[1], 1 + round((heights[1] - heights[0]) / spacing))
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return lattice[level.at(lattice) < -DEPTH * spacing]
+
+
+def area_within(line: Floats) -> float:
+    """Area within a closed line `(k, 3)` in a plane z = const. [m^2], negative where it runs clockwise."""
+    x, y = line[:, 0], line[:, 1]
+    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())

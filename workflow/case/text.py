@@ -6,6 +6,7 @@ CHECK_UNITS = {
     r".*peel_stress": "Pa", r".*plastic_work_density": "J/m^3", r"(\w+_)?frequency_\d+_(low|high)": "Hz",
     r"standoff_spread_.*": "m",
 }  # fmt: skip
+MICRO_UNIT = re.compile(r"\bu(?=[msgNJVA]\b)")
 # Below so much another unit reads better.
 LESS = {
     "s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "Pa": ((1e4, 1e-3, "kPa"),), "N": ((1.0, 1e3, "mN"),),
@@ -30,6 +31,11 @@ def readable(unit: str, size: float) -> tuple[float, str]:
     """Return by what values of a size in an SI unit are multiplied, and in which unit they then read well."""
     smaller = ((factor, shown) for least, factor, shown in LESS.get(unit, ()) if 0.0 < size < least)
     return next(smaller, SHOWN.get(unit, (1.0, unit)))
+
+
+def spelled(unit: str) -> str:
+    """Return a unit as a case names it, as it is printed: um as µm."""
+    return MICRO_UNIT.sub("µ", unit)
 
 
 def number(value) -> str:

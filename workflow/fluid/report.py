@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 IN_PLANE, IN_SPACE = (0.0, -1.0, 0.0), (0.3, -1.0, 0.25)  # where the viewer looks from
 NO_FACES = np.zeros((0, 3), dtype=int)
 HEADLINE = (
-    "spread_max", "time_of_spread_max", "mean_pressure", "pressure_error", "roundness", "base_over_diameter",
-    "height_over_diameter", "capillary_number", "outcome", "volume_error", "connected_parts_max", "roughness_sa",
-    "height_max", "voids", "drops",
+    "outcome", "spread_max", "time_of_spread_max", "contact_time", "mean_pressure", "pressure_error", "roundness",
+    "base_over_diameter", "height_over_diameter", "capillary_number", "volume_error",
+    "connected_parts_max", "roughness_sa", "height_max", "voids", "drops",
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
     "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip

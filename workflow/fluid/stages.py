@@ -34,11 +34,20 @@ REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "h
 
 def flow_droplet(run: Run[DropletCase], folder: Path) -> Findings:
     """Let a droplet move."""
-    from reflowshock.particles.scenes.droplet import rest_metrics, solve_droplet
+    from reflowshock.particles.scenes.droplet import outcome, rest_metrics, solve_droplet
+
+    told = {}
+
+    def solve(*arguments: Any) -> Any:
+        result = solve_droplet(*arguments)
+        if run.case.droplet.impact_speed:
+            told["outcome"] = metric(outcome(result.history), "")
+        return result
 
     known = rest_metrics(run.case.droplet)
     limits = DROPLET_LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
-    return _flow(run, folder, solve_droplet, limits)
+    found = _flow(run, folder, solve, limits)
+    return replace(found, metrics=dict(found.metrics) | told)
 
 
 def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:

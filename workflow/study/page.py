@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reflowshock.workflow import __version__
-from reflowshock.workflow.case.text import readable
+from reflowshock.workflow.case.text import readable, spelled
 from reflowshock.workflow.report.drawing import STYLE, pyplot
 from reflowshock.workflow.report.template import write_page
 from reflowshock.workflow.study import tables
@@ -95,9 +95,9 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
 
 
 def axis_title(effect: MainEffect) -> str:
-    """Name a factor in two lines that fit a panel, with its unit."""
+    """Name a factor in two lines that fit a panel, with the unit that the study gives its values in."""
     table, _, name = effect.factor.keys[0].rpartition(".")
-    return f"{table}\n{name} [{effect.unit}]" if effect.unit else f"{table}\n{name}"
+    return f"{table}\n{name} [{spelled(effect.unit)}]" if effect.unit else f"{table}\n{name}"
 
 
 def _means(axis: Axes, effect: MainEffect, factor: float) -> None:

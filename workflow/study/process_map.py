@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from reflowshock.workflow.case.text import spelled
 from reflowshock.workflow.report.colours import CYCLE
 from reflowshock.workflow.report.drawing import STYLE, pyplot
 from reflowshock.workflow.study.results import Row, numbers
@@ -58,4 +59,4 @@ def process_map(study: Study, metric: str, rows: Sequence[Row]) -> Figure | None
 
 def _titled(key: str, unit: str) -> str:
     name = key.rpartition(".")[2].replace("_", " ")
-    return f"{name} [{unit}]".replace("[um]", "[µm]") if unit else name
+    return f"{name} [{spelled(unit)}]" if unit else name

@@ -7,7 +7,7 @@ import pytest
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.scenes.droplet import base_width, droplet, solve_droplet, width
+from reflowshock.particles.scenes.droplet import base_width, droplet, outcome, solve_droplet, width
 from reflowshock.particles.scenes.flow_products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
@@ -174,6 +174,30 @@ def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     assert surface.volume == pytest.approx(volume, rel=0.03)
     simulation.step(simulation.time_step())
     assert simulation.fields.z.min() >= 0.0
+
+
+def test_a_drop_that_does_not_wet_its_wall_rebounds():
+    scene = drop(weber=4.0, reynolds=300.0, contact_angle=np.radians(150.0), gravity=0.0)
+    unit = np.sqrt(scene.density * scene.diameter**3 / scene.surface_tension)
+    result = solve_droplet(scene.model_copy(update={"duration": 1.4 * unit}))
+    assert outcome(result.history) == "rebounds"
+    assert 0.8 * unit < result.metrics["contact_time"][0] < 1.4 * unit
+    up = result.pictures[-1].velocity[:, 2].mean()
+    assert 0.2 * scene.impact_speed < up < scene.impact_speed
+    assert result.pictures[-1].points[:, 2].min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("foot", "parts", "words"),
+    [
+        ((0.0, 0.0), 1, "does not touch the wall"),
+        ((0.0, 0.9), 1, "stays on the wall"),
+        ((0.9, 0.3), 2, "a part rebounds"),
+        ((0.9, 0.0), 3, "rebounds in parts"),
+    ],
+)
+def test_what_became_of_a_drop_is_told_in_words(foot, parts, words):
+    assert outcome({"foot": np.array(foot), "parts": np.array([1.0, parts])}) == words
 
 
 def test_threads_change_no_droplet(every_thread):

@@ -232,9 +232,15 @@ def test_a_metric_in_words_is_a_map_over_two_factors(write, tmp_path):
 
 
 def test_a_metric_in_words_is_a_line_over_one_factor_and_nothing_over_names(write):
+    from reflowshock.workflow.study.page import main_effects
+
     text = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n'
     rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "0.9 mm"), (2, "1 mm"))]
     assert process_map(read_study(write(text)), "outcome", rows).axes[0].get_xlabel() == "pitch [mm]"
+    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "900 um"), (2, "1000 um"))]
+    assert process_map(read_study(write(text)), "outcome", rows).axes[0].get_xlabel() == "pitch [µm]"
+    axis = main_effects(tables.effects(read_study(write(text)), rows)).axes[0]
+    assert axis.get_xlabel() == "package\npitch [µm]"
     rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "fine"), (2, "wide"))]
     assert process_map(read_study(write(text)), "outcome", rows) is None
 
