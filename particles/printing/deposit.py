@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 NODES, MARGIN = 0.75, 4
 
 
-class Body(NamedTuple):
+class CuredBody(NamedTuple):
     """A solid body: surface of points `(m, 3)` [m] and triangles, which ends on the plate; the last of its drops."""
 
     points: Floats
@@ -64,7 +64,7 @@ class Deposit:
     state: Indices = field(default_factory=lambda: np.empty(0, np.int32))
     dose: Floats = field(default_factory=lambda: np.empty(0))
     drop: Indices = field(default_factory=lambda: np.empty(0, np.int32))
-    bodies: list[Body] = field(default_factory=list)
+    bodies: list[CuredBody] = field(default_factory=list)
     ground: LevelSet = field(init=False)
     surface: LiquidSurface = field(init=False)
     simulation: Simulation | None = None
@@ -98,7 +98,7 @@ class Deposit:
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
         for body in saved["bodies"]:
-            self._add_body(Body(**body))
+            self._add_body(CuredBody(**body))
         self.surface.restore(saved["surface"])
         if saved["simulation"]:
             self._begin()
@@ -155,7 +155,7 @@ class Deposit:
             fields, len(liquid), self.law, self.surface, flow.device_of(self.scene), len(held)
         )  # fmt: skip
 
-    def _add_body(self, body: Body) -> None:
+    def _add_body(self, body: CuredBody) -> None:
         """Add a solid body to the ground."""
         self.bodies.append(body)
         join(self.ground, body)
@@ -221,14 +221,14 @@ class Deposit:
         self.state[unsolid[~is_liquid[body]]] = SOLID
         if not is_liquid.all():
             last = int(self.drop[unsolid[~is_liquid[body]]].max(initial=0))
-            self._add_body(Body(*self.surface.take_out(~is_liquid[part]), last))
+            self._add_body(CuredBody(*self.surface.take_out(~is_liquid[part]), last))
         self.simulation = None
         if is_liquid.any():
             self._begin()
         return True
 
 
-def join(ground: LevelSet, body: Body) -> None:
+def join(ground: LevelSet, body: CuredBody) -> None:
     """Add a solid body to a level set, with its image behind the plate."""
     points, triangles = mirrored(body.points, body.triangles)
     grid, spacing = ground.grid, ground.grid.spacing

@@ -41,9 +41,7 @@ def test_a_drop_on_a_wall_becomes_a_cap():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("degrees", "duration"), [(30.0, 300e-6), (60.0, 250e-6), (120.0, 350e-6), (150.0, 300e-6)]
-)
+@pytest.mark.parametrize(("degrees", "duration"), [(30.0, 300e-6), (60.0, 250e-6), (120.0, 350e-6), (150.0, 300e-6)])
 def test_drops_on_walls_that_they_wet_or_not_become_caps(degrees, duration):
     assert_cap(ink(14, duration, contact_angle=np.radians(degrees)), 0.02)
 

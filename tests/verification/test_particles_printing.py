@@ -6,7 +6,7 @@ import pyvista
 
 from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
-from reflowshock.particles.printing.deposit import SOLID, Body, Deposit
+from reflowshock.particles.printing.deposit import SOLID, CuredBody, Deposit
 from reflowshock.particles.sph import flow
 
 LAYERS = 5
@@ -27,7 +27,7 @@ def on_slab(degrees):
     deposit.fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(count), deposit.law)
     deposit.state, deposit.drop = np.full(count, SOLID, np.int32), np.zeros(count, np.int32)
     deposit.dose = np.zeros(count)
-    deposit._add_body(Body(*open_box(half * spacing, top), 0))
+    deposit._add_body(CuredBody(*open_box(half * spacing, top), 0))
     deposit.add_drop((0.0, 0.0))
     return scene, deposit, top
 
