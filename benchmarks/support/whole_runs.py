@@ -8,9 +8,12 @@ from benchmarks.support import turns
 RUNS = Path(__file__).parents[2] / "runs"
 FIGURES = {  # figure -> folder of its run, limit [s], elements of the board that it has at least
     "default case, answer complete [s]": ("jedec_bga", 180.0, 1),
-    "hu_bga_drop, full size, finite + J2, two scales [s]": ("hu_bga_drop", 1800.0, 100_000),
+    "hu_bga_drop, full size, finite + J2, two scales [s]": ("hu_bga_drop-physical", 1800.0, 100_000),
 }
-COMMANDS = {"jedec_bga": "make demo", "hu_bga_drop": "reflowshock run cases/hu_bga_drop/case.toml --set scale=physical"}
+COMMANDS = {
+    "jedec_bga": "make demo",
+    "hu_bga_drop-physical": "reflowshock run cases/hu_bga_drop/case.toml --set scale=physical",
+}
 
 
 def found_in_runs(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
