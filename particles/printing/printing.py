@@ -193,4 +193,4 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
         "particle_steps_per_second": (run.particle_steps / run.seconds, "1/s"),
         "seconds": (run.seconds, "s"),
     }
-    return FlowResult(run.pictures, np.empty((0, 3)), history, metrics), part
+    return FlowResult(run.pictures, np.empty((0, 3)), history, metrics, {"outcome": part.outcome}), part

@@ -1,6 +1,7 @@
 """A droplet in space by delta-SPH: free, at rest on a wall, or striking it."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from math import cos, pi, sqrt
 
@@ -53,7 +54,8 @@ def solve_droplet(
             "films thinner than two spacings are not followed: take more particles per diameter"
         ) from error
     history = run.history(COLUMNS)
-    return flow.result_of(run, history, _metrics(scene, history))
+    words = {"outcome": outcome(history)} if scene.impact_speed else {}
+    return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
 
 
 def droplet(scene: Droplet) -> Simulation:

@@ -147,7 +147,7 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
 
 def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
     """How steps are solved: as asked for, or on tetrahedra where momentum is carried or shared, else towards rest."""
-    if solder.numerics.scheme == "ispg" and effects["inertia"]:
+    if solder.numerics.scheme == "ispg":
         return IspgStep()
     if solder.numerics.scheme == "gripc":
         return GripcStep(solder.numerics.basis)

@@ -46,12 +46,14 @@ class FlowResult:
         walls: `(m, 3)` particles of walls [m].
         history: arrays of equal length, the first is time [s].
         metrics: name to value and unit.
+        words: name to what is told in words.
     """
 
     pictures: list[Picture]
     walls: Floats
     history: dict[str, Floats]
     metrics: Metrics
+    words: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)

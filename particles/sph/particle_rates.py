@@ -26,6 +26,14 @@ def periods_of(law):
 
 
 @compiled
+def constants_of(law):
+    """Return what all pairs have: a line, 1 / h, of the kernel's gradient, of viscosity, W at a spacing over sigma."""
+    line, inverse = law.dimension == 1, 1.0 / law.length
+    scale, softening = law.norm * inverse * inverse, pair_terms.SOFTENING * law.length * law.length
+    return line, inverse, scale, softening, shape(law.kernel, line, law.spacing * inverse)
+
+
+@compiled
 def across(distance, period):
     """Return a component of a vector between particles [m] to the nearest image."""
     return distance - period[0] * floor(distance * period[1] + 0.5)
@@ -114,12 +122,7 @@ def _by_liquid(i, neighbours, fields, law):
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     density, pressure = fields.density[i], fields.pressure[i]
     gx, gy, gz = fields.slope_x[i], fields.slope_y[i], fields.slope_z[i]
-    periods = periods_of(law)
-    line = law.dimension == 1
-    inverse = 1.0 / law.length
-    scale = law.norm * inverse * inverse
-    softening = pair_terms.SOFTENING * law.length * law.length
-    level = shape(law.kernel, line, law.spacing * inverse)
+    periods, (line, inverse, scale, softening, level) = periods_of(law), constants_of(law)
     diffusion, artificial, viscosity = positive(law.diffusion), positive(law.artificial), own_viscosity(i, fields, law)
     along = 2.0 * (law.dimension + 2) / density if law.has_surface else 0.0  # over the viscosity of a pair
     aside = 0.0 if law.has_surface else 2.0 / density
@@ -168,12 +171,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
     """Sums over particles of walls, and their images: rate of density, acceleration, concentration of particles."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     density, pressure = fields.density[i], fields.pressure[i]
-    periods = periods_of(law)
-    line = law.dimension == 1
-    inverse = 1.0 / law.length
-    scale = law.norm * inverse * inverse
-    softening = pair_terms.SOFTENING * law.length * law.length
-    level = shape(law.kernel, line, law.spacing * inverse)
+    periods, (line, inverse, scale, softening, level) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
     viscosity = own_viscosity(i, fields, law) / density if law.no_slip else 0.0
     along = 2.0 * (law.dimension + 2) * viscosity if law.has_surface else 0.0

@@ -34,20 +34,11 @@ REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "h
 
 def flow_droplet(run: Run[DropletCase], folder: Path) -> Findings:
     """Let a droplet move."""
-    from reflowshock.particles.scenes.droplet import outcome, rest_metrics, solve_droplet
-
-    told = {}
-
-    def solve(*arguments: Any) -> Any:
-        result = solve_droplet(*arguments)
-        if run.case.droplet.impact_speed:
-            told["outcome"] = metric(outcome(result.history), "")
-        return result
+    from reflowshock.particles.scenes.droplet import rest_metrics, solve_droplet
 
     known = rest_metrics(run.case.droplet)
     limits = DROPLET_LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
-    found = _flow(run, folder, solve, limits)
-    return replace(found, metrics=dict(found.metrics) | told)
+    return _flow(run, folder, solve_droplet, limits)
 
 
 def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:
@@ -56,17 +47,13 @@ def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:
     from reflowshock.particles.printing.printing import solve_printing
     from reflowshock.workflow.fluid.printed_part import draw_heights
 
-    told = {}
-
     def solve(*arguments: Any) -> Any:
         result, part = solve_printing(*arguments)
-        told["outcome"] = metric(part.outcome, "")
         write_part(folder, part)
         draw_heights(folder / "height_map.png", part.x, part.y, part.heights)
         return result
 
-    found = _flow(run, folder, solve, PART_LIMITS)
-    return replace(found, metrics=dict(found.metrics) | told)
+    return _flow(run, folder, solve, PART_LIMITS)
 
 
 def flow_dam_break(run: Run[DamBreakCase], folder: Path) -> Findings:
@@ -101,6 +88,7 @@ def _flow(run: Run[Any], folder: Path, solve: Callable, limits: Mapping[str, flo
         result = solve(case.scene, progress, checkpoint)
     write_flow(folder, result)
     known = {name: metric(value, unit) for name, (value, unit) in result.metrics.items() if value == value}
+    known |= {name: metric(word, "") for name, word in result.words.items()}
     health = {name: at_most(abs(result.metrics[name][0]), limit) for name, limit in limits.items()}
     found = Findings(known, health, dict(decide_flow(case.scene)))
     return replace(found, continued="the flow" if checkpoint.continued else "")

@@ -9,9 +9,9 @@ from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.materials.roles import Materials
+from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
@@ -34,7 +34,7 @@ def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:
 
 def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> tuple[Body, float]:
     """Return a body of all parts, and its smallest element critical step [s]; ``materials`` go before ``board``."""
-    pieces, tables = dns_pieces(mesh, materials or Materials(board=board, solder=SAC405.elastic))
+    pieces, tables = dns_pieces(mesh, materials or ELASTIC.model_copy(update={"board": board}))
     return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
 
 
