@@ -25,6 +25,8 @@ from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
+from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, with_step
+from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_momenta, rigid_motions
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
@@ -39,80 +41,6 @@ SUPPORT = 1.5
 SMOOTHING = 10.0
 # Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
 EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
-# Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
-ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class LostEnergy:
-    """Energies that a flow has lost [J].
-
-    Attributes:
-        viscous: to viscosity, in the liquid and on its walls.
-        smoothing: to the smoothing of velocities.
-        integration: to the time integration: of the momentum, and of the way that the forces act along.
-        transfer: to the shift of particles, which take the velocity where they come, and to new masses.
-        evening: to what keeps triangles well shaped, at the volume.
-    """
-
-    viscous: float = 0.0
-    smoothing: float = 0.0
-    integration: float = 0.0
-    transfer: float = 0.0
-    evening: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
-
-
-@dataclass(frozen=True, slots=True)
-class GalerkinPast:
-    """What the last step left.
-
-    Attributes:
-        points: `(n, 3)` where it took the particles [m].
-        velocity: `(n, 3)` of the particles [m/s].
-        gradient: `(n, 3, 3)` of the velocity [1/s].
-        kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
-        pressure: `(n,)` coefficients [Pa].
-        volumes: `(n,)` of the particles in it [m^3].
-        evening: passes that even out the triangles after the next step.
-        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
-        momenta_change: of these in it, `(6,)`.
-        history: its displacement and change of the velocity.
-        losses: of all steps.
-    """
-
-    points: Floats
-    velocity: Floats
-    gradient: Floats
-    kinetic: float | None
-    potential: float
-    pressure: Floats
-    volumes: Floats
-    evening: float
-    momenta: Floats
-    momenta_change: Floats
-    history: BackwardDifference
-    losses: LostEnergy
-
-    @classmethod
-    def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
-        """A body that starts with its velocity, and an energy of the forces [J]."""
-        slope, start = np.zeros((len(body.points), 3, 3)), BackwardDifference.start(len(body.points))
-        losses = losses or LostEnergy()
-        still, unknown = np.zeros(6), np.zeros(len(body.points))
-        at_rest = (body.pressure, unknown, 1.0, still, still)
-        return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
-
-    def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
-        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        velocity = physics.admit(body, self.velocity + change)
-        history = self.history.stopped(physics.pinned(body))
-        return replace(self, points=body.points, velocity=velocity, history=history)
 
 
 @dataclass(slots=True)
@@ -238,7 +166,7 @@ class PreparedIspgStep:
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         losses = self._carried_losses(equations, past.velocity)
-        losses = _step_losses(losses, equations, base, (past.velocity, start, velocity), time_step)
+        losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
         pull = force - base.time_step * equations.tension(start)
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
@@ -314,7 +242,7 @@ class PreparedIspgStep:
             basis=basis,
             spacing=spacing,
             stiffness=sum((part.stiffness(body) for part in tensions), nothing),
-            rigid=_orthonormal(rigid, density * space.volumes),
+            rigid=orthonormal(rigid, density * space.volumes),
             drag=friction * wall_shares(body, space.volumes),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
@@ -329,31 +257,6 @@ class PreparedIspgStep:
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
 
 
-def _step_losses(
-    losses: LostEnergy,
-    equations: GalerkinEquations,
-    base: Base,
-    velocities: tuple[Floats, Floats, Floats],
-    time_step: float,
-) -> LostEnergy:
-    """Losses with those of a step [s], but for the way that the forces act along.
-
-    The velocities `(n, 3)` are the last, predicted and new ones [m/s].
-
-    Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
-    """
-    last, start, now = velocities
-    power = equations.losses(start, now)
-    change = time_step / base.time_step * float((now * equations.momentum(now - base.velocity)).sum())
-    gain = equations.kinetic(now) - equations.kinetic(last)
-    return replace(
-        losses,
-        viscous=losses.viscous + time_step * power.viscous,
-        smoothing=losses.smoothing + time_step * power.smoothing,
-        integration=losses.integration + change - gain,
-    )
-
-
 def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
     """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
 
@@ -366,33 +269,6 @@ def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
         EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
         + EVENING_RATE * time_step * fluid.smoothing / SMOOTHING,
     )
-
-
-def admitted_motions(body: Body, physics: Physics) -> NDArray[np.bool_]:
-    """Which rigid motions walls admit, `(6,)`."""
-    motions = rigid_motions(body.points)
-    changes = [np.abs(physics.admit(body, motion) - motion).max() for motion in motions]
-    return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
-
-
-def rigid_motions(points: Floats) -> Floats:
-    """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
-    motions = np.zeros((6, *points.shape))
-    for axis in range(3):
-        motions[axis, :, axis] = 1.0
-        motions[3 + axis, :, axis - 2], motions[3 + axis, :, axis - 1] = -points[:, axis - 1], points[:, axis - 2]
-    return motions
-
-
-def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
-    """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
-    return np.tensordot(motions, masses[:, None] * velocity, axes=2)
-
-
-def _orthonormal(motions: Floats, masses: Floats) -> Floats:
-    """A basis `(k, 3 n)` of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
-    flat = motions.reshape(len(motions), 3 * len(masses))
-    return np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
 
 
 def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:

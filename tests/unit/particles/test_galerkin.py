@@ -12,10 +12,11 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.gripc_step import force_pressure
-from reflowshock.particles.ispg.ispg_step import IspgStep, rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motions
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics

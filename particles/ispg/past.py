@@ -1,0 +1,108 @@
+"""What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+
+
+@dataclass(frozen=True, slots=True)
+class LostEnergy:
+    """Energies that a flow has lost [J].
+
+    Attributes:
+        viscous: to viscosity, in the liquid and on its walls.
+        smoothing: to the smoothing of velocities.
+        integration: to the time integration: of the momentum, and of the way that the forces act along.
+        transfer: to the shift of particles, which take the velocity where they come, and to new masses.
+        evening: to what keeps triangles well shaped, at the volume.
+    """
+
+    viscous: float = 0.0
+    smoothing: float = 0.0
+    integration: float = 0.0
+    transfer: float = 0.0
+    evening: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """All of them."""
+        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
+
+
+@dataclass(frozen=True, slots=True)
+class GalerkinPast:
+    """What the last step left.
+
+    Attributes:
+        points: `(n, 3)` where it took the particles [m].
+        velocity: `(n, 3)` of the particles [m/s].
+        gradient: `(n, 3, 3)` of the velocity [1/s].
+        kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
+        pressure: `(n,)` coefficients [Pa].
+        volumes: `(n,)` of the particles in it [m^3].
+        evening: passes that even out the triangles after the next step.
+        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
+        momenta_change: of these in it, `(6,)`.
+        history: its displacement and change of the velocity.
+        losses: of all steps.
+    """
+
+    points: Floats
+    velocity: Floats
+    gradient: Floats
+    kinetic: float | None
+    potential: float
+    pressure: Floats
+    volumes: Floats
+    evening: float
+    momenta: Floats
+    momenta_change: Floats
+    history: BackwardDifference
+    losses: LostEnergy
+
+    @classmethod
+    def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
+        """A body that starts with its velocity, and an energy of the forces [J]."""
+        slope, start = np.zeros((len(body.points), 3, 3)), BackwardDifference.start(len(body.points))
+        losses = losses or LostEnergy()
+        still, unknown = np.zeros(6), np.zeros(len(body.points))
+        at_rest = (body.pressure, unknown, 1.0, still, still)
+        return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
+
+    def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
+        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
+        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
+        velocity = physics.admit(body, self.velocity + change)
+        history = self.history.stopped(physics.pinned(body))
+        return replace(self, points=body.points, velocity=velocity, history=history)
+
+
+def with_step(
+    losses: LostEnergy,
+    equations: GalerkinEquations,
+    base: Base,
+    velocities: tuple[Floats, Floats, Floats],
+    time_step: float,
+) -> LostEnergy:
+    """Losses with those of a step [s], but for the way that the forces act along.
+
+    The velocities `(n, 3)` are the last, predicted and new ones [m/s].
+
+    Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
+    """
+    last, start, now = velocities
+    power = equations.losses(start, now)
+    change = time_step / base.time_step * float((now * equations.momentum(now - base.velocity)).sum())
+    gain = equations.kinetic(now) - equations.kinetic(last)
+    return replace(
+        losses,
+        viscous=losses.viscous + time_step * power.viscous,
+        smoothing=losses.smoothing + time_step * power.smoothing,
+        integration=losses.integration + change - gain,
+    )
