@@ -69,6 +69,16 @@ class Galerkin:
         shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
         return cls(nodal_volumes(body, density), starts, columns, weights, shape, ghosts)
 
+    @property
+    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:
+        """Starts, columns and weights of the shape functions, for kernels."""
+        return self.starts, self.columns, self.weights
+
+    @property
+    def images(self) -> tuple[NDArray[np.int64], Floats]:
+        """Sources and reflections of the images, for kernels."""
+        return self.ghosts.source, self.ghosts.reflection
+
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
         return self.shape @ coefficients[np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))]

@@ -8,6 +8,7 @@ number of threads.
 import numpy as np
 from numba import njit, prange
 
+from reflowshock.particles.core.surface_measure import laplacian_product
 from reflowshock.particles.ispg.mls_weights import factor_spd, substitute
 
 # Support radius in spacings; but the 16th neighbour lies within 1 / 1.2 of it: four must not lie in a plane.
@@ -266,3 +267,175 @@ def folded(forces, source, reflection):
             for c in range(3):
                 result[source[g], d] += reflection[g, c, d] * forces[count + g, c]
     return result
+
+
+@njit(cache=True)
+def projected(frames, field):
+    """Vectors `(n, 3)` times a matrix of each particle `(n, 3, 3)`."""
+    result = np.empty_like(field)
+    for i in range(field.shape[0]):
+        x, y, z = field[i, 0], field[i, 1], field[i, 2]
+        for c in range(3):
+            result[i, c] = frames[i, c, 0] * x + frames[i, c, 1] * y + frames[i, c, 2] * z
+    return result
+
+
+@njit(cache=True)
+def rates_of_volume(rows, images, parts, field):
+    """Rates of volume `(n,)` [m^3/s] of velocities `(n, 3)`, those of `parts`: volumes `(n,)`, unbalanced `(n, 3)`."""
+    volumes, unbalanced = parts
+    missed, total = 0.0, 0.0
+    for i in range(volumes.shape[0]):
+        total += volumes[i]
+        for c in range(3):
+            missed += unbalanced[i, c] * field[i, c]
+    return volumes * (divergence(*rows, reflected(field, *images)) + missed / total)
+
+
+@njit(cache=True)
+def pressure_forces(rows, images, parts, pressure):
+    """The transposed: forces `(n, 3)` [N] of pressures `(n,)`."""
+    volumes, unbalanced = parts
+    forces = np.zeros((volumes.shape[0] + images[0].shape[0], 3))
+    divergence_transposed(*rows, volumes * pressure, forces)
+    return folded(forces, *images) + (volumes * pressure).sum() / volumes.sum() * unbalanced
+
+
+@njit(cache=True)
+def pressure_operator(rows, images, parts, mobility, pressure):
+    """Rates of volume `(n,)` that pressures `(n,)` make with a mobility of each particle `(n, 3, 3)`."""
+    return rates_of_volume(rows, images, parts, projected(mobility, pressure_forces(rows, images, parts, pressure)))
+
+
+@njit(cache=True)
+def pull_back(surface, rigid, masses, field):
+    """Force `(n, 3)` that a surface `(triangles, weights)` resists velocities with, but for rigid motions `(k, n, 3)`.
+
+    These, orthonormal by the masses `(n,)`, meet none, and the force moves nothing along them.
+    """
+    moving = field.copy()
+    for motion in rigid:
+        share = 0.0
+        for i in range(masses.shape[0]):
+            for c in range(3):
+                share += motion[i, c] * masses[i] * field[i, c]
+        moving -= share * motion
+    force = laplacian_product(*surface, moving)
+    result = force.copy()
+    for motion in rigid:
+        share = (motion * force).sum()
+        for i in range(masses.shape[0]):
+            for c in range(3):
+                result[i, c] -= share * masses[i] * motion[i, c]
+    return result
+
+
+@njit(cache=True)
+def momentum_operator(rows, images, inertia, factors, implicit, admitted, field):
+    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia, resistance and implicit surface tension.
+
+    Args:
+        rows, images: of the shape functions.
+        inertia: `(n,)` masses over the time step [kg/s].
+        factors: as `resistance`.
+        implicit: surface, rigid motions and masses, as `pull_back`, and the time step [s].
+        admitted: `(n, 3, 3)` projections of the particles.
+        field: velocities that walls admit.
+    """
+    surface, rigid, masses, time_step = implicit
+    force = folded(resistance(*rows, reflected(field, *images), factors), *images)
+    pull = pull_back(surface, rigid, masses, field)
+    for i in range(field.shape[0]):
+        for c in range(3):
+            force[i, c] += inertia[i] * field[i, c] + time_step * pull[i, c]
+    return projected(admitted, force)
+
+
+@njit(cache=True)
+def momentum_diagonal(rows, source, inertia, factors, surface, time_step):
+    """About the diagonal of `momentum_operator`, `(n,)`, the same for all directions: each image by itself."""
+    starts, columns, weights = rows
+    count = starts.shape[0] - 1
+    result = inertia.copy()
+    for i in range(count):
+        rough, drag, viscous = factors[i, 0], factors[i, 1], factors[i, 2]
+        for k in range(starts[i], starts[i + 1]):
+            j, w = columns[k], weights[k]
+            own = rough * (w[0] - (j == i)) ** 2 + drag * w[0] ** 2
+            own += 4.0 / 3.0 * viscous * (w[1] ** 2 + w[2] ** 2 + w[3] ** 2)
+            result[j if j < count else source[j - count]] += own
+    triangles, pulls = surface
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            result[triangles[t, (k + 1) % 3]] += time_step * max(pulls[t, k], 0.0)
+            result[triangles[t, (k + 2) % 3]] += time_step * max(pulls[t, k], 0.0)
+    return result
+
+
+@njit(cache=True)
+def _by_particle(particle, rows, pieces):
+    """Entries of a sparse matrix sorted by the particle of their column: firsts `(n + 1,)`, rows and entries."""
+    firsts = np.zeros(rows.shape[0] + 1, np.int64)
+    for j in particle:
+        firsts[j + 1] += 1
+    firsts = np.cumsum(firsts)
+    fill, row, entries = firsts.copy(), np.empty(particle.shape[0], np.int32), np.empty_like(pieces)
+    for i in range(rows.shape[0] - 1):
+        for k in range(rows[i], rows[i + 1]):
+            at = fill[particle[k]]
+            fill[particle[k]] += 1
+            row[at] = i
+            entries[at] = pieces[k]
+    return firsts, row, entries
+
+
+@njit(cache=True, parallel=True)
+def pressure_matrix(rows, images, volumes, roots):
+    """Lower triangle of the matrix of `pressure_operator` in single precision `(n, n)`, but for what is unbalanced.
+
+    Args:
+        rows, images: of the shape functions.
+        volumes: `(n,)`.
+        roots: `(n, 3, 3)` of the mobilities.
+
+    Returns:
+        S A S, whose diagonal is about one, and S `(n,)`.
+    """
+    (starts, columns, weights), (source, reflection) = rows, images
+    count = starts.shape[0] - 1
+    particle, pieces = np.empty(columns.shape[0], np.int32), np.empty((columns.shape[0], 3), np.float32)
+    scale, matrix = np.empty(count), np.empty((count, count), np.float32)
+    for i in prange(count):
+        total = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j, x, y, z = columns[k], weights[k, 1], weights[k, 2], weights[k, 3]
+            if j >= count:
+                r = reflection[j - count]
+                j = source[j - count]
+                x, y, z = (
+                    r[0, 0] * x + r[1, 0] * y + r[2, 0] * z,
+                    r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
+                    r[0, 2] * x + r[1, 2] * y + r[2, 2] * z,
+                )
+            particle[k] = j
+            for c in range(3):
+                piece = roots[j, c, 0] * x + roots[j, c, 1] * y + roots[j, c, 2] * z
+                total += piece * piece
+                pieces[k, c] = piece
+        root = np.sqrt(total)
+        for k in range(starts[i], starts[i + 1]):
+            for c in range(3):
+                pieces[k, c] /= root
+        scale[i] = 1.0 / (volumes[i] * root)
+    firsts, row, entries = _by_particle(particle, starts, pieces)
+    for i in prange(count):
+        line = matrix[i]
+        line[: i + 1] = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j = particle[k]
+            x, y, z = pieces[k, 0], pieces[k, 1], pieces[k, 2]
+            for a in range(firsts[j], firsts[j + 1]):
+                if row[a] > i:
+                    break
+                line[row[a]] += x * entries[a, 0] + y * entries[a, 1] + z * entries[a, 2]
+    return matrix, scale

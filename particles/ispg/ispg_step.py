@@ -21,6 +21,7 @@ from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
+from reflowshock.particles.core.surface_measure import cotangents
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
@@ -31,7 +32,6 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
-from reflowshock.particles.steps.step_equations import Admissible
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
@@ -233,15 +233,13 @@ class PreparedIspgStep:
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
         coefficient = sum(part.coefficient for part in tensions)
         fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
-        basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
-        nothing = sparse.csr_matrix((len(body.points),) * 2)
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
             fluid=fluid,
-            basis=basis,
+            admitted=self.physics.projections(body),
+            surface=(body.triangles, 0.5 * coefficient * cotangents(body.points, body.triangles)),
             spacing=spacing,
-            stiffness=sum((part.stiffness(body) for part in tensions), nothing),
             rigid=orthonormal(rigid, density * space.volumes),
             drag=friction * wall_shares(body, space.volumes),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
@@ -269,8 +267,3 @@ def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
         EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
         + EVENING_RATE * time_step * fluid.smoothing / SMOOTHING,
     )
-
-
-def _by_particle(basis: sparse.csr_matrix) -> sparse.csr_matrix:
-    """A basis whose rows are ordered by component, with its rows ordered by particle."""
-    return basis[np.arange(basis.shape[0]).reshape(3, -1).T.ravel()]

@@ -33,6 +33,7 @@ def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
 
 
 def orthonormal(motions: Floats, masses: Floats) -> Floats:
-    """A basis `(k, 3 n)` of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
+    """A basis of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
     flat = motions.reshape(len(motions), 3 * len(masses))
-    return np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
+    basis = np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
+    return basis.reshape(motions.shape)

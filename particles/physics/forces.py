@@ -13,7 +13,13 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import area_vector, cotangent_laplacian, surface_area, wall_corners
+from reflowshock.particles.core.surface_measure import (
+    area_gradient,
+    area_vector,
+    cotangent_laplacian,
+    surface_area,
+    wall_corners,
+)
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.parameters.solder import Solder
@@ -41,17 +47,14 @@ class SurfaceTension:
         """Surface energy [J]."""
         return self.coefficient * surface_area(body.points, body.triangles)
 
-    def stiffness(self, body: Body) -> sparse.csr_matrix:
-        """Stiffness gamma K of the surface, `(n, n)` [N/m]."""
-        return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
-
     def force(self, body: Body) -> Floats:
         """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
-        return -(self.stiffness(body) @ body.points)
+        return -self.coefficient * area_gradient(body.points, body.triangles)
 
     def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
         """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
-        return sparse.kron(sparse.identity(3), time_step * self.stiffness(body), format="csr")
+        stiffness = self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
+        return sparse.kron(sparse.identity(3), time_step * stiffness, format="csr")
 
 
 @dataclass(frozen=True, slots=True)
