@@ -13,15 +13,15 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.neighbours import find_beside, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.collocation import Ghosts, mirror
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
 
-# Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
-REACHES = (2.6, 3.4, 4.4)
+# Reach of the search for neighbours in spacings, and that of particles with too few of them.
+REACH, WIDEST = 2.6, 4.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,14 @@ class Galerkin:
         count, spacing = len(body.points), body.cloud.spacing
         planes = [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in body.cloud.symmetry]
         slips = [slip_length] * len(body.plates) + [np.inf] * len(planes)
-        for reach in REACHES:
-            ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing, slips)
-            points = np.concatenate((body.points, ghosts.points))
-            lists = find_neighbours(points, reach * spacing, rows=count)
-            squares, lengths = kernels.supports(count, points, (*lists, reach * spacing), spacing)
-            if (squares > 0.0).all():
-                break
+        ghosts = mirror(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
+        points = np.concatenate((body.points, ghosts.points))
+        lists = find_neighbours(points, REACH * spacing, rows=count)
+        squares, lengths = kernels.supports(count, points, (*lists, REACH * spacing), spacing)
+        lacking = np.flatnonzero(squares == 0.0)
+        if len(lacking):
+            lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
+            squares, lengths = kernels.supports(count, points, (*lists, WIDEST * spacing), spacing)
         _check(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)

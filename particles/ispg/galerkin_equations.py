@@ -113,7 +113,7 @@ class GalerkinEquations:
         load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia, factors = self.masses / self.time_step, self.factors
-        inverse = 1.0 / self._momentum_diagonal(inertia, factors)[:, None]
+        inverse = 1.0 / inertia[:, None]
         implicit = (self.surface, self.rigid, self.masses, self.time_step)
         parts = (self.space.rows, self.space.images, inertia, factors, implicit, self.admitted)
         solution, _ = conjugate_gradients(
@@ -124,13 +124,6 @@ class GalerkinEquations:
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
         return solution
-
-    def _momentum_diagonal(self, inertia: Floats, factors: Floats) -> Floats:
-        """About the diagonal of the prediction's matrix `(n,)` [kg/s]."""
-        space = self.space
-        return kernels.momentum_diagonal(
-            space.rows, space.ghosts.source, inertia, factors, self.surface, self.time_step
-        )
 
     def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
         """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].

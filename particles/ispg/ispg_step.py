@@ -84,15 +84,16 @@ class IspgStep:
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
         """Carry the velocity to where the particles are now; without inertia it is zero."""
+        energy, projections = physics.energy(body), physics.projections(body)
         if self.past is None:
-            self.first_energy = physics.energy(body)
-            self.past = GalerkinPast.start(body, self.first_energy)
+            self.first_energy, self.past = energy, GalerkinPast.start(body, energy)
         elif not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
-            self.past = GalerkinPast.start(body, physics.energy(body), self.past.losses)
+            self.past = GalerkinPast.start(body, energy, self.past.losses)
         else:
-            self.past = self.past.carried_on(body, physics)
-        return PreparedIspgStep(self, body, physics, self.past, admitted_motions(body, physics))
+            self.past = self.past.carried_on(body, physics, projections)
+        kept = admitted_motions(body.points, projections)
+        return PreparedIspgStep(self, body, physics, self.past, energy, projections, kept)
 
     @property
     def mass(self) -> sparse.csr_matrix:
@@ -130,6 +131,8 @@ class PreparedIspgStep:
         body: the liquid body.
         physics: what acts on it.
         past: of the particles where they are now.
+        energy: of the forces there [J].
+        projections: `(n, 3, 3)` of velocities onto those that walls admit.
         admitted: `(6,)` which rigid motions walls admit.
     """
 
@@ -137,6 +140,8 @@ class PreparedIspgStep:
     body: Body
     physics: Physics
     past: GalerkinPast
+    energy: float
+    projections: Floats
     admitted: NDArray[np.bool_]
 
     def solve(self, time_step: float, volume: float) -> Motion:
@@ -184,7 +189,7 @@ class PreparedIspgStep:
             momenta=momenta,
             momenta_change=gain,
             history=history,
-            losses=replace(losses, integration=losses.integration + self.physics.energy(body) - potential - work),
+            losses=replace(losses, integration=losses.integration + self.energy - potential - work),
         )
         return Motion(
             velocity=velocity,
@@ -202,16 +207,17 @@ class PreparedIspgStep:
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
         drop would be left turning.
         """
-        past, kept = self.past, self.admitted
+        past, kept, masses, basis = self.past, self.admitted, equations.masses, equations.rigid
         motions = motions[kept]
+        # Momenta along the motions of the basis, by columns.
+        moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T
 
         def corrected(velocity: Floats, momenta: Floats) -> Floats:
-            if not kept.any():
-                return velocity
-            missing = momenta[kept] - rigid_momenta(motions, equations.masses, velocity)
-            inertia = np.array([rigid_momenta(motions, equations.masses, motion) for motion in motions])
-            return velocity + np.tensordot(np.linalg.solve(inertia, missing), motions, axes=1)
+            missing = momenta[kept] - rigid_momenta(motions, masses, velocity)
+            return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
 
+        if not kept.any():
+            return past, base
         start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
         return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
 
@@ -237,11 +243,11 @@ class PreparedIspgStep:
         return GalerkinEquations(
             space=space,
             fluid=fluid,
-            admitted=self.physics.projections(body),
+            admitted=self.projections,
             surface=(body.triangles, 0.5 * coefficient * cotangents(body.points, body.triangles)),
             spacing=spacing,
             rigid=orthonormal(rigid, density * space.volumes),
-            drag=friction * wall_shares(body, space.volumes),
+            drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
         )
@@ -250,7 +256,7 @@ class PreparedIspgStep:
         """Losses up to this step, which starts with new masses and a velocity `(n, 3)` [m/s]."""
         past, kinetic = self.past, equations.kinetic(velocity)
         transfer = 0.0 if past.kinetic is None else past.kinetic - kinetic
-        evening = past.potential - self.physics.energy(self.body)
+        evening = past.potential - self.energy
         losses = past.losses
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
 

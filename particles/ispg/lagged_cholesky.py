@@ -48,12 +48,12 @@ def conjugate_gradients(
     Raises:
         SolveFailed: the true residual stays above the limit.
     """
-    norm = float(np.linalg.norm(right))
+    norm = _length(right)
     enough = max(tolerance.relative * norm, tolerance.absolute)
     solution = start.copy()
     residual = right - operator(solution) if start.any() else right.copy()
     direction, product, iterations = np.zeros_like(right), 1.0, 0
-    while np.linalg.norm(residual) > enough and iterations < MAX_ITERATIONS:
+    while _length(residual) > enough and iterations < MAX_ITERATIONS:
         scaled = precondition(residual)
         before, product = product, float(np.vdot(residual, scaled))
         direction = scaled + (product / before if iterations else 0.0) * direction
@@ -62,10 +62,14 @@ def conjugate_gradients(
         solution += length * direction
         residual -= length * image
         iterations += 1
-    left = float(np.linalg.norm(right - operator(solution))) if iterations else 0.0
+    left = _length(right - operator(solution)) if iterations else 0.0
     if not left <= max(RESIDUAL_LIMIT * norm, 2.0 * enough):
         raise SolveFailed(f"conjugate gradients: relative residual {left / norm:.2e} after {iterations} iterations")
     return solution, iterations
+
+
+def _length(values: Floats) -> float:
+    return float(np.sqrt(np.vdot(values, values)))
 
 
 @dataclass(slots=True)
@@ -76,7 +80,7 @@ class LaggedCholesky:
     precision is enough to precondition with, and half the memory twice as fast.
 
     Attributes:
-        root: R of R^T R = S A S, `(n, n)`, by columns; what is below its diagonal has no meaning.
+        root: R of R^T R = S A S, `(n, n)`, upper triangle.
         scale: S, `(n,)`.
         iterations: of the last solve.
     """

@@ -6,6 +6,7 @@ import numpy as np
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.galerkin_kernels import projected
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
@@ -75,10 +76,10 @@ class GalerkinPast:
         at_rest = (body.pressure, unknown, 1.0, still, still)
         return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
 
-    def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
-        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        velocity = physics.admit(body, self.velocity + change)
+    def carried_on(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
+        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` admit it."""
+        change = projected(self.gradient, body.points - self.points)
+        velocity = projected(projections, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))
         return replace(self, points=body.points, velocity=velocity, history=history)
 

@@ -166,8 +166,11 @@ class Wetting:
 
     def update(self, body: Body) -> None:
         """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
+        lines = [line for line in self.lines if line.has_events]
+        if not lines:
+            return
         load = self._load(body)
-        for line in self.lines:
+        for line in lines:
             line.update(body, load, self.coefficient)
 
     def attempt(self, body: Body) -> bool:
@@ -175,8 +178,11 @@ class Wetting:
 
         Alone this dents the surface: it pays where the step that follows gains more than it takes.
         """
+        lines = [line for line in self.lines if line.has_edge]
+        if not lines:
+            return False
         load, found = self._load(body), False
-        for line in self.lines:
+        for line in lines:
             near = line.near_edges(body, load, self.coefficient)
             if near.any():
                 line.catch(body, near)
