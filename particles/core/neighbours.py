@@ -55,10 +55,11 @@ def _cell_of(place, origin, size, shape):
 
 @njit(cache=True)
 def _columns(place, grid):
-    """Cells around a place: first and last along x, along y and, these excluded, along z."""
+    """Cells around a place: first and last along x, y and z, the last one excluded."""
     _, _, _, origin, size, shape = grid
     x, y, z = _cell_of(place, origin, size, shape)
-    along_x, along_y = (max(x - REACH, 0), min(x + REACH + 1, shape[0])), (max(y - REACH, 0), min(y + REACH + 1, shape[1]))
+    along_x = max(x - REACH, 0), min(x + REACH + 1, shape[0])
+    along_y = max(y - REACH, 0), min(y + REACH + 1, shape[1])
     return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
 
 
@@ -98,9 +99,13 @@ def _visit(place, left_out, radius, grid, found):
 
 
 @njit(cache=True, parallel=True)
-def _rows(rows, places, radius, grid, own, movers):
-    """Compressed rows of some places, first and last. ``own``: whether a point is listed in its own row."""
-    first, count, points = rows[0], rows[1] - rows[0], grid[1].shape[0]
+def _rows(rows, places, radius, grid, listed):
+    """Compressed rows of some places, first and last.
+
+    ``listed``: whether a point is listed in its own row, and how many places see all points.
+    """
+    (first, last), (own, movers), points = rows, listed, grid[1].shape[0]
+    count = last - first
     room, offsets = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int32)
     for r in prange(count):
         room[r + 1] = _candidates(places[first + r], grid)
@@ -118,10 +123,12 @@ def _rows(rows, places, radius, grid, own, movers):
     return offsets, indices
 
 
-def _in_blocks(places: Points, radius: float, grid: tuple[Any, ...], own: bool, movers: int) -> tuple[Indices, Indices]:
-    """Compressed rows of all places, some thousands at a time: candidates, four times as many as neighbours, need room."""
+def _in_blocks(
+    places: Points, radius: float, grid: tuple[Any, ...], listed: tuple[bool, int]
+) -> tuple[Indices, Indices]:
+    """Compressed rows of all places, some thousands at a time: candidates, four times the neighbours, need room."""
     bounds = [*range(0, max(len(places), 1), BLOCK), len(places)]
-    parts = [_rows(pair, places, radius, grid, own, movers) for pair in pairwise(bounds)]
+    parts = [_rows(pair, places, radius, grid, listed) for pair in pairwise(bounds)]
     if len(parts) == 1:
         return parts[0]
     lengths = np.concatenate([[0], *(np.diff(offsets) for offsets, _ in parts)])
@@ -142,7 +149,7 @@ def find_neighbours(points: Points, radius: float, rows: int | None = None) -> t
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    return _in_blocks(points[:rows], radius, _grid(points, points, radius), False, len(points))
+    return _in_blocks(points[:rows], radius, _grid(points, points, radius), (False, len(points)))
 
 
 def find_beside(places: Points, points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:
@@ -162,7 +169,7 @@ def find_beside(places: Points, points: Points, radius: float, movers: int | Non
         FloatingPointError: a coordinate is not finite.
     """
     moving = max(len(places), len(points)) if movers is None else movers
-    return _in_blocks(places, radius, _grid(places, points, radius), True, moving)
+    return _in_blocks(places, radius, _grid(places, points, radius), (True, moving))
 
 
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:

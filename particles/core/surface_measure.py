@@ -200,7 +200,7 @@ def cotangents(points, triangles):
 
 @njit(cache=True)
 def laplacian_product(triangles, weights, field):
-    """K v `(n, 3)` of a field `(n, 3)`, without K of `cotangent_laplacian`; its half cotangents are `weights (t, 3)`."""
+    """K v `(n, 3)` of a field `(n, 3)`, K of `cotangent_laplacian` by its half cotangents, `weights (t, 3)`."""
     result = np.zeros_like(field)
     for t in range(triangles.shape[0]):
         for k in range(3):

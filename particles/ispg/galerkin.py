@@ -123,21 +123,6 @@ class Galerkin:
         kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
         return self._folded(result)
 
-    def divergence_rows(self) -> sparse.csr_matrix:
-        """Rows of `divergence` as a matrix `(n, 3 n)`, velocities by particle."""
-        count = len(self.starts) - 1
-        columns = (3 * self.columns[:, None] + np.arange(3, dtype=np.int32)).ravel()
-        size = 3 * (count + len(self.ghosts.source))
-        rows = sparse.csr_matrix((self.weights[:, 1:].ravel(), columns, 3 * self.starts), shape=(count, size))
-        return rows @ self._reflection(count)
-
-    def _reflection(self, count: int) -> sparse.csr_matrix:
-        """Extension of velocities by their images, `(3 (n + g), 3 n)`."""
-        blocks = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), self.ghosts.reflection))
-        source = np.concatenate((np.arange(count), self.ghosts.source))
-        starts = np.arange(len(source) + 1)
-        return sparse.bsr_matrix((blocks, source, starts), shape=(3 * len(source), 3 * count)).tocsr()
-
     def _with_images(self, field: Floats) -> Floats:
         return kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.ispg import galerkin_kernels as kernels
+from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 
@@ -112,10 +112,10 @@ class GalerkinEquations:
         """
         load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
-        inertia, factors = self.masses / self.time_step, self.factors
+        inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
         implicit = (self.surface, self.rigid, self.masses, self.time_step)
-        parts = (self.space.rows, self.space.images, inertia, factors, implicit, self.admitted)
+        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
         solution, _ = conjugate_gradients(
             lambda field: kernels.momentum_operator(*parts, field),
             kernels.projected(self.admitted, load),

@@ -6,8 +6,8 @@ import numpy as np
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.ispg.galerkin_kernels import projected
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
 
@@ -77,7 +77,7 @@ class GalerkinPast:
         return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
 
     def carried_on(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` admit it."""
+        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it."""
         change = projected(self.gradient, body.points - self.points)
         velocity = projected(projections, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))

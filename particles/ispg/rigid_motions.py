@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.ispg.galerkin_kernels import projected
+from reflowshock.particles.ispg.step_kernels import projected
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
