@@ -92,13 +92,25 @@ def nodal_volumes(body: Body, density: Floats) -> Floats:
     # Products of two directions stand for two entries of x x.
     entries = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
-    factors = np.zeros(len(wanted))
+    found, missing = _fitted(powers, found, wanted, softness)
+    if missing < TOLERANCE * volume:
+        return found
+    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+
+
+@njit(cache=True)
+def _fitted(powers, volumes, wanted, softness):
+    """Volumes `(n,)` times exp(powers q) with wanted sums of powers `(n, k)`, and the largest that is missing of one.
+
+    Newton's method for q; what is missing may be softness times q.
+    """
+    factors, missing = np.zeros(len(wanted)), wanted - powers.T @ volumes
     for _ in range(NEWTON_STEPS):
-        missing = wanted - powers.T @ found - softness * factors
-        if np.abs(missing).max() < TOLERANCE * volume:
-            return found
-        change = np.linalg.solve((powers * found[:, None]).T @ powers + np.diag(softness), missing)
+        if np.abs(missing).max() < TOLERANCE * wanted[0]:
+            break
+        change = np.linalg.solve((powers * volumes.reshape(-1, 1)).T @ powers + np.diag(softness), missing)
         change /= max(1.0, np.abs(powers @ change).max())
         factors += change
-        found = found * np.exp(powers @ change)
-    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+        volumes = volumes * np.exp(powers @ change)
+        missing = wanted - powers.T @ volumes - softness * factors
+    return volumes, np.abs(missing).max()
