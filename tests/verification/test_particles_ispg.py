@@ -22,7 +22,7 @@ from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.time_step import TimeStep
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
-STEPS_PER_PERIOD = 60
+STEPS_PER_PERIOD = 100
 
 
 LONG = [
@@ -160,10 +160,10 @@ def test_a_free_drop_swings_with_its_period():
     exact_decay, exact = viscous_oscillation(2, omega, viscosity)
     decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
     assert abs(exact / found - 1.0) < 0.015
-    assert 1.0 < decay / exact_decay < 2.2
+    assert 1.0 < decay / exact_decay < 1.2
     past, first = flow.solver.past, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
     assert past.losses.viscous / start == pytest.approx(1.0 - np.exp(-2.0 * exact_decay * flow.time), rel=0.1)
-    assert past.losses.smoothing < 0.25 * past.losses.viscous
+    assert past.losses.smoothing < 0.15 * past.losses.viscous
     gained = swing.energy(ball) - first + past.kinetic - start
     assert abs(gained + past.losses.total) < 0.01 * start
