@@ -130,7 +130,7 @@ def _flip_pass(points, triangles, on_ring, margin, worth):
     keys, order = _half_edges(triangles, points.shape[0])
     touched = np.zeros(triangles.shape[0], np.bool_)
     excess = _excess_triangles(triangles, on_ring)
-    flips = 0
+    made, flips = np.empty(triangles.shape[0], np.int64), 0
     for e in range(keys.shape[0] - 1):
         if keys[e] != keys[e + 1]:
             continue
@@ -145,7 +145,7 @@ def _flip_pass(points, triangles, on_ring, margin, worth):
             continue
         new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
         found = np.searchsorted(keys, new_key)
-        if found < keys.shape[0] and keys[found] == new_key:
+        if (found < keys.shape[0] and keys[found] == new_key) or (made[:flips] == new_key).any():
             continue
         if _folds(points, (p, q, i, j)):
             continue
@@ -154,6 +154,7 @@ def _flip_pass(points, triangles, on_ring, margin, worth):
         touched[s] = touched[t] = True
         for vertex, change in ((i, -1.0), (j, -1.0), (p, 1.0), (q, 1.0)):
             excess[vertex] += change
+        made[flips] = new_key
         flips += 1
     return flips
 
