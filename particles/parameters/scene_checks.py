@@ -19,7 +19,8 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-ISPG_EDGES = (5, 11)
+ISPG_EDGES = (5, 15)
+ISPG_PAD_EDGE = 11
 # Below this angle a cube of fewer particles along an edge becomes a film, in which particles lack neighbours.
 ISPG_FILM_ANGLE, ISPG_FILM_EDGE = radians(60.0), 6
 KEYS = {
@@ -75,8 +76,9 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
             few and angle is not None and angle < ISPG_FILM_ANGLE - ROUNDING
         ),
-        f"{drop.count} particles along an edge on a pad (at least {ISPG_FILM_EDGE})": few
-        and drop.pad_radius is not None,
+        f"{drop.count} particles along an edge on a pad (for {ISPG_FILM_EDGE} to {ISPG_PAD_EDGE} it is)": (
+            drop.pad_radius is not None and not ISPG_FILM_EDGE <= drop.count <= ISPG_PAD_EDGE
+        ),
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
 

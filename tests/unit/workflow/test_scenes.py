@@ -206,7 +206,7 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
         ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
-        ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
+        ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         (
             "drop={volume='1 mm^3',contact_angle='50 deg',particles_per_edge=5}",
             "5 particles along an edge below 60 deg",
@@ -238,7 +238,7 @@ def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setti
 def test_the_scheme_ispg_takes_a_pad_that_holds_the_drop():
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
     assert read_case(BALL, asked).molten.numerics.scheme == "ispg"
-    assert "on a pad (at least 6)" in problems_of(BALL, *asked, "drop.pad_radius=0.3 mm", "drop.particles_per_edge=5")
+    assert "on a pad (for 6 to 11 it is)" in problems_of(BALL, *asked, "drop.pad_radius=0.3 mm", "drop.particles_per_edge=5")
 
 
 def test_motion_that_matters_costs_all_steps_allowed():
