@@ -21,6 +21,7 @@ class LostEnergy:
         integration: to the time integration: of the momentum, and of the way that the forces act along.
         transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
+        rebuilding: to bodies made anew, where liquids meet or part.
     """
 
     viscous: float = 0.0
@@ -28,11 +29,12 @@ class LostEnergy:
     integration: float = 0.0
     transfer: float = 0.0
     evening: float = 0.0
+    rebuilding: float = 0.0
 
     @property
     def total(self) -> float:
         """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
+        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening + self.rebuilding
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = checks.ispg_problems(solder, "two drops") or _flow_problems(pair, solder)
+    found = _flow_problems(pair, solder) or _ispg_pair_problems(pair, solder)
     found = found or free_problems(pair, solder) or _pair_resolution(pair)
     return found or _distance_problems(pair, solder)
 
@@ -90,6 +90,17 @@ def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
         "packages that are moved": joint.path is not None,
         "walls that hold the liquid": solder.wall != "free-slip",
         f"joints without inertia ({inertia['why']})": not inertia["on"],
+    }
+    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _ispg_pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """Find pairs of drops that the scheme ispg is not verified for."""
+    inertia = decide_drop(solder, pair.is_free)["inertia"]
+    places = {
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(pair.contact_angle),
+        "walls that hold the liquid": solder.wall != "free-slip",
+        f"drops without inertia ({inertia['why']})": not inertia["on"],
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
 

@@ -267,7 +267,7 @@ def _ledger(flow: LiquidFlow, run: Run) -> Metrics:
         return {}
     past, first = flow.solver.past, flow.solver.first_energy
     lost, kinetic, now = past.losses, past.kinetic or 0.0, run.records[-1].energy / flow.body.cloud.parts
-    names = ("viscous", "smoothing", "integration", "transfer", "evening")
+    names = ("viscous", "smoothing", "integration", "transfer", "evening", "rebuilding")
     metrics: Metrics = {f"{name}_loss": (getattr(lost, name) / first, "") for name in names}
     return metrics | {"energy_imbalance": ((now + kinetic + lost.total) / first - 1.0, "")}
 

@@ -16,6 +16,8 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import centre_of_volume
+from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.rebuilt import Moving, take_over
 from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
@@ -92,6 +94,20 @@ def rebuild(*bodies: Body) -> Body:
         result.points += sum(centres) / volume - centre_of_volume(result.points, result.triangles)
     result.velocity = _common_velocity(result, bodies)
     return result
+
+
+def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
+    """Give flows of bodies made anew the time and the steps of the old ones, and with ispg their motion and ledger."""
+    for flow in new:
+        flow.time, flow.steps = max(one.time for one in old), max(one.steps for one in old)
+    before, after = _moving(old), _moving(new)
+    if len(before) == len(old) and len(after) == len(new):
+        take_over(after, before)
+
+
+def _moving(flows: Sequence[LiquidFlow]) -> list[Moving]:
+    """Those that the scheme ispg moves."""
+    return [Moving(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
 
 
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
