@@ -1,9 +1,9 @@
 """Bodies made anew of others in the scheme ispg: they have their momenta, and what is lost of the energy is counted.
 
-Where liquids meet or part, new surfaces and new particles replace the old ones, all at once; who makes them keeps volume
-and centre. Here each new particle gets the velocities of the old ones around it, each continued to its place with its
-gradient, so that motions that are linear in space come over as they are. The least motion that does so, a rigid one,
-makes up for what is missing of the momenta. The time integration starts anew.
+Where liquids meet or part, new surfaces and new particles replace the old ones, all at once; who makes them keeps the
+volume and its centre. Here each new particle gets the velocities of the old ones around it, each continued to its place
+with its gradient, so that motions that are linear in space come over as they are. The least motion that does so, a
+rigid one, makes up for what is missing of the momenta. The time integration starts anew.
 """
 
 from collections.abc import Sequence

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.rebuilt import Moving, take_over
 from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -88,12 +88,21 @@ def rebuild(*bodies: Body) -> Body:
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
     result = Body.at_rest(cloud_from_level_set(union, volume, walls))
-    if not walls:
-        # A neck that is closed on one side shifts the centre; no force does.
-        centres = [body.volume()[0] * centre_of_volume(body.points, body.triangles) for body in bodies]
-        result.points += sum(centres) / volume - centre_of_volume(result.points, result.triangles)
+    moments = [body_moments(body) for body in bodies]
+    _put_centre(result, walls, sum(moment[1] for moment in moments) / sum(moment[0] for moment in moments))
     result.velocity = _common_velocity(result, bodies)
     return result
+
+
+def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
+    """Shift a body so that its centre of volume is where it was `(3,)` [m], as far as its walls let it slide.
+
+    A neck that is closed on one side shifts it; no force does.
+    """
+    if any(plate.pads for plate in walls):
+        return
+    volume, first, _ = body_moments(body)
+    body.points += (centre - first / volume) * (1.0 if not walls else np.array([1.0, 1.0, 0.0]))
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
