@@ -16,6 +16,8 @@ MAX_ITERATIONS = 500
 RESIDUAL_LIMIT = 1e-4
 # Factors cost as much as some forty iterations.
 MANY_ITERATIONS = 16
+# With factors of another matrix: where these do not do, new ones cost less than to go on.
+TOO_MANY_ITERATIONS = 80
 # Of the mean of the diagonal, added to it in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 
@@ -29,7 +31,12 @@ class Tolerance:
 
 
 def conjugate_gradients(
-    operator: Apply, right: Floats, start: Floats, precondition: Apply, tolerance: Tolerance
+    operator: Apply,
+    right: Floats,
+    start: Floats,
+    precondition: Apply,
+    tolerance: Tolerance,
+    most: int = MAX_ITERATIONS,
 ) -> tuple[Floats, int]:
     """Solve A x = b for a symmetric positive definite A.
 
@@ -39,6 +46,7 @@ def conjugate_gradients(
         start: `(d,)`.
         precondition: r -> P^-1 r.
         tolerance: when it ends.
+        most: iterations that it may take.
 
     Returns:
         x `(d,)` and the iterations.
@@ -51,7 +59,7 @@ def conjugate_gradients(
     solution = start.copy()
     residual = right - operator(solution)
     direction, product, iterations = np.zeros_like(right), 1.0, 0
-    while np.linalg.norm(residual) > enough and iterations < MAX_ITERATIONS:
+    while np.linalg.norm(residual) > enough and iterations < most:
         scaled = precondition(residual)
         before, product = product, float(residual @ scaled)
         direction = scaled + (product / before if iterations else 0.0) * direction
@@ -83,14 +91,26 @@ class LaggedCholesky(LaggedSolver):
         """
         if self.origin is None or self.iterations > MANY_ITERATIONS or self.origin.shape[0] != len(right):
             self.origin, self._solver = matrix(), None
-        if self._solver is None:
+        fresh = self._solver is None
+        try:
+            return self._solved(operator, right, tolerance, MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS)
+        except SolveFailed:
+            if fresh:
+                raise
+        self.origin, self._solver = matrix(), None
+        return self._solved(operator, right, tolerance, MAX_ITERATIONS)
+
+    def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance, most: int) -> Floats:
+        """Solve with the factors of the matrix that is kept, in at most so many iterations."""
+        if self.origin is not None and self._solver is None:
             self._solver = _factored(self.origin)
         factors = self._solver
 
         def precondition(residual: Floats) -> Floats:
             return linalg.cho_solve(factors, residual, check_finite=False)
 
-        solution, self.iterations = conjugate_gradients(operator, right, np.zeros_like(right), precondition, tolerance)
+        start = np.zeros_like(right)
+        solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance, most)
         return solution
 
 

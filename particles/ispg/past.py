@@ -1,6 +1,7 @@
 """What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -35,6 +36,11 @@ class LostEnergy:
     def total(self) -> float:
         """All of them."""
         return self.viscous + self.smoothing + self.integration + self.transfer + self.evening + self.rebuilding
+
+
+def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
+    """Losses of several flows, each by its kind."""
+    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))
 
 
 @dataclass(frozen=True, slots=True)

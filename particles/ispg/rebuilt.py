@@ -7,7 +7,7 @@ rigid one, makes up for what is missing of the momenta. The time integration sta
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,7 +16,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy
+from reflowshock.particles.ispg.past import GalerkinPast, total_losses
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 
@@ -84,7 +84,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
     now = [part.physics.energy(part.body) for part in old]
     evened = sum(past.potential - left for past, left in zip(pasts, now, strict=True))
     before = sum(now) + sum(past.kinetic or 0.0 for past in pasts)
-    first, losses = new[0].solver, _sum([past.losses for past in pasts])
+    first, losses = new[0].solver, total_losses([past.losses for past in pasts])
     losses = replace(losses, evening=losses.evening + evened, rebuilding=losses.rebuilding + before - energy)
     first.first_energy = sum(part.first_energy for part in old)
     first.past = replace(first.past, losses=losses) if first.past else None
@@ -119,6 +119,3 @@ def _with_momenta(
     amount = np.linalg.solve(inertia, missing)
     return [velocity + np.tensordot(amount, motion, 1) for velocity, motion in zip(velocities, motions, strict=True)]
 
-
-def _sum(losses: Sequence[LostEnergy]) -> LostEnergy:
-    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))

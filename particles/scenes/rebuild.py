@@ -18,7 +18,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.rebuilt import Moving, take_over
-from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
+from reflowshock.particles.scenes.metrics import Metrics, ledger, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
@@ -186,6 +186,8 @@ def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], Liqu
     if any(plate.normal[2] != 1.0 or abs(neck - plate.origin[2]) < room for plate in walls):
         return []
     drops = [start(part) for part in _cut(body, walls, neck, below)]
+    hand_over([flow], drops)
+    rule = replace(rule, max_steps=flow.steps + rule.max_steps)
     return [(drop, run_to_rest(drop, rule)) for drop in drops]
 
 
@@ -234,10 +236,13 @@ def parted_shape(joint: JointShape, drops: Sequence[Flowed]) -> JointShape:
 
 def _drop_metrics(drops: Sequence[Flowed]) -> Metrics:
     """Volume and height of each drop, and what an array is judged by."""
-    metrics: Metrics = {
+    metrics: Metrics = ledger([flow for flow, _ in drops]) | {
         "max_width": (max(run.profiles[-1].max_width for _, run in drops), "m"),
         "axial_force": (0.0, "N"),
         "particles": (float(sum(len(flow.body.points) for flow, _ in drops)), ""),
+        "particles_lost": (float(sum(particles_lost(flow.body) for flow, _ in drops)), ""),
+        "at_rest": (float(all(run.at_rest for _, run in drops)), ""),
+        "time_at_rest": (max(flow.time for flow, _ in drops), "s"),
     }
     for name, (flow, run) in zip(("board", "package"), drops, strict=True):
         metrics[f"volume_{name}"] = (flow.body.volume()[0], "m^3")

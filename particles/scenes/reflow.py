@@ -79,7 +79,9 @@ def solve_joint(
 
 def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
     """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
-    effects = switched(decide_effects(geometry, solder)) | AT_REST
+    effects = switched(decide_effects(geometry, solder))
+    if solder.numerics.scheme != "ispg":
+        effects |= AT_REST
 
     def start(body: Body) -> LiquidFlow:
         return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
