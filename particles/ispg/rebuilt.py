@@ -118,4 +118,3 @@ def _with_momenta(
         inertia += np.array([rigid_momenta(motion, mass, one) for one in motion])
     amount = np.linalg.solve(inertia, missing)
     return [velocity + np.tensordot(amount, motion, 1) for velocity, motion in zip(velocities, motions, strict=True)]
-

@@ -18,6 +18,7 @@ from reflowshock.particles.core.cloud import Cloud, TooLittleSolder, box_cloud, 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
+from reflowshock.particles.ispg.adaptation import Adaptation
 from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
@@ -144,6 +145,8 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     largest, bound = largest_step(solder, cloud.spacing)
     time_step = TimeStep(largest, cloud.spacing, largest, bound, bound)
     physics, solver = build_physics(solder, effects, lines), step_solver(solder, effects)
+    if isinstance(solver, IspgStep):
+        physics = replace(physics, events=(*physics.events, Adaptation(solver, physics)))
     return LiquidFlow(Body.at_rest(cloud), physics, time_step, solver)
 
 
