@@ -30,7 +30,7 @@ GAP, NEAREST = 1.5, 0.2
 EMPTY = 0.95
 # What is nearer to the surface than this would be pushed back at once.
 DEPTH = 0.6
-MOMENT_PASSES = 6
+MOMENT_PASSES, ROUNDING = 16, 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) 
         found, moments, _ = body_moments(body)
         centre = first / volume
         missing = np.append(volume - found, (first - moments - (volume - found) * centre) / length)
-        if np.abs(missing).max() <= 1e-15 * volume:
+        if np.abs(missing).max() <= ROUNDING * volume:
             return
         slope = body.volume()[1]
         normal = physics.admit(body, slope)
@@ -218,8 +218,14 @@ def _take(body: Body, change: Change) -> None:
 
 def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
     """What the last step left, at the new particles."""
-    fields = ("points", "velocity", "gradient", "pressure", "volumes")
-    history = past.history
-    steps = (change.mean(history.displacement), change.mean(history.velocity_change))
-    own = {name: change.mean(getattr(past, name)) for name in fields}
-    return replace(past, **own, history=BackwardDifference(*steps, history.time_step))
+    last = past.history
+    displacement, change_of_velocity = change.mean(last.displacement), change.mean(last.velocity_change)
+    return replace(
+        past,
+        points=change.mean(past.points),
+        velocity=change.mean(past.velocity),
+        gradient=change.mean(past.gradient),
+        pressure=change.mean(past.pressure),
+        volumes=change.mean(past.volumes),
+        history=BackwardDifference(displacement, change_of_velocity, last.time_step),
+    )

@@ -1,7 +1,7 @@
 """Conjugate gradients without a matrix, and preconditioned with the factors of an earlier step's matrix."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg, sparse
@@ -24,19 +24,15 @@ SHIFT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """When a solve ends: at this share of the norm of the right-hand side, or at this residual."""
+    """When a solve ends: at this share of the norm of the right-hand side, or at this residual; it fails at `most`."""
 
     relative: float
     absolute: float
+    most: int = MAX_ITERATIONS
 
 
 def conjugate_gradients(
-    operator: Apply,
-    right: Floats,
-    start: Floats,
-    precondition: Apply,
-    tolerance: Tolerance,
-    most: int = MAX_ITERATIONS,
+    operator: Apply, right: Floats, start: Floats, precondition: Apply, tolerance: Tolerance
 ) -> tuple[Floats, int]:
     """Solve A x = b for a symmetric positive definite A.
 
@@ -46,7 +42,6 @@ def conjugate_gradients(
         start: `(d,)`.
         precondition: r -> P^-1 r.
         tolerance: when it ends.
-        most: iterations that it may take.
 
     Returns:
         x `(d,)` and the iterations.
@@ -59,7 +54,7 @@ def conjugate_gradients(
     solution = start.copy()
     residual = right - operator(solution)
     direction, product, iterations = np.zeros_like(right), 1.0, 0
-    while np.linalg.norm(residual) > enough and iterations < most:
+    while np.linalg.norm(residual) > enough and iterations < tolerance.most:
         scaled = precondition(residual)
         before, product = product, float(residual @ scaled)
         direction = scaled + (product / before if iterations else 0.0) * direction
@@ -93,15 +88,16 @@ class LaggedCholesky(LaggedSolver):
             self.origin, self._solver = matrix(), None
         fresh = self._solver is None
         try:
-            return self._solved(operator, right, tolerance, MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS)
+            most = MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS
+            return self._solved(operator, right, replace(tolerance, most=most))
         except SolveFailed:
             if fresh:
                 raise
         self.origin, self._solver = matrix(), None
-        return self._solved(operator, right, tolerance, MAX_ITERATIONS)
+        return self._solved(operator, right, tolerance)
 
-    def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance, most: int) -> Floats:
-        """Solve with the factors of the matrix that is kept, in at most so many iterations."""
+    def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
+        """Solve with the factors of the matrix that is kept."""
         if self.origin is not None and self._solver is None:
             self._solver = _factored(self.origin)
         factors = self._solver
@@ -110,7 +106,7 @@ class LaggedCholesky(LaggedSolver):
             return linalg.cho_solve(factors, residual, check_finite=False)
 
         start = np.zeros_like(right)
-        solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance, most)
+        solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance)
         return solution
 
 

@@ -89,7 +89,8 @@ def rebuild(*bodies: Body) -> Body:
     volume = sum(body.volume()[0] for body in bodies)
     result = Body.at_rest(cloud_from_level_set(union, volume, walls))
     moments = [body_moments(body) for body in bodies]
-    _put_centre(result, walls, sum(moment[1] for moment in moments) / sum(moment[0] for moment in moments))
+    centre = np.sum([moment[1] for moment in moments], axis=0) / sum(moment[0] for moment in moments)
+    _put_centre(result, walls, centre)
     result.velocity = _common_velocity(result, bodies)
     return result
 

@@ -49,7 +49,7 @@ def split_long(
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     busy = np.zeros(len(triangles), bool)
     pairs: list[Indices] = []
-    faces = [row for row in triangles]
+    faces = list(triangles)
     lines = [ring.tolist() for ring in rings]
     for edge in np.argsort(-length, kind="stable"):
         if length[edge] <= longest:
