@@ -1,6 +1,6 @@
 """Particles that come and go with the room: on the surface by its edges, below it by distance.
 
-An event before a step. Edges of the surface longer than 1.5 spacings are split, those shorter than 0.4 collapse. Below
+An event before a step. Edges of the surface longer than 1.6 spacings are split, those shorter than 0.4 collapse. Below
 the surface a particle is put midway between two that are more than 1.5 spacings apart with nothing in between, and one
 of two nearer than 0.2 goes. Each new particle is the mean of two old ones, in place, velocity and pressure.
 
@@ -24,7 +24,8 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
 
-LONGEST_EDGE, SHORTEST_EDGE = 1.5, 0.4
+# The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
+LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
 GAP, NEAREST = 1.5, 0.2
 # In a cubic lattice the middle of a cell is 0.87 spacings from the corners, which are 1.7 apart: no gap.
 EMPTY = 0.95
