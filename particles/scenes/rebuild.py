@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.ispg.adaptation import restore_moments
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.rebuilt import Moving, take_over
@@ -107,17 +108,30 @@ def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
-    """Give flows of bodies made anew the time and the steps of the old ones, and with ispg their motion and ledger."""
+    """Give flows of bodies made anew the time and the steps of the old ones.
+
+    With the scheme ispg they get their motion, centre and ledger, too.
+    """
     for flow in new:
         flow.time, flow.steps = max(one.time for one in old), max(one.steps for one in old)
     before, after = _moving(old), _moving(new)
     if len(before) == len(old) and len(after) == len(new):
+        _keep_centre(before, after)
         take_over(after, before)
 
 
 def _moving(flows: Sequence[LiquidFlow]) -> list[Moving]:
     """Those that the scheme ispg moves."""
     return [Moving(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
+
+
+def _keep_centre(old: Sequence[Moving], new: Sequence[Moving]) -> None:
+    """Give new bodies the centre of volume that the old ones had together; each moves by as much."""
+    before, after = ([body_moments(part.body) for part in parts] for parts in (old, new))
+    missing = np.sum([first for _, first, _ in before], axis=0) - np.sum([first for _, first, _ in after], axis=0)
+    total = sum(volume for volume, _, _ in after)
+    for part, (volume, first, _) in zip(new, after, strict=True):
+        restore_moments(part.body, part.physics, volume, first + volume / total * missing)
 
 
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
