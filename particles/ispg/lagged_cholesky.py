@@ -1,7 +1,7 @@
 """Conjugate gradients without a matrix, and preconditioned with the factors of an earlier step's matrix."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,16 +19,19 @@ RESIDUAL_LIMIT = 1e-4
 # A step takes four with new factors, fourteen with the last step's and twice as many with those before; the former cost
 # as much as ten of 216 pressures, fifty of 1331.
 MANY_ITERATIONS = 12
+# With factors of another matrix: where these do not do, new ones cost less than to go on.
+TOO_MANY_ITERATIONS = 80
 # Added to the diagonal, which is about one, in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """When a solve ends: at this share of the norm of the right-hand side, or at this residual."""
+    """When a solve ends: at this share of the norm of the right-hand side, or at this residual; it fails at `most`."""
 
     relative: float
     absolute: float
+    most: int = MAX_ITERATIONS
 
 
 def conjugate_gradients(
@@ -54,7 +57,7 @@ def conjugate_gradients(
     solution = start.copy()
     residual = right - operator(solution) if start.any() else right.copy()
     direction, product, iterations = np.zeros_like(right), 1.0, 0
-    while _length(residual) > enough and iterations < MAX_ITERATIONS:
+    while _length(residual) > enough and iterations < tolerance.most:
         scaled = precondition(residual)
         before, product = product, float(np.vdot(residual, scaled))
         direction = scaled + (product / before if iterations else 0.0) * direction
@@ -98,8 +101,20 @@ class LaggedCholesky:
         Raises:
             SolveFailed: the true residual stays above the limit, or A has no factors.
         """
-        if self.scale is None or self.iterations > MANY_ITERATIONS or len(self.scale) != len(right):
+        fresh = self.scale is None or self.iterations > MANY_ITERATIONS or len(self.scale) != len(right)
+        if fresh:
             self.root, self.scale = _factored(*matrix())
+        try:
+            most = MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS
+            return self._solved(operator, right, replace(tolerance, most=most))
+        except SolveFailed:
+            if fresh:
+                raise
+        self.root, self.scale = _factored(*matrix())
+        return self._solved(operator, right, tolerance)
+
+    def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
+        """Solve with the factors that are kept."""
         root, scale = self.root, self.scale
 
         def precondition(residual: Floats) -> Floats:
@@ -107,7 +122,8 @@ class LaggedCholesky:
             scaled = (scale * residual).astype(np.float32)
             return scale * blas.strsv(root, blas.strsv(root, scaled, trans=1), overwrite_x=1)
 
-        solution, self.iterations = conjugate_gradients(operator, right, np.zeros_like(right), precondition, tolerance)
+        start = np.zeros_like(right)
+        solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance)
         return solution
 
     def saved(self) -> dict[str, Any]:
