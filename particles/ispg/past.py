@@ -1,6 +1,7 @@
 """What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ class LostEnergy:
         integration: to the time integration: of the momentum, and of the way that the forces act along.
         transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
+        rebuilding: to bodies made anew, where liquids meet or part.
     """
 
     viscous: float = 0.0
@@ -30,11 +32,17 @@ class LostEnergy:
     integration: float = 0.0
     transfer: float = 0.0
     evening: float = 0.0
+    rebuilding: float = 0.0
 
     @property
     def total(self) -> float:
         """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
+        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening + self.rebuilding
+
+
+def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
+    """Losses of several flows, each by its kind."""
+    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))
 
 
 @dataclass(frozen=True, slots=True)
