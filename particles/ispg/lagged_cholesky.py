@@ -116,6 +116,7 @@ class LaggedCholesky:
     def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
         """Solve with the factors that are kept."""
         root, scale = self.root, self.scale
+        assert scale is not None
 
         def precondition(residual: Floats) -> Floats:
             # One right-hand side: the routine for many (potrs) takes four times as long.
