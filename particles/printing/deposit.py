@@ -115,6 +115,11 @@ class Deposit:
         """Of all particles `(n, 3)` [m], up to the present where none moves now."""
         return np.stack(self.fields[:3], axis=1)
 
+    @property
+    def pressures(self) -> Floats:
+        """Of all particles [Pa], with that of the surface; none in what is cured."""
+        return np.where(self.state == LIQUID, self.fields.pressure + self.surface.pressure, 0.0)
+
     def add_drop(self, place: tuple[float, float]) -> None:
         """Let a drop land at x, y [m]: it starts as a sphere that all but touches what is below it."""
         self.update()

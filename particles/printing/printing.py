@@ -170,7 +170,7 @@ def _picture(run: PrintRun, scene: Printing) -> None:
     deposit.update()
     velocity = np.stack(deposit.fields[3:6], axis=1)
     velocity[deposit.state != LIQUID] = 0.0
-    run.pictures.append(Picture(deposit.time, deposit.points, velocity, deposit.fields.pressure.copy()))
+    run.pictures.append(Picture(deposit.time, deposit.points, velocity, deposit.pressures))
 
 
 def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
@@ -178,7 +178,7 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
     deposit = run.deposit
     if not run.pictures or len(run.pictures[-1].points) < len(deposit.points):
         still = np.zeros_like(deposit.points)
-        run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.fields.pressure.copy()))
+        run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.pressures))
     part = part_of(scene, deposit)
     history: dict[str, Floats] = dict(zip(COLUMNS, np.array(run.rows).T, strict=True))
     meetings = deposit.surface.meetings
