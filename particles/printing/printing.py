@@ -2,6 +2,7 @@
 
 Time goes on in events. While liquid moves it is computed step by step; what has been followed for the settling time
 since the last drop landed, or does not move any more, rests until the next drop lands or a particle cures: no steps.
+What freezes is followed until it is solid.
 """
 
 from collections.abc import Callable, Mapping
@@ -144,6 +145,8 @@ def _shine(run: PrintRun) -> None:
 
 
 def _rests(run: PrintRun, simulation: Simulation, scene: Printing) -> bool:
+    if scene.freezes:
+        return False
     is_old = run.deposit.time - run.since >= scene.settling_time
     return is_old or simulation.kinetic_energy < REST * _unit_of_energy(scene)
 
@@ -185,6 +188,7 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
     metrics: Metrics = measure_part(scene, deposit, part) | {
         "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
         "splits": (float(sum(one.after > one.before for one in meetings)), ""),
+        "solid_after": (deposit.time - run.since, "s"),
         "motion_left": (run.left, ""),
         "weber": (scene.drop.weber_number, ""),
         "ohnesorge": (scene.drop.ohnesorge, ""),
