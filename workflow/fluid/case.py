@@ -117,7 +117,7 @@ def _of_freezing(scene: Printing) -> list[Problem]:
         allowed = "printing.cure or printing.freezing; effects.freezing = off leaves the cure"
         return [Problem("printing.cure", "drops freeze before light cures them", "given", allowed)]
     if scene.drops > 1 and scene.delay < scene.cooling_time:
-        delay, least = (from_si(one, "us", digits=3) for one in (scene.delay, scene.cooling_time))
+        delay, least = (from_si(one, "us", digits=4) for one in (scene.delay, scene.cooling_time))
         allowed = f">= {least}, in which a drop freezes and cools down to the plate"
         return [Problem("printing.delay", "a drop would land on one that is still warm", delay, allowed)]
     return []
