@@ -65,7 +65,7 @@ BAD_VALUES = {
     "a drop on a warm one": (
         FROZEN,
         ["printing.layers=2", "printing.delay=200 us"],
-        ["printing.delay", "still warm", ">= 138"],
+        ["printing.delay", "still warm", ">= 1377 us"],
     ),
     "freezing of nothing known": (
         PRINTING,
