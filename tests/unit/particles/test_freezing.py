@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.parameters.freezing import Freezing
-from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
+from reflowshock.particles.parameters.printing import LITTLE_FROZEN, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import LIQUID, SOLID, Deposit
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.heat import Heat, enthalpy_at
@@ -104,14 +104,35 @@ def test_a_drop_freezes_from_the_plate_upwards_and_what_is_frozen_stands_still()
     assert np.array_equal(again.points, deposit.points) and again.time == deposit.time
 
 
+GIVEN = {
+    "drop_volume": 2.5e-13, "surface_tension": 0.345, "speed": 1.5, "delay": 1e-3, "pitch": 1e-4, "columns": 1,
+    "rows": 1, "density": DENSITY, "numerics": PrintingNumerics(particles_per_diameter=8),
+}  # fmt: skip
+SLOW = Freezing(**(SOLDER | {"conductivity": 1e-5}))
+
+
 def test_light_cures_what_does_not_freeze():
-    given = {
-        "drop_volume": 2.5e-13, "surface_tension": 0.345, "speed": 1.5, "delay": 1e-3, "pitch": 1e-4, "columns": 1,
-        "rows": 1,
-    }  # fmt: skip
-    assert not Printing(**given).freezes
-    assert Printing(**given, freezing=Freezing(**SOLDER)).freezes
-    assert not Printing(**given, freezing=Freezing(**SOLDER), effects={"freezing": "off"}).freezes
-    slow = Freezing(**(SOLDER | {"conductivity": 1e-5}))
-    assert not Printing(**given, freezing=slow).freezes
-    assert Printing(**given, freezing=slow, effects={"freezing": "on"}).freezes
+    assert Printing(**GIVEN, freezing=Freezing(**SOLDER)).freezes
+    assert Printing(**GIVEN, freezing=SLOW, effects={"freezing": "on"}).freezes
+    off = {"freezing": Freezing(**SOLDER), "effects": {"freezing": "off"}}
+    for scene in (Printing(**GIVEN), Printing(**GIVEN, freezing=SLOW), Printing(**GIVEN, **off)):
+        assert not scene.freezes
+        deposit = Deposit(scene)
+        deposit.add_drop((0.0, 0.0))
+        deposit.expose(scene.cure_time)
+        assert deposit.heat is None and deposit.cure()
+
+
+def test_little_freezing_does_little():
+    ended = []
+    for switch in ("off", "on"):
+        scene = Printing(**GIVEN, freezing=SLOW, effects={"freezing": switch})
+        deposit = Deposit(scene)
+        deposit.add_drop((0.0, 0.0))
+        for _ in range(60):
+            deposit.step(1.0)
+        assert (deposit.heat is not None) == (switch == "on")
+        deposit.cure()
+        ended.append(deposit.points)
+    assert scene.share_frozen < LITTLE_FROZEN
+    assert np.abs(ended[1] - ended[0]).max() < scene.share_frozen * scene.length
