@@ -12,7 +12,7 @@ from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
-from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS
+from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS, PRINTING_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -252,7 +252,7 @@ KINDS = (
     ),
     replace(
         _flow_kind(PrintingCase, fluid_case.of_printing, fluid_stages.flow_printing),
-        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS),
+        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS, *PRINTING_EFFECTS),
     ),
     PACKAGE,
 )

@@ -9,7 +9,7 @@ from reflowshock.parameters import changed
 from reflowshock.particles.parameters.droplets import Droplet
 from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.particles.parameters.flows import ARTIFICIAL_VISCOSITY, SphFlow
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.parameters.printing import LITTLE_FROZEN, Printing
 
 # Thickness of a boundary layer, over the length of the flow: with less, viscosity is left out where walls are smooth.
 THIN_LAYER = 0.01
@@ -141,8 +141,41 @@ class DropletGravity(Effect[Droplet]):
         return decision(influence > NEGLIGIBLE_SHAPE_CHANGE, why, influence)
 
 
+class InkFreezing(Effect[Printing]):
+    """Freezing of printed drops on a cold plate."""
+
+    name = "freezing"
+    stage = "particles"
+    adds = "de/dt = div(k grad T) / rho; a particle without half of its latent heat stands still"
+    number = (
+        "sqrt(delay / t_f), t_f = H^2 / (4 lambda^2 a): share of a drop's height that freezes before the next lands"
+    )
+    threshold = LITTLE_FROZEN
+    influence = "the number; without freezing light cures the drops"
+    place = "reflowshock.particles.sph.heat.Heat"
+    switch = "printing.effects.freezing = auto, on, off"
+    source = "Neumann's solution, as in Carslaw & Jaeger 1959; Cleary & Monaghan 1999; Voller & Prakash 1987"
+
+    def decide(self, scene: Printing) -> Decision:
+        """By the share that freezes, or as the user says."""
+        freezing, switch = scene.freezing, scene.effects.freezing
+        if freezing is None:
+            return decision(False, "no freezing is given: light cures the drops")
+        why = (
+            f"Stefan number {freezing.stefan:.3g}: {100.0 * scene.share_frozen:.3g} % of a drop's height between drops"
+        )
+        if switch != "auto":
+            why = f"set to {switch} by the user ({why})"
+        return decision(scene.freezes, why, scene.share_frozen)
+
+    def other_way(self, case: Any, acts: bool) -> Any | None:
+        """Return a case whose drops are cured by light; where the case gives no freezing, none is known."""
+        return changed(case, f"{case.kind}.freezing", None) if acts else None
+
+
 FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 DROPLET_EFFECTS = (DropletTension(), DropletGravity())
+PRINTING_EFFECTS = (InkFreezing(),)
 
 
 def artificial_viscosity(scene: SphFlow) -> float:
@@ -156,6 +189,6 @@ def artificial_viscosity(scene: SphFlow) -> float:
 def decide_flow(scene: SphFlow) -> dict[str, Decision]:
     """Decide on all effects of a flow."""
     if isinstance(scene, Printing):
-        return decide_flow(scene.drop)
+        return decide_flow(scene.drop) | decided(PRINTING_EFFECTS, scene)
     found = decided(FLOW_EFFECTS, scene)
     return found | decided(DROPLET_EFFECTS, scene) if isinstance(scene, Droplet) else found

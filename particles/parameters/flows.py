@@ -23,6 +23,8 @@ class MethodNumerics(Parameters):
 
     The smoothing length is over the spacing of the particles, the speed of sound over the largest speed expected;
     density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
+    The density diffuses along its gradient: "renormalised" by a 3 x 3 matrix, or "reproducing", the slope of the linear
+    function next to the neighbours, from a 4 x 4 matrix (Belytschko et al. 1998).
     XSPH lets particles move with a velocity that is smoothed by so much: 0.5 is usual, none is needed with viscosity.
     Sums over pairs run on threads of the processor, or on a GPU (cuda).
     """
@@ -32,6 +34,7 @@ class MethodNumerics(Parameters):
     smoothing_length: float = Field(1.3, ge=1.0, le=2.5)
     sound_speed: float = Field(10.0, ge=5, le=100)
     density_diffusion: float = Field(0.1, ge=0, le=0.2)
+    density_gradient: Literal["renormalised", "reproducing"] = "renormalised"
     artificial_viscosity: float | None = Field(None, ge=0, le=0.5)
     xsph: float = Field(0.0, ge=0, le=1)
 

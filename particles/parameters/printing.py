@@ -1,20 +1,24 @@
-"""Parameters of a printed part in SI floats: drops of ink, one after the other, layer on layer, and how they cure."""
+"""Parameters of a printed part in SI floats: drops, one after the other, layer on layer, that cure or freeze."""
 
 from functools import lru_cache
-from math import cos, pi, sin
+from math import cos, inf, pi, sin, sqrt
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
 from reflowshock.particles.parameters.droplets import RIGHT_ANGLE, Droplet, DropletEffects, DropletNumerics, cap
 from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.parameters.freezing import Freezing
 from reflowshock.quantity import Quantity
 
 # sqrt(rho D^3 / gamma) that a drop is followed at most after it has landed, if it does not cure before.
 SETTLING = 2.0
 # Beside liquid, in diameters: how far it may get before the next drop lands or cures.
 WITHIN_REACH = 1.0
+# Share of the height of a drop that freezes before the next one lands: with less freezing is left out.
+LITTLE_FROZEN = 0.01
 
 
 class Cure(Parameters):
@@ -26,6 +30,12 @@ class Cure(Parameters):
     intensity: Annotated[float, Quantity("W/m^2")] = Field(1.0e5, gt=0)
     dose: Annotated[float, Quantity("J/m^2")] = Field(50.0, gt=0)
     depth: Annotated[float | None, Quantity("um")] = Field(None, gt=0)
+
+
+class PrintingEffects(DropletEffects):
+    """What acts besides pressure, and whether drops freeze: decided from how much of one freezes, or by the user."""
+
+    freezing: Switch = "auto"
 
 
 class PrintingNumerics(DropletNumerics):
@@ -42,7 +52,8 @@ class Printing(SphFlow):
 
     Drops of a layer are printed row by row; "serpentine" turns at the end of each, "interleaved" takes every other
     place first. The plate is tilted about y by `substrate_angle`: drops come down aslant. The contact angle is that on
-    the plate and on cured ink alike.
+    the plate and on cured ink alike. Light cures the drops, or they freeze; then one is followed until it is solid, and
+    cools down to the plate before the next one lands.
     """
 
     drop_volume: Annotated[float, Quantity("pL")] = Field(gt=0)
@@ -58,7 +69,8 @@ class Printing(SphFlow):
     substrate_angle: Annotated[float, Quantity("deg")] = Field(0.0, ge=-pi / 4.0 - 1e-9, le=pi / 4.0 + 1e-9)
     gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
     cure: Cure = Cure()
-    effects: DropletEffects = DropletEffects()
+    freezing: Freezing | None = None
+    effects: PrintingEffects = PrintingEffects()
     numerics: PrintingNumerics = PrintingNumerics()
 
     @property
@@ -88,8 +100,37 @@ class Printing(SphFlow):
 
     @property
     def cure_time(self) -> float:
-        """In which ink at the light cures [s]."""
+        """In which ink at the light cures, or in which a drop freezes, the mean over the layers [s]."""
+        if self.freezes and self.freezing is not None:
+            return self.freezing.time_for(self._height, self.density) / self.layers
         return self.cure.dose / self.cure.intensity
+
+    @property
+    def share_frozen(self) -> float:
+        """How much of the height of a drop freezes before the next one lands, 0 to 1."""
+        if self.freezing is None:
+            return 0.0
+        return min(1.0, sqrt(self.delay / self.freezing.time_for(self._height / self.layers, self.density)))
+
+    @property
+    def freezes(self) -> bool:
+        """Whether drops freeze, and no light cures them."""
+        if self.freezing is None or self.effects.freezing != "auto":
+            return self.freezing is not None and self.effects.freezing == "on"
+        return self.share_frozen > LITTLE_FROZEN
+
+    @property
+    def cooling_time(self) -> float:
+        """In which a drop on top freezes and cools down to the plate, nearly [s]."""
+        if self.freezing is None:
+            return inf
+        diffusion = self._height**2 / self.freezing.diffusivity(self.density)
+        return self.freezing.time_for(self._height, self.density) + diffusion
+
+    @property
+    def _height(self) -> float:
+        """Of all layers, were their drops caps [m]."""
+        return self.layers * cap(self.contact_angle)[1] * self.length
 
     @property
     def settling_time(self) -> float:
@@ -100,6 +141,8 @@ class Printing(SphFlow):
     @property
     def followed(self) -> float:
         """For how long at most one drop is followed [s]."""
+        if self.freezes:
+            return self.cure_time
         return min(self.settling_time, self.cure_time, self.delay if self.cure_time > self.delay else self.cure_time)
 
     @property
@@ -144,6 +187,7 @@ def _drop_of(scene: Printing) -> Droplet:
         diameter=(6.0 * scene.drop_volume / pi) ** (1.0 / 3.0), density=scene.density, viscosity=scene.viscosity,
         rheology=scene.rheology,
         surface_tension=scene.surface_tension, speed=scene.speed, contact_angle=scene.contact_angle,
-        gravity=scene.gravity, duration=scene.delay, effects=scene.effects,
+        gravity=scene.gravity, duration=scene.delay,
+        effects=DropletEffects(**scene.effects.model_dump(exclude={"freezing"})),
         numerics=DropletNumerics(**scene.numerics.model_dump(exclude={"settling"})),
     )  # fmt: skip

@@ -1,8 +1,8 @@
 """Ink on a plate: particles that are liquid, held or solid, and the surface of what is liquid.
 
-A particle that is cured never moves again. As long as some of its body, a connected part of the liquid's surface, is
-liquid, it is held: it stands still as walls do, but carries the surface. A body without liquid is solid: it leaves the
-loops, but for particles that liquid can reach, which are its walls.
+A particle that is cured or frozen never moves again. As long as some of its body, a connected part of the liquid's
+surface, is liquid, it is held: it stands still as walls do, but carries the surface. A body without liquid is solid: it
+leaves the loops, but for particles that liquid can reach, which are its walls.
 """
 
 from collections.abc import Mapping
@@ -18,6 +18,7 @@ from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.particles.scenes.droplet import liquid_of, start_shape
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.heat import Heat, enthalpy_at
 from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
@@ -50,12 +51,14 @@ class Deposit:
         fields: quantities of all particles, in the order in which they have landed.
         state: `(n,)` `LIQUID`, `HELD` or `SOLID`.
         dose: `(n,)` of light that each has got [J/m^2].
+        enthalpy: `(n,)` of each where drops freeze, over that of solid at the melting point [J/kg].
         drop: `(n,)` number of each one's drop.
         bodies: what is solid, in the order in which it cured.
         ground: distance to the bodies, on a grid about all that will be printed.
         surface: of what is liquid, and held with it; empty where all is solid.
         simulation: of what is liquid; None where nothing is.
         order: which particles those of the simulation are.
+        heat: of these particles; None where nothing freezes.
         time: [s].
     """
 
@@ -63,12 +66,14 @@ class Deposit:
     fields: Fields = field(init=False)
     state: Indices = field(default_factory=lambda: np.empty(0, np.int32))
     dose: Floats = field(default_factory=lambda: np.empty(0))
+    enthalpy: Floats = field(default_factory=lambda: np.empty(0))
     drop: Indices = field(default_factory=lambda: np.empty(0, np.int32))
     bodies: list[CuredBody] = field(default_factory=list)
     ground: LevelSet = field(init=False)
     surface: LiquidSurface = field(init=False)
     simulation: Simulation | None = None
     order: Indices = field(default_factory=lambda: np.empty(0, np.int64))
+    heat: Heat | None = None
     time: float = 0.0
     law: Law = field(init=False)
     start: tuple[Floats, tuple[Floats, Indices], float] = field(init=False)
@@ -88,6 +93,7 @@ class Deposit:
         self.update()
         return {
             "fields": self.fields._asdict(), "state": self.state, "dose": self.dose, "drop": self.drop,
+            "enthalpy": self.enthalpy, "heat_listed_at": self.heat.rows.built_at if self.heat else None,
             "bodies": [body._asdict() for body in self.bodies],
             "surface": self.surface.saved(), "order": self.order, "time": self.time,
             "simulation": self.simulation.saved() if self.simulation else None,
@@ -97,6 +103,7 @@ class Deposit:
         """Continue from what `saved` returned."""
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
+        self.enthalpy = saved["enthalpy"]
         for body in saved["bodies"]:
             self._add_body(CuredBody(**body))
         self.surface.restore(saved["surface"])
@@ -104,6 +111,8 @@ class Deposit:
             self._begin()
             assert self.simulation is not None
             self.simulation.restore(saved["simulation"])
+            if self.heat and len(saved["heat_listed_at"]):
+                self.heat.rows.update(saved["heat_listed_at"])
 
     @property
     def liquid(self) -> Indices:
@@ -114,6 +123,11 @@ class Deposit:
     def points(self) -> Floats:
         """Of all particles `(n, 3)` [m], up to the present where none moves now."""
         return np.stack(self.fields[:3], axis=1)
+
+    @property
+    def pressures(self) -> Floats:
+        """Of all particles [Pa], with that of the surface; none in what is cured."""
+        return np.where(self.state == LIQUID, self.fields.pressure + self.surface.pressure, 0.0)
 
     def add_drop(self, place: tuple[float, float]) -> None:
         """Let a drop land at x, y [m]: it starts as a sphere that all but touches what is below it."""
@@ -128,8 +142,19 @@ class Deposit:
         self.state = np.append(self.state, np.full(start.shape[1], LIQUID, np.int32))
         self.drop = np.append(self.drop, np.full(start.shape[1], 1 + self.drop.max(initial=-1), np.int32))
         self.dose = np.append(self.dose, np.zeros(start.shape[1]))
+        self._add_heat(start.shape[1])
         self.surface.add(corners + shift, triangles)
         self._begin()
+
+    def _add_heat(self, count: int) -> None:
+        """Add particles of a new drop, warm; what is solid has cooled down to the plate."""
+        freezing, warm = self.scene.freezing, 0.0
+        if freezing is not None:
+            self.enthalpy[self.state[: len(self.enthalpy)] == SOLID] = enthalpy_at(
+                freezing, freezing.substrate_temperature
+            )
+            warm = enthalpy_at(freezing, freezing.temperature)
+        self.enthalpy = np.append(self.enthalpy, np.full(count, warm))
 
     def _lift(self, place: tuple[float, float]) -> float:
         """Height of the centre of a drop that lands at x, y [m]."""
@@ -154,6 +179,8 @@ class Deposit:
         self.simulation = Simulation(
             fields, len(liquid), self.law, self.surface, flow.device_of(self.scene), len(held)
         )  # fmt: skip
+        if self.scene.freezes and self.scene.freezing is not None:
+            self.heat = Heat(self.scene.freezing, self.law, self.enthalpy[self.order])
 
     def _add_body(self, body: CuredBody) -> None:
         """Add a solid body to the ground."""
@@ -171,8 +198,10 @@ class Deposit:
     def step(self, longest: float) -> float:
         """Let the liquid flow for a time step, or less [s]; return it."""
         assert self.simulation is not None
-        time_step = min(self.simulation.time_step(), longest)
+        time_step = min(self.simulation.time_step(), longest, self.heat.longest_step if self.heat else longest)
         self.simulation.step(time_step)
+        if self.heat:
+            self.heat.conduct(self.simulation.fields, time_step)
         self.time += time_step
         return time_step
 
@@ -183,10 +212,14 @@ class Deposit:
         moving = self.simulation.fluids
         for everything, some in zip(self.fields[:12], self.simulation.fields[:12], strict=True):
             everything[self.order[:moving]] = some[:moving]
+        if self.heat:
+            self.enthalpy[self.order] = self.heat.enthalpy
 
     def expose(self, duration: float) -> None:
-        """Give all particles that are not solid the light of a duration [s]."""
+        """Give all particles that are not solid the light of a duration [s], where it is light that cures."""
         self.update()
+        if self.scene.freezes:
+            return
         open_ = np.flatnonzero(self.state != SOLID)
         self.dose[open_] += duration * self._intensity(open_)
 
@@ -206,11 +239,15 @@ class Deposit:
         return cure.intensity * np.exp(-(top - points[particles, 2]) / cure.depth)
 
     def cure(self) -> bool:
-        """Hold liquid particles that have got their dose; bodies without liquid are solid. Return whether any cured."""
-        cured = (self.state == LIQUID) & (self.dose >= self.scene.cure.dose * (1.0 - ROUNDING))
+        """Hold liquid particles that are cured or frozen; bodies without liquid are solid. Return whether any were."""
+        self.update()
+        cured = self.state == LIQUID
+        if self.heat:
+            cured[self.order] &= self.heat.is_frozen
+        else:
+            cured &= self.dose >= self.scene.cure.dose * (1.0 - ROUNDING)
         if not cured.any():
             return False
-        self.update()
         self.state[cured] = HELD
         for speed in self.fields[3:6]:
             speed[cured] = 0.0
@@ -222,7 +259,7 @@ class Deposit:
         if not is_liquid.all():
             last = int(self.drop[unsolid[~is_liquid[body]]].max(initial=0))
             self._add_body(CuredBody(*self.surface.take_out(~is_liquid[part]), last))
-        self.simulation = None
+        self.simulation = self.heat = None
         if is_liquid.any():
             self._begin()
         return True

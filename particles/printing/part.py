@@ -163,6 +163,7 @@ def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
         "height_mean": (float(field.mean()), "m"),
         "height_max": (float(part.heights.max()), "m"),
         "layer_rise_min": (float(np.diff([layer.height for layer in part.layers], prepend=0.0).min()), "m"),
+        "footprint": (float((part.heights > 0.0).mean() * np.ptp(part.x) * np.ptp(part.y)), "m^2"),
         "voids": (float(len(part.voids)), ""),
         "void_volume": (float(part.voids.sum()), "m^3"),
     }

@@ -2,6 +2,7 @@
 
 Time goes on in events. While liquid moves it is computed step by step; what has been followed for the settling time
 since the last drop landed, or does not move any more, rests until the next drop lands or a particle cures: no steps.
+What freezes is followed until it is solid.
 """
 
 from collections.abc import Callable, Mapping
@@ -144,6 +145,8 @@ def _shine(run: PrintRun) -> None:
 
 
 def _rests(run: PrintRun, simulation: Simulation, scene: Printing) -> bool:
+    if scene.freezes:
+        return False
     is_old = run.deposit.time - run.since >= scene.settling_time
     return is_old or simulation.kinetic_energy < REST * _unit_of_energy(scene)
 
@@ -170,7 +173,7 @@ def _picture(run: PrintRun, scene: Printing) -> None:
     deposit.update()
     velocity = np.stack(deposit.fields[3:6], axis=1)
     velocity[deposit.state != LIQUID] = 0.0
-    run.pictures.append(Picture(deposit.time, deposit.points, velocity, deposit.fields.pressure.copy()))
+    run.pictures.append(Picture(deposit.time, deposit.points, velocity, deposit.pressures))
 
 
 def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
@@ -178,13 +181,14 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
     deposit = run.deposit
     if not run.pictures or len(run.pictures[-1].points) < len(deposit.points):
         still = np.zeros_like(deposit.points)
-        run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.fields.pressure.copy()))
+        run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.pressures))
     part = part_of(scene, deposit)
     history: dict[str, Floats] = dict(zip(COLUMNS, np.array(run.rows).T, strict=True))
     meetings = deposit.surface.meetings
     metrics: Metrics = measure_part(scene, deposit, part) | {
         "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
         "splits": (float(sum(one.after > one.before for one in meetings)), ""),
+        "solid_after": (deposit.time - run.since, "s"),
         "motion_left": (run.left, ""),
         "weber": (scene.drop.weber_number, ""),
         "ohnesorge": (scene.drop.ohnesorge, ""),

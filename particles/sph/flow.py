@@ -12,7 +12,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import SphFlow
-from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
 from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Loops, Simulation
@@ -178,6 +178,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
         rest_density=scene.density,
         sound=scene.sound,
         diffusion=numerics.density_diffusion * length * scene.sound,
+        gradient=GRADIENTS[numerics.density_gradient],
         artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
         viscosity=scene.liquid_viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
         **shear_law(scene),

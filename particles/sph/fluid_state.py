@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 from reflowshock.arrays import Floats
 
+RENORMALISED, REPRODUCING = 0, 1
+GRADIENTS = {"renormalised": RENORMALISED, "reproducing": REPRODUCING}
+
 
 class Law(NamedTuple):
     """What acts between two particles; a term whose coefficient is zero is not computed.
@@ -20,6 +23,7 @@ class Law(NamedTuple):
         rest_density: rho_0 [kg/m^3].
         sound: speed of sound c0 [m/s].
         diffusion: delta h c0 [m^2/s].
+        gradient: `RENORMALISED` or `REPRODUCING`, that of the density in its diffusion.
         artificial: alpha h c0 rho_0 [Pa s].
         viscosity: mu [Pa s]; in the law of one that depends on the rate of shear, that of `Rheology`.
         rheology: `NEWTON`, `POWER_LAW` or `CARREAU`.
@@ -45,6 +49,7 @@ class Law(NamedTuple):
     rest_density: float
     sound: float
     diffusion: float
+    gradient: int
     artificial: float
     viscosity: float
     rheology: int

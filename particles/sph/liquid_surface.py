@@ -32,7 +32,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside, have_moved
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
-from reflowshock.particles.sph import surface_loops
+from reflowshock.particles.sph import grounds, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
@@ -125,7 +125,8 @@ class LiquidSurface:
         self._built_at, self._shares = saved["built_at"], saved["shares"]
         self.meetings, self.pressure = saved["meetings"], saved["pressure"]
         self._find_wetness()
-        self._list(self._built_at)
+        if len(self.points):
+            self._list(self._built_at)
 
     @property
     def volume(self) -> float:
@@ -154,17 +155,8 @@ class LiquidSurface:
         """Find what lies on the ground, none of it below."""
         if self.ground is None or not len(self.points):
             return
-        near = TOUCH * self.law.spacing
-        distance = self.ground.at(self.points, 1)
-        share = np.clip(2.0 - distance / near, 0.0, 1.0)
-        normals, close = np.zeros_like(self.points), share > 0.0
-        normals[close] = self.ground.gradient(self.points[close], 1)
-        normals[close] /= np.maximum(np.linalg.norm(normals[close], axis=1), 1e-300)[:, None]
-        away = (vertex_normals(self.points, self.triangles, len(self.points)) * normals).sum(axis=1) > 0.0
-        down = (distance < near) & ~away | (distance < 0.0)
-        self.points[down] -= distance[down, None] * normals[down]
-        share[away] = 0.0
-        self.wetness = share, normals
+        normals = vertex_normals(self.points, self.triangles, len(self.points))
+        self.wetness = grounds.settle(self.ground, self.points, normals, TOUCH * self.law.spacing)
 
     def add(self, points: Floats, triangles: Indices) -> None:
         """Add the surface of more liquid, apart from this one: `(k, 3)` [m], `(t, 3)`."""
@@ -187,7 +179,8 @@ class LiquidSurface:
     def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
         """Add the accelerations that it gives particles to rows 1 to 3 of their rates `(10, n)`, and itself to 7 to 9.
 
-        These, the gradient of concentration, are then zero beside it, too, where particles are spread evenly.
+        These, the gradient of concentration, are then zero beside it, too, where particles are spread evenly. Where
+        it stands on the ground its image counts, too, as that of the liquid does, for which particles of walls stand.
 
         Args:
             rates: of the liquid.
@@ -206,17 +199,22 @@ class LiquidSurface:
         self._shares = weights / np.repeat(level, np.diff(offsets))
         pushes, crowd = np.zeros((3, carriers)), np.zeros((3, carriers))
         surface_loops.share_out(self._lists, self._shares, self.forces(), pushes)
-        surface_loops.share_out(self._lists, weights, self._outward(), crowd)
+        outward = self._outward()
+        surface_loops.share_out(self._lists, weights, outward, crowd)
+        if self.ground is not None:
+            images, outward = grounds.reflected(self.ground, self.points, outward, SUPPORT * self.law.length)
+            surface_loops.find_weights(images, self._lists, fields, self.law, weights)
+            surface_loops.share_out(self._lists, weights, outward, crowd)
         fluids = rates.shape[1]
         rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
         rates[7:10] += crowd[:, :fluids]
 
     def _outward(self) -> Floats:
-        """Areas about the vertices times their outward normals `(m, 3)` [m^2], without what lies on the ground."""
+        """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
         area = volume_and_gradient(self.points, self.triangles, (), ())[1]
         for ring in self.rings:
             area[ring, 2] = 0.0
-        return area if self.ground is None else (1.0 - self.wetness[0])[:, None] * area
+        return area if self.ground is None else grounds.along(area, *self.wetness)
 
     def forces(self) -> Floats:
         """Forces -d(E - p V)/dx on the vertices `(m, 3)` [N], with the pressure that leaves none on the whole surface.
@@ -228,9 +226,8 @@ class LiquidSurface:
         self.pressure = self._balance(result)
         result += self.pressure * volume_and_gradient(self.points, self.triangles, (), ())[1]
         if wet is not None:
-            share, normals = self.wetness
             result += self.tension * self.cosine * area_gradient(self.points, self.triangles, wet)
-            result -= (share * (result * normals).sum(axis=1))[:, None] * normals
+            result = grounds.along(result, *self.wetness)
         for ring in self.rings:
             along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
             outward = 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
@@ -243,6 +240,8 @@ class LiquidSurface:
         area = self._outward()
         for ring in self.rings:
             area[ring] = 0.0
+        if self.ground is not None:
+            area *= 1.0 - self.wetness[0][:, None]
         square = float((area**2).sum())
         return -float((forces * area).sum()) / square if square else 0.0
 

@@ -4,15 +4,18 @@ The sum over a particle is the same whatever the number of threads. Indices are 
 from the end.
 """
 
-from math import floor, sqrt
+from math import floor, inf, sqrt
 
 from numba import njit, uint32
 
 from reflowshock.particles.sph import pair_terms
+from reflowshock.particles.sph.fluid_state import REPRODUCING
 from reflowshock.particles.sph.smoothing import shape, slope
 
 # Of the determinant of the matrix of moments, which is one inside the liquid: with less the gradient is not resolved.
 FEWEST_MOMENTS = 0.05
+# Of the matrix of the linear fit: with a larger condition number, or fewer neighbours, the slope is none (Shepard).
+LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
 compiled = njit(cache=True, error_model="numpy")
 # Sums may be taken in any order, so that several pairs are computed at a time; the order does not depend on threads.
 summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
@@ -106,7 +109,9 @@ def rates_of(i, fluids, neighbours, fields, law):
         wall = _by_walls(i, fluids, neighbours[liquid:], fields, law)
         rate, ax, ay, az = rate + wall[0], ax + wall[1], ay + wall[2], az + wall[3]
         cx, cy, cz = cx + wall[4], cy + wall[5], cz + wall[6]
-    if law.diffusion > 0.0:
+    if law.diffusion > 0.0 and law.gradient == REPRODUCING:
+        bx, by, bz = fitted_slope(i, neighbours[:liquid], fields, law)
+    elif law.diffusion > 0.0:
         bx, by, bz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
     else:
         bx = by = bz = 0.0
@@ -245,6 +250,60 @@ def solved(moments, sums, dimension):
         (ay * bx + by_y * by + by_z * bz) / determinant,
         (az * bx + by_z * by + bz_z * bz) / determinant,
     )
+
+
+@summed
+def fitted_slope(i, neighbours, fields, law):
+    """Return the slope (3) of the linear function that is next to the densities of a particle's neighbours [kg/m^4].
+
+    With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), whose first row is taken out of the
+    other three. It is zero where that is not resolved: the value is then that of Shepard.
+    """
+    x, y, z, density = fields.x[i], fields.y[i], fields.z[i], fields.density[i]
+    periods, inverse = periods_of(law), 1.0 / law.length
+    total = jumps = fx = fy = fz = bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
+    near = 0
+    for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
+        side = 1.0 - 2.0 * image
+        for n in range(len(neighbours)):
+            j = uint32(neighbours[n])
+            dx, dy, dz = apart((x, y, z), j, side, fields, periods)
+            level = shape(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            weight, jump = level * fields.mass[j] / fields.density[j], fields.density[j] - density
+            near += 1 if level > 0.0 else 0
+            dx, dy, dz = -dx * inverse, -dy * inverse, -dz * inverse
+            total, jumps = total + weight, jumps + weight * jump
+            fx, fy, fz = fx + weight * dx, fy + weight * dy, fz + weight * dz
+            bx, by, bz = bx + weight * jump * dx, by + weight * jump * dy, bz + weight * jump * dz
+            xx, yy, zz = xx + weight * dx * dx, yy + weight * dy * dy, zz + weight * dz * dz
+            xy, yz, xz = xy + weight * dx * dy, yz + weight * dy * dz, xz + weight * dx * dz
+    trace = (xx + yy + zz) / law.dimension
+    if near <= FEWEST_NEIGHBOURS or trace <= 0.0:
+        return 0.0, 0.0, 0.0
+    mean = jumps / total
+    bx, by, bz = (bx - mean * fx) / trace, (by - mean * fy) / trace, (bz - mean * fz) / trace
+    xx, yy, zz = (xx - fx * fx / total) / trace, (yy - fy * fy / total) / trace, (zz - fz * fz / total) / trace
+    xy, yz, xz = (xy - fx * fy / total) / trace, (yz - fy * fz / total) / trace, (xz - fx * fz / total) / trace
+    if condition_of((xx, yy, zz, xy, yz, xz), law.dimension) > LARGEST_CONDITION:
+        return 0.0, 0.0, 0.0
+    sx, sy, sz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
+    return sx * inverse, sy * inverse, sz * inverse
+
+
+@compiled
+def condition_of(moments, dimension):
+    """Return a bound of the condition number of a symmetric matrix, in a plane that of x and z; infinite if singular.
+
+    The largest eigenvalue is at most the trace, and the others than the least have at most half of it each.
+    """
+    xx, yy, zz, xy, yz, xz = moments
+    if dimension == 1:
+        return 1.0 if xx > 0.0 else inf
+    if dimension == 2:
+        determinant = xx * zz - xz * xz
+        return (xx + zz) ** 2 / determinant if determinant > 0.0 else inf
+    determinant = xx * (yy * zz - yz * yz) + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy)
+    return 0.25 * (xx + yy + zz) ** 3 / determinant if determinant > 0.0 else inf
 
 
 @summed

@@ -208,6 +208,14 @@ def test_drops_are_printed_from_case_file_to_report(tmp_path):
     assert {"part.stl", "height_map.png"} <= {path.name for path in (tmp_path / "run/particles").iterdir()}
 
 
+def test_a_drop_freezes_from_case_file_to_report(tmp_path):
+    ended = run("frozen_drop", tmp_path / "run", "scale=quick")
+    assert "report: " in ended.stdout, ended.stderr
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert {"solid_after", "footprint", "volume_error"} <= summary["metrics"].keys()
+    assert summary["effects"]["freezing"]["on"]
+
+
 @pytest.mark.parametrize(
     ("name", "settings", "metrics"),
     [

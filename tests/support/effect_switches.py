@@ -33,6 +33,7 @@ SOLDER = Solder(volume=1e-9, pad_contact_angle=np.radians(120.0))
 LENGTH, THICKNESS = 40e-3, 1e-3
 RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "inertia": False, "viscosity": False}
 RHEOLOGY = "tests/unit/particles/test_rheology.py"
+FREEZING = "tests/unit/particles/test_freezing.py"
 FLOWS, DROPLETS = (f"tests/verification/test_particles_{name}.py" for name in ("flows", "droplets"))
 # What needs a whole run is tested where there is one.
 ELSEWHERE_OFF = {
@@ -42,6 +43,7 @@ ELSEWHERE_OFF = {
     "shear_dependent_viscosity": f"{RHEOLOGY}::test_shear_dependence_acts_where_it_is_given_and_viscosity_acts",
     "droplet_tension": f"{DROPLETS}::test_effects_that_are_off_do_nothing",
     "droplet_gravity": f"{DROPLETS}::test_effects_that_are_off_do_nothing",
+    "freezing": f"{FREEZING}::test_light_cures_what_does_not_freeze",
 }
 ELSEWHERE_ON = {
     "flow_viscosity": f"{FLOWS}::test_viscosity_that_is_left_out_changes_nothing",
@@ -49,6 +51,7 @@ ELSEWHERE_ON = {
     "shear_dependent_viscosity": f"{RHEOLOGY}::test_an_exponent_of_one_computes_what_constant_viscosity_does",
     "droplet_tension": f"{DROPLETS}::test_little_tension_does_little",
     "droplet_gravity": f"{DROPLETS}::test_little_weight_does_little",
+    "freezing": f"{FREEZING}::test_little_freezing_does_little",
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
     "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
     "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",

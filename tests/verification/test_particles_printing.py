@@ -8,6 +8,7 @@ from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import SOLID, CuredBody, Deposit
 from reflowshock.particles.sph import flow
+from reflowshock.particles.surface.level_set import depths
 
 LAYERS = 5
 
@@ -62,6 +63,15 @@ def errors_on_slab(degrees, units):
 def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
     height, profile = errors_on_slab(90.0, 1.5)
     assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; without shares of walls 0.18 and 0.2
+
+
+def test_liquid_that_spreads_on_cured_ink_stays_within_its_surface():
+    scene, deposit, _ = on_slab(90.0)
+    while deposit.time < 0.5 * np.sqrt(scene.density * scene.length**3 / scene.surface_tension):
+        deposit.step(1.0)
+    deposit.update()
+    inside = depths(deposit.points[deposit.liquid], (deposit.surface.points, deposit.surface.triangles))
+    assert inside.min() > -0.2 * deposit.law.spacing  # before the surface had an image in cured ink: -0.7
 
 
 @pytest.mark.long

@@ -90,9 +90,37 @@ def of_printing(case: PrintingCase) -> list[Problem]:
         allowed = f">= {from_si(scene.length / scene.speed, 'us', digits=3)}, in which a drop goes its diameter"
         delay = from_si(scene.delay, "us", digits=3)
         found.append(Problem("printing.delay", "a drop would land in the one before", delay, allowed))
+    found += _of_freezing(scene)
     if numerics.device != "cpu":
         found.append(Problem("printing.numerics.device", "prints on the processor only", numerics.device, "cpu"))
     return found
+
+
+def _of_freezing(scene: Printing) -> list[Problem]:
+    """Find a plate that freezes nothing, drops that land frozen, light where drops freeze, and too short delays."""
+    freezing = scene.freezing
+    if freezing is None:
+        message, allowed = "no [printing.freezing] is given", "auto, off"
+        on = scene.effects.freezing == "on"
+        return [Problem("printing.effects.freezing", message, "on", allowed)] if on else []
+    melting = from_si(freezing.melting_point, "degC", digits=4)
+    if freezing.substrate_temperature >= freezing.melting_point:
+        value = from_si(freezing.substrate_temperature, "degC", digits=4)
+        allowed = f"< {melting}, the melting point"
+        return [Problem("printing.freezing.substrate_temperature", "freezes nothing", value, allowed)]
+    if freezing.temperature < freezing.melting_point:
+        value, allowed = from_si(freezing.temperature, "degC", digits=4), f">= {melting}, the melting point"
+        return [Problem("printing.freezing.temperature", "drops would land frozen", value, allowed)]
+    if not scene.freezes:
+        return []
+    if "cure" in scene.model_fields_set:
+        allowed = "printing.cure or printing.freezing; effects.freezing = off leaves the cure"
+        return [Problem("printing.cure", "drops freeze before light cures them", "given", allowed)]
+    if scene.drops > 1 and scene.delay < scene.cooling_time:
+        delay, least = (from_si(one, "us", digits=4) for one in (scene.delay, scene.cooling_time))
+        allowed = f">= {least}, in which a drop freezes and cools down to the plate"
+        return [Problem("printing.delay", "a drop would land on one that is still warm", delay, allowed)]
+    return []
 
 
 def of_droplet(case: DropletCase) -> list[Problem]:

@@ -128,11 +128,12 @@ def _add_droplet(table: Table, scene: Droplet) -> None:
 
 
 def _add_printing(table: Table, scene: Printing) -> None:
-    """Add what is printed, and how it cures."""
+    """Add what is printed, and how it cures or freezes."""
     pattern = f"{scene.columns} x {scene.rows} in {scene.layers} layer{'s' if scene.layers > 1 else ''}"
     table.add_row("drops", f"{scene.drops}", pattern)
     base = f"{scene.pitch / scene.base:.3g} times the width of a drop on the plate, {micrometres(scene.base)}"
     table.add_row("pitch", micrometres(scene.pitch), base)
     wet = "before the next drop lands" if scene.cure_time <= scene.delay else "after the next drop has landed"
-    table.add_row("cured after", short(scene.cure_time), wet)
-    table.add_row("followed", short(scene.followed), "of each drop; what is then liquid rests until it is cured")
+    table.add_row("frozen after" if scene.freezes else "cured after", short(scene.cure_time), wet)
+    rests = "until it is solid" if scene.freezes else "of each drop; what is then liquid rests until it is cured"
+    table.add_row("followed", short(scene.followed), rests)

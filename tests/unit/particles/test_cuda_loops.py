@@ -40,6 +40,7 @@ INK = {
     "speed": 5.0, "duration": 1e-5,
 }  # fmt: skip
 
+THINNED = {"particles_per_diameter": 8, "xsph": 0.5, "density_gradient": "reproducing"}
 THINNING = Rheology(law="carreau", exponent=0.5, shear_rate=1e5, viscosity_at_infinity=1e-3)
 
 
@@ -52,7 +53,7 @@ def small_impact() -> Simulation:
 
 
 def small_impact_of_carreau() -> Simulation:
-    ink = Droplet(**INK, rheology=THINNING, numerics=DropletNumerics(particles_per_diameter=8, xsph=0.5))
+    ink = Droplet(**INK, rheology=THINNING, numerics=DropletNumerics(**THINNED))
     return droplet(ink)
 
 

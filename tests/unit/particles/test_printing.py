@@ -39,11 +39,14 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     deposit = Deposit(scene)
     deposit.add_drop((0.0, 0.0))
     top = deposit.points[:, 2]
+    laplace = 4.0 * scene.surface_tension / scene.length
+    assert deposit.pressures.mean() == pytest.approx(laplace, rel=0.05)
     deposit.expose(deposit.cures_in())
     assert deposit.cure()
     held = deposit.state == HELD
     assert held.any() and (deposit.state == LIQUID).any()
     assert top[held].mean() > top[~held].mean()  # light comes from above
+    assert not deposit.pressures[held].any()
     before = deposit.points[held].copy()
     for _ in range(3):
         deposit.step(1.0)
@@ -52,7 +55,11 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     deposit.expose(1.0)
     assert deposit.cure()
     assert (deposit.state == SOLID).all() and deposit.simulation is None and len(deposit.bodies) == 1
-    deposit.add_drop((0.0, 0.0))
+    again = Deposit(scene)
+    again.restore(deposit.saved())  # where a run was killed while nothing was liquid
+    for one in (deposit, again):
+        one.add_drop((0.0, 0.0))
+    assert np.array_equal(again.points, deposit.points) and np.array_equal(again.dose, deposit.dose)
     below, above = deposit.points[deposit.drop == 0], deposit.points[deposit.drop == 1]
     gaps = np.linalg.norm(below[:, None] - above, axis=2)
     assert gaps.min() > scene.spacing

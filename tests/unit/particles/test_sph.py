@@ -14,7 +14,9 @@ from reflowshock.particles.reference.dam_break import MEASURED, measured_pressur
 from reflowshock.particles.scenes.dam_break import dam, second_rise, solve_dam_break
 from reflowshock.particles.scenes.flow_products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
-from reflowshock.particles.sph.particle_rates import rates_of, solved
+from reflowshock.particles.sph.flow import liquid_and_walls
+from reflowshock.particles.sph.fluid_state import REPRODUCING
+from reflowshock.particles.sph.particle_rates import condition_of, rates_of, solved
 from reflowshock.particles.sph.simulation import Rows, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
 
@@ -123,6 +125,41 @@ def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
         assert found[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
         assert abs(found[0]) < 1e-12 * law.sound / law.length
     assert solved((1e-3, 0.0, 1e-3, 0.0, 0.0, 0.0), (1.0, 0.0, 1.0), 2) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_reproducing_gradient_is_exact_for_linear_densities_at_surfaces_and_corners(dimension):
+    law = dam(small_dam()).law
+    length = 1.3 * law.spacing
+    law = law._replace(
+        dimension=dimension, length=length, norm=norm(law.kernel, dimension, length), gradient=REPRODUCING
+    )
+    depth = 6 if dimension == 3 else 1
+    lattice = np.stack(np.meshgrid(*(np.arange(count) for count in (6, depth, 6)), indexing="ij")).reshape(3, -1)
+    moved = np.random.default_rng(2).uniform(-0.2, 0.2, lattice.shape) * (np.array([1.0, depth > 1, 1.0])[:, None])
+    slopes = np.array([3.0, 5.0 if dimension == 3 else 0.0, -7.0])
+    fields = liquid_and_walls(law.spacing * (lattice + moved), np.empty((3, 0)), np.zeros(lattice.shape[1]), law)
+    fields.density[:] += slopes @ np.array(fields[:3])
+    rows = Rows(law, lattice.shape[1])
+    rows.update(np.stack(fields[:3], axis=1))
+    offsets, indices = rows.lists
+    for i in range(lattice.shape[1]):
+        found = rates_of(i, lattice.shape[1], indices[offsets[i] : offsets[i + 1]], fields, law)
+        assert found[4:7] == pytest.approx(tuple(slopes), abs=1e-9)
+    alone = rates_of(0, lattice.shape[1], indices[offsets[0] : offsets[0] + 3], fields, law)
+    assert alone[4:7] == (0.0, 0.0, 0.0)  # too few neighbours
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_condition_numbers_are_bounded(dimension):
+    for seed in range(20):
+        half = np.random.default_rng(seed).normal(size=(dimension, dimension))
+        axes, matrix = [0, 2] if dimension == 2 else [0, 1, 2], np.zeros((3, 3))
+        matrix[np.ix_(axes, axes)] = half @ half.T
+        moments = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[1, 2], matrix[0, 2])
+        exact = np.linalg.cond(half @ half.T)
+        assert exact <= condition_of(moments, dimension) * (1.0 + 1e-9) < 30.0 * exact
+    assert condition_of((1.0, 0.0, 0.0, 0.0, 0.0, 0.0), dimension) == np.inf
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])

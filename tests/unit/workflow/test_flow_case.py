@@ -12,6 +12,7 @@ from reflowshock.workflow.pipeline.reader import read_case
 CASES = Path(__file__).resolve().parents[3] / "cases"
 DAM, CHANNEL, VORTICES = (CASES / name / "case.toml" for name in ("dam_break", "poiseuille", "taylor_green"))
 PRINTING = CASES / "printing/case.toml"
+FROZEN = CASES / "frozen_drop/case.toml"
 FREE, CAP, IMPACT = (CASES / name / "case.toml" for name in ("young_laplace", "static_caps", "drop_impact"))
 CARREAU = ["droplet.rheology.law=carreau", "droplet.rheology.exponent=0.5", "droplet.rheology.shear_rate=1e5 1/s"]
 BAD_VALUES = {
@@ -50,6 +51,27 @@ BAD_VALUES = {
     "no pitch": (PRINTING, "printing.pitch=-1 um", ["printing.pitch", "> 0"]),
     "drops on each other": (PRINTING, "printing.pitch=2 um", ["printing.pitch", "on each other", ">= 5.75 um"]),
     "drops in each other": (PRINTING, "printing.delay=2 us", ["printing.delay", "in the one before", ">= 7.67 us"]),
+    "light on what freezes": (FROZEN, "printing.cure.dose=1 J/m^2", ["printing.cure", "drops freeze before", "off"]),
+    "a warm plate": (
+        FROZEN,
+        "printing.freezing.substrate_temperature=190 degC",
+        ["freezing.substrate_temperature", "190 degC", "freezes nothing", "< 183 degC"],
+    ),
+    "drops that land frozen": (
+        FROZEN,
+        "printing.freezing.temperature=100 degC",
+        ["freezing.temperature", ">= 183 degC"],
+    ),
+    "a drop on a warm one": (
+        FROZEN,
+        ["printing.layers=2", "printing.delay=200 us"],
+        ["printing.delay", "still warm", ">= 1377 us"],
+    ),
+    "freezing of nothing known": (
+        PRINTING,
+        "printing.effects.freezing=on",
+        ["effects.freezing", "no [printing.freezing]"],
+    ),
     "no order": (PRINTING, "printing.order=rastr", ["one of raster, serpentine, interleaved", "did you mean raster?"]),
     "a carreau bound": (
         IMPACT,
