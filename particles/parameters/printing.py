@@ -68,10 +68,15 @@ class Printing(SphFlow):
     delay: Annotated[float, Quantity("us")] = Field(gt=0)
     substrate_angle: Annotated[float, Quantity("deg")] = Field(0.0, ge=-pi / 4.0 - 1e-9, le=pi / 4.0 + 1e-9)
     gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
-    cure: Cure = Cure()
+    cure: Cure | None = None
     freezing: Freezing | None = None
     effects: PrintingEffects = PrintingEffects()
     numerics: PrintingNumerics = PrintingNumerics()
+
+    @property
+    def light(self) -> Cure:
+        """What cures drops that do not freeze."""
+        return self.cure or Cure()
 
     @property
     def drop(self) -> Droplet:
@@ -103,7 +108,7 @@ class Printing(SphFlow):
         """In which ink at the light cures, or in which a drop freezes, the mean over the layers [s]."""
         if self.freezes and self.freezing is not None:
             return self.freezing.time_for(self._height, self.density) / self.layers
-        return self.cure.dose / self.cure.intensity
+        return self.light.dose / self.light.intensity
 
     @property
     def share_frozen(self) -> float:

@@ -226,11 +226,11 @@ class Deposit:
     def cures_in(self) -> float:
         """Duration until the next liquid particle is cured if nothing moves [s]."""
         liquid = self.liquid
-        return float(((self.scene.cure.dose - self.dose[liquid]) / self._intensity(liquid)).min())
+        return float(((self.scene.light.dose - self.dose[liquid]) / self._intensity(liquid)).min())
 
     def _intensity(self, particles: Indices) -> Floats:
         """Light at particles [W/m^2]: it dies out below the highest particle about the vertical through them."""
-        cure = self.scene.cure
+        cure = self.scene.light
         if cure.depth is None:
             return np.full(len(particles), cure.intensity)
         points = self.points
@@ -245,7 +245,7 @@ class Deposit:
         if self.heat:
             cured[self.order] &= self.heat.is_frozen
         else:
-            cured &= self.dose >= self.scene.cure.dose * (1.0 - ROUNDING)
+            cured &= self.dose >= self.scene.light.dose * (1.0 - ROUNDING)
         if not cured.any():
             return False
         self.state[cured] = HELD

@@ -113,7 +113,7 @@ def _of_freezing(scene: Printing) -> list[Problem]:
         return [Problem("printing.freezing.temperature", "drops would land frozen", value, allowed)]
     if not scene.freezes:
         return []
-    if "cure" in scene.model_fields_set:
+    if scene.cure is not None:
         allowed = "printing.cure or printing.freezing; effects.freezing = off leaves the cure"
         return [Problem("printing.cure", "drops freeze before light cures them", "given", allowed)]
     if scene.drops > 1 and scene.delay < scene.cooling_time:
