@@ -115,7 +115,7 @@ def _flip_pass(points, triangles, on_ring, margin):
     """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips."""
     keys, order = _half_edges(triangles, points.shape[0])
     touched = np.zeros(triangles.shape[0], np.bool_)
-    flips = 0
+    made, flips = np.empty(triangles.shape[0], np.int64), 0
     for e in range(keys.shape[0] - 1):
         if keys[e] != keys[e + 1]:
             continue
@@ -128,13 +128,14 @@ def _flip_pass(points, triangles, on_ring, margin):
             continue
         new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
         found = np.searchsorted(keys, new_key)
-        if found < keys.shape[0] and keys[found] == new_key:
+        if (found < keys.shape[0] and keys[found] == new_key) or (made[:flips] == new_key).any():
             continue
         if _folds(points, (p, q, i, j)):
             continue
         triangles[s, 0], triangles[s, 1], triangles[s, 2] = p, i, q
         triangles[t, 0], triangles[t, 1], triangles[t, 2] = p, q, j
         touched[s] = touched[t] = True
+        made[flips] = new_key
         flips += 1
     return flips
 
