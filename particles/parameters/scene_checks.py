@@ -19,7 +19,8 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-ISPG_EDGES = (5, 11)
+ISPG_EDGES = (5, 15)
+ISPG_PAD_EDGE = 11
 ISPG_PAIR = 2000
 KEYS = {
     "solder.volume": "joint.volume",
@@ -69,6 +70,9 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
             ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
+        ),
+        f"{drop.count} particles along an edge on a pad (up to {ISPG_PAD_EDGE} it is)": (
+            drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
         ),
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])

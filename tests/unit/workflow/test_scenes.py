@@ -206,7 +206,7 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
         ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
-        ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
+        ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
@@ -251,6 +251,11 @@ def test_the_scheme_ispg_takes_few_particles_that_become_a_film_or_rest_on_a_pad
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", "drop.particles_per_edge=5"]
     case = BALL if "pad" in setting else DROP
     assert read_case(case, [*asked, setting]).molten.numerics.scheme == "ispg"
+
+
+def test_the_scheme_ispg_is_refused_for_finer_particles_on_a_pad():
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", "drop.pad_radius=0.3 mm"]
+    assert "on a pad (up to 11 it is)" in problems_of(BALL, *asked, "drop.particles_per_edge=12")
 
 
 def test_motion_that_matters_costs_all_steps_allowed():
