@@ -16,7 +16,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.past import GalerkinPast, total_losses
+from reflowshock.particles.ispg.past import GalerkinPast, centre, total_losses
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 
@@ -70,7 +70,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
     velocities = [part.physics.admit(part.body, carried(part.body.points, old, pasts)) for part in new]
     momenta = sum((past.momenta for past in pasts), np.zeros(6))
     velocities = _with_momenta(new, equations, velocities, momenta)
-    energy = 0.0
+    energy, behind = 0.0, _behind(old, pasts)
     for part, here, velocity in zip(new, equations, velocities, strict=True):
         part.body.velocity = velocity
         own, motions = part.physics.energy(part.body), rigid_motions(part.body.points)
@@ -80,6 +80,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
             kinetic=here.kinetic(velocity),
             momenta=rigid_momenta(motions, here.masses, velocity),
             volumes=here.space.carried,
+            centre=centre(part.body) + behind,
         )
         part.solver.first_energy = 0.0
         energy += own + here.kinetic(velocity)
@@ -90,6 +91,13 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
     losses = replace(losses, evening=losses.evening + evened, rebuilding=losses.rebuilding + before - energy)
     first.first_energy = sum(part.first_energy for part in old)
     first.past = replace(first.past, losses=losses) if first.past else None
+
+
+def _behind(old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:
+    """How far the centre of bodies is from where their momenta took it, `(3,)` [m]."""
+    volumes = np.array([part.body.volume()[0] for part in old])
+    ways = np.array([past.centre - centre(part.body) for part, past in zip(old, pasts, strict=True)])
+    return volumes @ ways / volumes.sum()
 
 
 def carried(points: Floats, old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:

@@ -23,6 +23,7 @@ from reflowshock.particles.scenes.metrics import Metrics, ledger, particle_press
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
+from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
 from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 from reflowshock.particles.surface.profile import Profile, fit_profile
@@ -88,7 +89,7 @@ def rebuild(*bodies: Body) -> Body:
     if any(_contact_lines_meet(body) for body in bodies):
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
-    result = Body.at_rest(cloud_from_level_set(union, volume, walls))
+    result = Body.at_rest(cloud_from_level_set(without_slits(union), volume, walls))
     moments = [body_moments(body) for body in bodies]
     centre = np.sum([moment[1] for moment in moments], axis=0) / sum(moment[0] for moment in moments)
     _put_centre(result, walls, centre)

@@ -1,6 +1,7 @@
 """Gaps in a liquid's surface, and the surface that closes them: liquids that meet become one."""
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -8,6 +9,7 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface, signed_distance
 
+BLUNTINGS = 4
 # Cosine of the angle between the normals of vertices that face each other, at most.
 FACING = -0.5
 
@@ -41,6 +43,20 @@ def closed_level(level: LevelSet, gap: float) -> LevelSet:
     wider = signed_distance(*extract_surface(LevelSet(level.grid, level.values - 0.5 * gap)), level.grid)
     least = np.minimum if gap > 0.0 else np.maximum
     return LevelSet(level.grid, least(level.values, wider.values + 0.5 * gap))
+
+
+def without_slits(level: LevelSet) -> LevelSet:
+    """Return a level set whose net is a surface: slits and grooves narrower than its cells are blunted.
+
+    Two sheets that cross the same cells share vertices and edges there. A Gaussian as wide as a cell parts or closes
+    them; where there are none nothing changes.
+    """
+    for _ in range(BLUNTINGS):
+        edges = np.sort(np.concatenate([extract_surface(level)[1][:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+        if np.unique(edges, axis=0, return_counts=True)[1].max(initial=0) <= 2:
+            break
+        level = LevelSet(level.grid, gaussian_filter(level.values, 1.0))
+    return level
 
 
 def part_of_vertex(triangles: Indices, count: int) -> Indices:

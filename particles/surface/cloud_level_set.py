@@ -83,7 +83,7 @@ def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
     there, back = edges @ (size, 1), edges @ (1, size)
     outer = edges[~np.isin(there, back)].tolist()
     after = dict(outer)
-    if len(after) < len(outer):
+    if len(after) < len(outer) or set(after) != set(after.values()):
         raise CannotRebuild("contact lines of a new surface meet in a point: too coarse for its shape")
     loops = []
     while after:

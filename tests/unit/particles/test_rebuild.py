@@ -6,8 +6,16 @@ from reflowshock.particles.core.cloud import box_cloud, joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
+from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
-from reflowshock.particles.surface.level_set import Grid, extract_surface, relax, signed_distance, smooth_union
+from reflowshock.particles.surface.level_set import (
+    Grid,
+    LevelSet,
+    extract_surface,
+    relax,
+    signed_distance,
+    smooth_union,
+)
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
 R = 0.5e-3
@@ -130,6 +138,24 @@ def test_bodies_that_cannot_rebuild():
         rebuild(joint, joint)
     with pytest.raises(CannotRebuild, match="free, or on the same walls"):
         rebuild(sphere_body(0.2 * R), Body.at_rest(box_cloud(1e-3, 5)))
+
+
+def test_a_groove_narrower_than_a_cell_is_blunted_and_a_smooth_net_stays():
+    """Two bars that touch along an edge: both of their nets have the vertices of its cells."""
+    grid = Grid.around(np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), 0.1)
+    x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
+    x, y = x - 0.03, y - 0.03
+    bars = -np.sign(x * y) * np.minimum(np.abs(x), np.abs(y))
+    grooved = LevelSet(grid, np.maximum(bars, np.max([np.abs(x), np.abs(y), np.abs(z)], axis=0) - 0.4))
+
+    def most(level):
+        edges = np.sort(np.concatenate([extract_surface(level)[1][:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+        return np.unique(edges, axis=0, return_counts=True)[1].max()
+
+    assert most(grooved) > 2
+    assert most(without_slits(grooved)) == 2
+    smooth = ball(grid, (0, 0, 0), 0.4)
+    assert without_slits(smooth) is smooth
 
 
 def test_a_collapsed_surface_is_made_even_again():
