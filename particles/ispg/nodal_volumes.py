@@ -78,7 +78,22 @@ def nodal_volumes(body: Body, density: Floats) -> Floats:
     # Products of two directions stand for two entries of x x.
     entries = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
-    factors = np.zeros(len(wanted))
+    return fitted_volumes(found, powers, wanted, softness)
+
+
+def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floats) -> Floats:
+    """Volumes v exp(q) of n particles `(n,)` with k moments, q a polynomial.
+
+    Args:
+        found: v, `(n,)` [m^3]; they add up to the volume of the body.
+        powers: `(n, k)` monomials at the particles, without unit, the first one is 1.
+        wanted: `(k,)` their integrals over the body [m^3].
+        softness: `(k,)` of them [m^3], 0 where they are exact.
+
+    Raises:
+        NoVolumes: there are none.
+    """
+    factors, volume = np.zeros(len(wanted)), wanted[0]
     for _ in range(NEWTON_STEPS):
         missing = wanted - powers.T @ found - softness * factors
         if np.abs(missing).max() < TOLERANCE * volume:

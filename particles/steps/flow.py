@@ -19,8 +19,11 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
 from reflowshock.particles.steps.interior_shift import interior_shift
+from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
 from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
+from reflowshock.particles.surface.profile import Profile, fit_profile
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 SKIN = 0.2
 FLIP_INTERVAL = 2
@@ -107,7 +110,7 @@ class LiquidFlow:
         before = body.points[: body.cloud.surface_count].copy()
         motion, flips = self._descend()
         self.neighbours.update(body.points)
-        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours)
+        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours, self.outward())
         self.steps += 1
         self.time += self.time_step.size
         self.pace = (body.points[: len(before)] - before) / self.time_step.size
@@ -115,6 +118,19 @@ class LiquidFlow:
         # Where momentum is kept, the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
+
+    def outward(self) -> Floats:
+        """Unit normals out of the liquid at the vertices of the surface `(s, 3)`."""
+        return vertex_normals(self.body.points, self.body.triangles, self.body.cloud.surface_count)
+
+    def profile(self) -> Profile:
+        """Cross-sections of the surface against their height."""
+        body = self.body
+        return fit_profile(body.points, body.triangles, body.span(), body.cloud.parts)
+
+    def snapshot(self) -> Snapshot:
+        """Particles and surface as they are."""
+        return Snapshot(self.time, self.body.points.copy(), self.body.triangles.copy())
 
     def _descend(self) -> tuple[Motion, int]:
         """Move so that the energy does not rise; return the motion and the number of flips."""

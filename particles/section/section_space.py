@@ -1,0 +1,233 @@
+"""Space of the Galerkin scheme in section: as `ispg/galerkin.py`, with matrices, and the strain of hoops about an axis.
+
+Linear MLS in x and z, the wall and the axis mirrored. Around the axis a velocity v_x stretches hoops by N v_x / x; on the
+axis that is dv_x/dx.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.ispg.galerkin import REACHES, check_stencils, symmetry_planes
+from reflowshock.particles.ispg.collocation import Ghosts, mirror
+from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
+from reflowshock.particles.section.section import Section
+
+# Support radius in spacings; but the 7th neighbour lies within 1 / 1.2 of it.
+SUPPORT, FEWEST, WIDER = 2.0, 7, 1.2
+# Of a spacing: hoops that are smaller stretch by dv_x/dx.
+SMALLEST_HOOP = 1e-6
+Matrix = sparse.csr_matrix
+
+
+@dataclass(frozen=True, slots=True)
+class SectionSpace:
+    """Operators at n particles; velocities `(n, 3)` have no component along y.
+
+    Attributes:
+        volumes: `(n,)` of the particles as points of integration [m^3].
+        scalar: `(n, n)` values of what is even at the walls.
+        values: `(3 n, 3 n)` velocity N v, by particle.
+        slopes: `(9 n, 3 n)` its gradient [1/m].
+        rates: `(n, 3 n)` its divergence [1/m].
+    """
+
+    volumes: Floats
+    scalar: Matrix
+    values: Matrix
+    slopes: Matrix
+    rates: Matrix
+
+    @classmethod
+    def of(cls, body: Section) -> "SectionSpace":
+        """Fit the shape functions at the particles of a body, on walls with free slip.
+
+        Raises:
+            DegenerateStencil: a particle has too few neighbours, or they lie on a line.
+            NoVolumes: the particles do not fill the body.
+        """
+        count, spacing = len(body.points), body.cloud.spacing
+        for reach in REACHES:
+            ghosts = mirror(body.points, (*body.plates, *symmetry_planes(body.cloud)), reach * spacing)
+            points = np.concatenate((body.points, ghosts.points))
+            pairs = _Pairs.within(points, count, reach * spacing, spacing)
+            if (pairs.supports > 0.0).all():
+                break
+        check_stencils(body, pairs.supports > 0.0, f"has fewer than {FEWEST} neighbours within {REACHES[-1]} spacings")
+        weights, density, is_sound = pairs.shape_functions(cell_share(body)[np.concatenate((np.arange(count), ghosts.source))])
+        check_stencils(body, is_sound, "has all its neighbours on a line")
+        shape, by_x, by_z = (
+            sparse.csr_matrix((weight, pairs.columns, pairs.starts), shape=(count, len(points))) for weight in weights
+        )
+        even, (along_x, along_z) = ghosts.even(count), (_images(ghosts, count, axis) for axis in (0, 2))
+        parts = {
+            (0, 0): by_x @ along_x,
+            (0, 2): by_z @ along_x,
+            (2, 0): by_x @ along_z,
+            (2, 2): by_z @ along_z,
+        }
+        if body.chain.power:
+            parts[1, 1] = _hoops(body, shape @ along_x, parts[0, 0])
+        slopes = sum(_placed(part, (3 * c + d, 9), (0 if c == 1 else c, 3)) for (c, d), part in parts.items())
+        values = _placed(shape @ along_x, (0, 3), (0, 3)) + _placed(shape @ along_z, (2, 3), (2, 3))
+        trace = sparse.kron(sparse.identity(count), np.eye(3).ravel()[None, :], format="csr")
+        return cls(section_volumes(body, density), (shape @ even).tocsr(), values.tocsr(), slopes.tocsr(), (trace @ slopes).tocsr())
+
+    def averages(self, coefficients: Floats) -> Floats:
+        """Values at the particles `(n,)` of a scalar that is even at the walls."""
+        return self.scalar @ coefficients
+
+    def rough(self, field: Floats) -> Floats:
+        """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
+        return field - (self.values @ field.ravel()).reshape(-1, 3)
+
+    def gradient(self, field: Floats) -> Floats:
+        """Gradient of a velocity `(n, 3, 3)` [1/s], that of hoops in the middle."""
+        return (self.slopes @ field.ravel()).reshape(-1, 3, 3)
+
+    def resistance(self, field: Floats, factors: Floats) -> Floats:
+        """Forces `(n, 3)` [N] that resist a velocity, as `Galerkin.resistance`."""
+        smoothing, drag, viscosity = factors.T
+        values, gradient = (self.values @ field.ravel()).reshape(-1, 3), self.gradient(field)
+        rough = smoothing[:, None] * (field - values)
+        stress = viscosity[:, None, None] * (gradient + gradient.transpose(0, 2, 1))
+        on_values = drag[:, None] * values - rough
+        return rough + (self.values.T @ on_values.ravel() + self.slopes.T @ stress.ravel()).reshape(-1, 3)
+
+    def divergence(self, field: Floats) -> Floats:
+        """Divergence of a velocity at the particles `(n,)` [1/s]."""
+        return self.rates @ field.ravel()
+
+    def divergence_load(self, factor: Floats) -> Floats:
+        """The transposed of `divergence`: forces on the particles `(n, 3)` [N] of factors `(n,)` [N m]."""
+        return (self.rates.T @ factor).reshape(-1, 3)
+
+    def divergence_rows(self) -> Matrix:
+        """Rows of `divergence` as a matrix `(n, 3 n)`, velocities by particle."""
+        return self.rates
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Pairs of a particle and a point within its support, itself included, rows one after the other.
+
+    Attributes:
+        points: `(n + g, 3)` particles and images [m].
+        supports: `(n,)` radius [m], 0 where the search did not reach far enough.
+        starts, columns: rows of the pairs.
+    """
+
+    points: Floats
+    supports: Floats
+    starts: NDArray[np.int64]
+    columns: NDArray[np.int32]
+
+    @classmethod
+    def within(cls, points: Floats, count: int, reach: float, spacing: float) -> "_Pairs":
+        """Find them among the points that a search of some reach [m] finds."""
+        offsets, found = find_neighbours(points, reach, rows=count)
+        rows = np.repeat(np.arange(count), np.diff(offsets))
+        distances = np.linalg.norm(points[found] - points[rows], axis=1)
+        nearest = np.lexsort((distances, rows))
+        enough = np.diff(offsets) >= FEWEST
+        last = np.where(enough, offsets[:-1] + FEWEST - 1, 0)
+        supports = np.maximum(SUPPORT * spacing, WIDER * distances[nearest][last])
+        supports[~enough | (supports > reach)] = 0.0
+        kept = distances < supports[rows]
+        rows = np.concatenate((np.arange(count), rows[kept]))
+        columns = np.concatenate((np.arange(count), found[kept]))
+        order = np.argsort(rows, kind="stable")
+        starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=count))))
+        return cls(points, supports, starts, columns[order].astype(np.int32))
+
+    def shape_functions(self, shares: Floats) -> tuple[tuple[Floats, ...], Floats, NDArray[np.bool_]]:
+        """Weights of psi, psi,x and psi,z of all pairs; density of particles [1/m^2], and which stencils are sound.
+
+        The density counts each point by its share `(n + g,)`, without a constant factor. As in `galerkin_kernels`.
+        """
+        rows = np.repeat(np.arange(len(self.supports)), np.diff(self.starts))
+        support, first = self.supports[rows], self.starts[:-1]
+        offset = (self.points[self.columns] - self.points[rows])[:, [0, 2]] / support[:, None]
+        basis = np.column_stack((np.ones(len(rows)), offset))
+        rest = 1.0 - (offset**2).sum(axis=1)
+        weight, slope = rest**3, 6.0 * rest[:, None] ** 2 * offset
+        products = basis[:, :, None] * basis[:, None, :]
+        moments = np.add.reduceat(weight[:, None, None] * products, first)
+        sound = np.linalg.cond(moments) < 1.0 / ROUNDING
+        moments[~sound] = np.eye(3)
+        by = [np.add.reduceat(slope[:, c, None, None] * products, first) for c in range(2)]
+        unit = np.eye(3)
+        found = np.linalg.solve(moments, np.broadcast_to(unit[:, :1], (len(first), 3, 1)))
+        slopes = [np.linalg.solve(moments, unit[:, 1 + c : 2 + c] - by[c] @ found) for c in range(2)]
+        values = (basis * found[rows, :, 0]).sum(axis=1)
+        along = [
+            ((basis * slopes[c][rows, :, 0]).sum(axis=1) * rest + 6.0 * values * offset[:, c]) * rest**2 / support
+            for c in range(2)
+        ]
+        density = np.add.reduceat(shares[self.columns] * weight, first) / self.supports**2
+        return (values * weight, *along), density, sound
+
+
+# Condition of the moments of a stencil: neighbours on a line have none.
+ROUNDING = 1e-10
+
+
+def _images(ghosts: Ghosts, count: int, axis: int) -> Matrix:
+    """Extension of a velocity's component along x or z by its images, `(n + g, n)`: plates are level, the axis upright."""
+    values = np.concatenate((np.ones(count), ghosts.reflection[:, axis, axis]))
+    columns = np.concatenate((np.arange(count), ghosts.source))
+    return sparse.csr_matrix((values, columns, np.arange(len(columns) + 1)), shape=(len(columns), count))
+
+
+def _hoops(body: Section, values: Matrix, slopes: Matrix) -> Matrix:
+    """Strain rate of hoops about the axis of velocities along x, `(n, n)` [1/m]."""
+    radius = body.points[:, 0]
+    on_axis = radius <= SMALLEST_HOOP * body.cloud.spacing
+    inverse = np.where(on_axis, 0.0, 1.0 / np.where(on_axis, 1.0, radius))
+    return sparse.diags(inverse) @ values + sparse.diags(on_axis.astype(float)) @ slopes
+
+
+def _placed(part: Matrix, row: tuple[int, int], column: tuple[int, int]) -> Matrix:
+    """A matrix `(n, n)` as one entry of each block: which entry along rows and columns, and of how many."""
+    unit = sparse.csr_matrix(([1.0], ([row[0]], [column[0]])), shape=(row[1], column[1]))
+    return sparse.kron(part, unit, format="csr")
+
+
+def section_volumes(body: Section, density: Floats) -> Floats:
+    """Volumes of the particles `(n,)` [m^3] with the moments of the body: of 1, x and z, and nearly of second order.
+
+    About an axis those of x and x z are zero for the whole body.
+
+    Args:
+        body: the liquid body.
+        density: `(n,)` of particles around each, walls mirrored, the free surface counted by `cell_share`.
+
+    Raises:
+        NoVolumes: there are none.
+    """
+    chain, volume = body.chain, body.volume()[0]
+    areas = cell_share(body) ** 2 / density * np.where(body.cloud.wall >= 0, 0.5, 1.0)
+    found = areas * _mean_radius(body) if chain.power else areas
+    length = np.sqrt(volume) if not chain.power else np.cbrt(volume)
+    exponents = [(0, 1), (2, 0), (0, 2)] if chain.power else [(1, 0), (0, 1), (2, 0), (0, 2), (1, 1)]
+    centre = np.array([chain.integral(body.line, *one)[0] / volume for one in ((1, 0), (0, 1))])
+    if chain.power:
+        centre[0] = 0.0
+    line = (body.line - np.array([centre[0], 0.0, centre[1]])) / length
+    x, _, z = ((body.points - np.array([centre[0], 0.0, centre[1]])) / length).T
+    powers = np.column_stack([np.ones(len(x)), *(x**p * z**q for p, q in exponents)])
+    scale = length ** (2 + chain.power)
+    wanted = np.array([volume, *(scale * chain.integral(line, p, q)[0] for p, q in exponents)])
+    entries = np.array([np.inf, *(np.inf if p + q < 2 else 1.0 + (p == q) for p, q in exponents)])
+    softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
+    return fitted_volumes(found * (volume / found.sum()), powers, wanted, softness)
+
+
+def _mean_radius(body: Section) -> Floats:
+    """Mean distance from the axis over the part of each particle's cell, a spacing wide, on this side of it `(n,)` [m]."""
+    radius, half = body.points[:, 0], 0.5 * body.cloud.spacing
+    return np.where(radius < half, (radius + half) ** 2 / (4.0 * half), radius)
