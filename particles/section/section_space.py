@@ -13,7 +13,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.ispg.galerkin import REACHES, check_stencils, symmetry_planes
-from reflowshock.particles.ispg.collocation import Ghosts, mirror
+from reflowshock.particles.ispg.collocation import mirror
 from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
 from reflowshock.particles.section.section import Section
 
@@ -31,16 +31,16 @@ class SectionSpace:
     Attributes:
         volumes: `(n,)` of the particles as points of integration [m^3].
         scalar: `(n, n)` values of what is even at the walls.
-        values: `(3 n, 3 n)` velocity N v, by particle.
-        slopes: `(9 n, 3 n)` its gradient [1/m].
-        rates: `(n, 3 n)` its divergence [1/m].
+        values: `(3 n, 3 n)` velocity N v, by particle; and the transposed.
+        slopes: `(9 n, 3 n)` its gradient [1/m]; and the transposed.
+        rates: `(n, 3 n)` its divergence [1/m]; and the transposed.
     """
 
     volumes: Floats
     scalar: Matrix
-    values: Matrix
-    slopes: Matrix
-    rates: Matrix
+    values: tuple[Matrix, Matrix]
+    slopes: tuple[Matrix, Matrix]
+    rates: tuple[Matrix, Matrix]
 
     @classmethod
     def of(cls, body: Section) -> "SectionSpace":
@@ -58,24 +58,32 @@ class SectionSpace:
             if (pairs.supports > 0.0).all():
                 break
         check_stencils(body, pairs.supports > 0.0, f"has fewer than {FEWEST} neighbours within {REACHES[-1]} spacings")
-        weights, density, is_sound = pairs.shape_functions(cell_share(body)[np.concatenate((np.arange(count), ghosts.source))])
+        source = np.concatenate((np.arange(count), ghosts.source))
+        weights, density, is_sound = pairs.shape_functions(cell_share(body)[source])
         check_stencils(body, is_sound, "has all its neighbours on a line")
-        shape, by_x, by_z = (
-            sparse.csr_matrix((weight, pairs.columns, pairs.starts), shape=(count, len(points))) for weight in weights
-        )
-        even, (along_x, along_z) = ghosts.even(count), (_images(ghosts, count, axis) for axis in (0, 2))
-        parts = {
-            (0, 0): by_x @ along_x,
-            (0, 2): by_z @ along_x,
-            (2, 0): by_x @ along_z,
-            (2, 2): by_z @ along_z,
-        }
+        rows, columns = pairs.rows, source[pairs.columns]
+        # Plates are level and the axis is upright: images have each component with a factor of its own.
+        reflection = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), ghosts.reflection))[pairs.columns]
+        entries: dict[tuple[int, int], Floats] = {}
+        for c in (0, 2):
+            for d, weight in zip((0, 2), weights[1:], strict=True):
+                entries[c, d] = weight * reflection[:, c, c]
+        values = {c: weights[0] * reflection[:, c, c] for c in (0, 2)}
         if body.chain.power:
-            parts[1, 1] = _hoops(body, shape @ along_x, parts[0, 0])
-        slopes = sum(_placed(part, (3 * c + d, 9), (0 if c == 1 else c, 3)) for (c, d), part in parts.items())
-        values = _placed(shape @ along_x, (0, 3), (0, 3)) + _placed(shape @ along_z, (2, 3), (2, 3))
-        trace = sparse.kron(sparse.identity(count), np.eye(3).ravel()[None, :], format="csr")
-        return cls(section_volumes(body, density), (shape @ even).tocsr(), values.tocsr(), slopes.tocsr(), (trace @ slopes).tocsr())
+            entries[1, 1] = _hoops(body, rows, values[0], entries[0, 0])
+        moving = {(c, d): 0 if c == 1 else c for c, d in entries}
+
+        def matrix(parts: list[tuple[Floats, NDArray, NDArray]], size: int, width: int) -> Matrix:
+            data, at, of = (np.concatenate(part) for part in zip(*parts, strict=True))
+            return sparse.csr_matrix((data, (at, of)), shape=(size * count, width * count))
+
+        slopes = matrix([(w, 9 * rows + 3 * c + d, 3 * columns + moving[c, d]) for (c, d), w in entries.items()], 9, 3)
+        shown = matrix([(w, 3 * rows + c, 3 * columns + c) for c, w in values.items()], 3, 3)
+        traces = [(w, rows, 3 * columns + moving[c, d]) for (c, d), w in entries.items() if c == d]
+        rates = matrix(traces, 1, 3)
+        scalar = matrix([(weights[0], rows, columns)], 1, 1)
+        pairs_of = [(one, one.T.tocsr()) for one in (shown, slopes, rates)]
+        return cls(section_volumes(body, density), scalar, *pairs_of)
 
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
@@ -83,32 +91,32 @@ class SectionSpace:
 
     def rough(self, field: Floats) -> Floats:
         """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
-        return field - (self.values @ field.ravel()).reshape(-1, 3)
+        return field - (self.values[0] @ field.ravel()).reshape(-1, 3)
 
     def gradient(self, field: Floats) -> Floats:
         """Gradient of a velocity `(n, 3, 3)` [1/s], that of hoops in the middle."""
-        return (self.slopes @ field.ravel()).reshape(-1, 3, 3)
+        return (self.slopes[0] @ field.ravel()).reshape(-1, 3, 3)
 
     def resistance(self, field: Floats, factors: Floats) -> Floats:
         """Forces `(n, 3)` [N] that resist a velocity, as `Galerkin.resistance`."""
         smoothing, drag, viscosity = factors.T
-        values, gradient = (self.values @ field.ravel()).reshape(-1, 3), self.gradient(field)
-        rough = smoothing[:, None] * (field - values)
+        rough, gradient = self.rough(field), self.gradient(field)
+        friction = smoothing[:, None] * rough
         stress = viscosity[:, None, None] * (gradient + gradient.transpose(0, 2, 1))
-        on_values = drag[:, None] * values - rough
-        return rough + (self.values.T @ on_values.ravel() + self.slopes.T @ stress.ravel()).reshape(-1, 3)
+        on_values = drag[:, None] * (field - rough) - friction
+        return friction + (self.values[1] @ on_values.ravel() + self.slopes[1] @ stress.ravel()).reshape(-1, 3)
 
     def divergence(self, field: Floats) -> Floats:
         """Divergence of a velocity at the particles `(n,)` [1/s]."""
-        return self.rates @ field.ravel()
+        return self.rates[0] @ field.ravel()
 
     def divergence_load(self, factor: Floats) -> Floats:
         """The transposed of `divergence`: forces on the particles `(n, 3)` [N] of factors `(n,)` [N m]."""
-        return (self.rates.T @ factor).reshape(-1, 3)
+        return (self.rates[1] @ factor).reshape(-1, 3)
 
     def divergence_rows(self) -> Matrix:
         """Rows of `divergence` as a matrix `(n, 3 n)`, velocities by particle."""
-        return self.rates
+        return self.rates[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +126,14 @@ class _Pairs:
     Attributes:
         points: `(n + g, 3)` particles and images [m].
         supports: `(n,)` radius [m], 0 where the search did not reach far enough.
-        starts, columns: rows of the pairs.
+        rows, starts, columns: of the pairs.
     """
 
     points: Floats
     supports: Floats
+    rows: NDArray[np.int64]
     starts: NDArray[np.int64]
-    columns: NDArray[np.int32]
+    columns: NDArray[np.int64]
 
     @classmethod
     def within(cls, points: Floats, count: int, reach: float, spacing: float) -> "_Pairs":
@@ -142,15 +151,14 @@ class _Pairs:
         columns = np.concatenate((np.arange(count), found[kept]))
         order = np.argsort(rows, kind="stable")
         starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=count))))
-        return cls(points, supports, starts, columns[order].astype(np.int32))
+        return cls(points, supports, rows[order], starts, columns[order])
 
     def shape_functions(self, shares: Floats) -> tuple[tuple[Floats, ...], Floats, NDArray[np.bool_]]:
         """Weights of psi, psi,x and psi,z of all pairs; density of particles [1/m^2], and which stencils are sound.
 
         The density counts each point by its share `(n + g,)`, without a constant factor. As in `galerkin_kernels`.
         """
-        rows = np.repeat(np.arange(len(self.supports)), np.diff(self.starts))
-        support, first = self.supports[rows], self.starts[:-1]
+        rows, support, first = self.rows, self.supports[self.rows], self.starts[:-1]
         offset = (self.points[self.columns] - self.points[rows])[:, [0, 2]] / support[:, None]
         basis = np.column_stack((np.ones(len(rows)), offset))
         rest = 1.0 - (offset**2).sum(axis=1)
@@ -176,25 +184,11 @@ class _Pairs:
 ROUNDING = 1e-10
 
 
-def _images(ghosts: Ghosts, count: int, axis: int) -> Matrix:
-    """Extension of a velocity's component along x or z by its images, `(n + g, n)`: plates are level, the axis upright."""
-    values = np.concatenate((np.ones(count), ghosts.reflection[:, axis, axis]))
-    columns = np.concatenate((np.arange(count), ghosts.source))
-    return sparse.csr_matrix((values, columns, np.arange(len(columns) + 1)), shape=(len(columns), count))
-
-
-def _hoops(body: Section, values: Matrix, slopes: Matrix) -> Matrix:
-    """Strain rate of hoops about the axis of velocities along x, `(n, n)` [1/m]."""
-    radius = body.points[:, 0]
+def _hoops(body: Section, rows: NDArray, values: Floats, slopes: Floats) -> Floats:
+    """Weights of the strain rate of hoops about the axis, of pairs with weights of N v_x and of d N v_x / dx."""
+    radius = body.points[rows, 0]
     on_axis = radius <= SMALLEST_HOOP * body.cloud.spacing
-    inverse = np.where(on_axis, 0.0, 1.0 / np.where(on_axis, 1.0, radius))
-    return sparse.diags(inverse) @ values + sparse.diags(on_axis.astype(float)) @ slopes
-
-
-def _placed(part: Matrix, row: tuple[int, int], column: tuple[int, int]) -> Matrix:
-    """A matrix `(n, n)` as one entry of each block: which entry along rows and columns, and of how many."""
-    unit = sparse.csr_matrix(([1.0], ([row[0]], [column[0]])), shape=(row[1], column[1]))
-    return sparse.kron(part, unit, format="csr")
+    return np.where(on_axis, slopes, values / np.where(on_axis, 1.0, radius))
 
 
 def section_volumes(body: Section, density: Floats) -> Floats:
