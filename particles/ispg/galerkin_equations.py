@@ -134,26 +134,31 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, basis, across = self.space, self.basis, self.basis.T
-        divergence, inverse = self.constraint(start), self.time_step * self._inverse_masses()
-
-        def accelerated(pressure: Floats) -> Floats:
-            return (basis @ (inverse * (across @ self.push(pressure).ravel()))).reshape(-1, 3)
-
-        def matrix() -> sparse.csr_matrix:
-            rows = (sparse.diags(space.volumes) @ space.divergence_rows() @ basis).tocsr()
-            return (rows @ sparse.diags(inverse) @ rows.T).tocsr()
-
+        space, divergence = self.space, self.constraint(start)
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
         potential = factors.solve(
-            lambda pressure: self.constraint(accelerated(pressure)),
-            matrix,
+            lambda pressure: self.constraint(self.accelerated(pressure)),
+            self.pressure_matrix,
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
         change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + accelerated(potential), change
+        return start + self.accelerated(potential), change
+
+    def pulled(self, start: Floats, _end: Floats) -> Floats:
+        """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
+        return start
+
+    def accelerated(self, pressure: Floats) -> Floats:
+        """Change of the velocity in a step under a pressure `(n,)` [Pa], dt m^-1 B^T p."""
+        moved = self.time_step * self._inverse_masses() * (self.basis.T @ self.push(pressure).ravel())
+        return (self.basis @ moved).reshape(-1, 3)
+
+    def pressure_matrix(self) -> sparse.csr_matrix:
+        """Rates of volume under such changes, `(n, n)` [m^3/(s Pa)], but for what nodal integration misses."""
+        rows = (sparse.diags(self.space.volumes) @ self.space.divergence_rows() @ self.basis).tocsr()
+        return (rows @ sparse.diags(self.time_step * self._inverse_masses()) @ rows.T).tocsr()
 
     def _inverse_masses(self) -> Floats:
         """One over the mass of the particle of each admissible velocity, `(d,)` [1/kg]."""
@@ -171,8 +176,12 @@ class GalerkinEquations:
         """
         rigid = self.rigid
         moving = (rigid @ self.momentum(field).ravel()) @ rigid
-        pull = self.stiffness @ (field - moving.reshape(-1, 3))
+        pull = self.pull(field - moving.reshape(-1, 3))
         return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
+
+    def pull(self, field: Floats) -> Floats:
+        """gamma K x of a displacement, `(n, 3)`."""
+        return self.stiffness @ field
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""

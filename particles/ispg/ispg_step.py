@@ -168,7 +168,7 @@ class PreparedIspgStep:
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(start)
+        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta

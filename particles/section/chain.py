@@ -80,15 +80,25 @@ class Chain:
         wider[:, 0] = 0.5 * self.power * self.factor * length
         return float(mean @ length), self._sum(wider - pull, wider + pull)
 
-    def stiffness(self, line: Floats, size: int) -> sparse.csr_matrix:
-        """Stiffness K of the surface Laplacian, `(size, size)`: of velocities that are the same around the axis."""
+    def stiffness(self, line: Floats, count: int) -> sparse.csr_matrix:
+        """Stiffness K of the surface Laplacian, velocities of the first s of n particles, `(3 n, 3 n)` by particle.
+
+        About the axis hoops of the surface resist, too: x of each vertex with the length around it over its radius.
+        """
         first, second = self.ends(line)
-        weight = self._mean(first, second) / np.linalg.norm(second - first, axis=1)
-        i = np.arange(len(weight))
+        length = np.linalg.norm(second - first, axis=1)
+        weight = np.repeat(self._mean(first, second) / length, 2)
+        i = np.arange(len(length))
         j = (i + 1) % len(line)
+        i, j = ((3 * one[:, None] + [0, 2]).ravel() for one in (i, j))
         rows, columns = np.concatenate((i, j, i, j)), np.concatenate((j, i, i, j))
         values = np.concatenate((-weight, -weight, weight, weight))
-        return sparse.csr_matrix((values, (rows, columns)), shape=(size, size))
+        if self.power:
+            off_axis = np.flatnonzero(line[:, 0] > 0.0)
+            around = self._sum(0.5 * length, 0.5 * length)[off_axis]
+            rows, columns = (np.concatenate((one, 3 * off_axis)) for one in (rows, columns))
+            values = np.concatenate((values, self.factor * around / line[off_axis, 0]))
+        return sparse.csr_matrix((values, (rows, columns)), shape=(3 * count, 3 * count))
 
     def wetted(self, line: Floats) -> tuple[float, Floats]:
         """Area of the wall z = 0 under the liquid, and its gradient by the vertices `(s, 3)`."""
@@ -113,12 +123,16 @@ class Chain:
         normal = np.column_stack((along[:, 2], np.zeros(len(line)), -along[:, 0]))
         return normal / np.linalg.norm(normal, axis=1)[:, None]
 
-    def evening(self, line: Floats) -> Floats:
-        """Displacements `(s, 3)` of vertices along their chord towards the middle of their neighbours; ends stay."""
+    def evening(self, line: Floats, share: float) -> Floats:
+        """Displacements `(s, 3)` of vertices by a share of the way to the middle of their neighbours; ends stay.
+
+        Along the parabola through the three: they stay on a smooth surface to third order.
+        """
         before, after = np.roll(line, 1, axis=0), np.roll(line, -1, axis=0)
-        along = after - before
-        along /= np.linalg.norm(along, axis=1)[:, None]
-        offset = ((0.5 * (before + after) - line) * along).sum(axis=1)[:, None] * along
+        back, ahead = line - before, after - line
+        a, b = (np.linalg.norm(one, axis=1)[:, None] for one in (back, ahead))
+        way = 0.5 * share * (b - a)
+        offset = way * (back / a + (way + a) / (a + b) * (ahead / b - back / a))
         if not self.is_closed:
             offset[[0, -1]] = 0.0
         return offset

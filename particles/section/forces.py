@@ -24,7 +24,7 @@ class ChainTension:
         return -self.coefficient * body.on_particles(body.chain.area(body.line)[1])
 
     def stiffness(self, body: Section) -> sparse.csr_matrix:
-        """Stiffness gamma K of the surface, `(n, n)` [N/m]."""
+        """Stiffness gamma K of the surface, `(3 n, 3 n)` by particle [N/m]."""
         return self.coefficient * body.chain.stiffness(body.line, len(body.points))
 
 
