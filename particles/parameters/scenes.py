@@ -63,6 +63,8 @@ class Drop(Parameters):
     angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
+    With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as its radius,
+    which is the edge then.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -74,6 +76,7 @@ class Drop(Parameters):
     spacing: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
+    section: Literal["none", "axisymmetric"] = "none"
 
     @property
     def symmetry_axes(self) -> tuple[int, ...]:
@@ -83,17 +86,19 @@ class Drop(Parameters):
     @property
     def particles(self) -> int:
         """Number of particles of the cube, or of the part of it that is computed."""
+        if self.section != "none":
+            return self.count**2
         cuts = len(self.symmetry_axes)
         return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
 
     @property
     def edge(self) -> float:
-        """Edge of the cube that the drop starts as [m]."""
-        return self.volume ** (1.0 / 3.0)
+        """Edge of the cube that the drop starts as, in section the radius of the cylinder [m]."""
+        return (self.volume if self.section == "none" else self.volume / pi) ** (1.0 / 3.0)
 
     @property
     def count(self) -> int:
-        """Particles along an edge of the cube."""
+        """Particles along an edge of the cube, in section along the radius of the cylinder."""
         if self.spacing is not None:
             return max(2, 1 + round(self.edge / self.spacing))
         return self.particles_per_edge or DEFAULT_PER_EDGE

@@ -6,14 +6,12 @@ import numpy as np
 from scipy import sparse
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.physics.forces import Gravity, SurfaceTension
 from reflowshock.particles.section.section import Section
 
 
-@dataclass(frozen=True, slots=True)
-class ChainTension:
-    """Energy gamma A of the surface; gamma in [N/m]."""
-
-    coefficient: float
+class ChainTension(SurfaceTension):
+    """Energy gamma A of the surface."""
 
     def energy(self, body: Section) -> float:
         """Surface energy [J]."""
@@ -28,14 +26,11 @@ class ChainTension:
         return self.coefficient * body.chain.stiffness(body.line, len(body.points))
 
 
-@dataclass(frozen=True, slots=True)
-class ChainWeight:
-    """Potential energy of the weight; rho g in [N/m^3]."""
-
-    weight: float
+class ChainWeight(Gravity):
+    """Potential energy of the weight, zero at the height of the origin."""
 
     def energy(self, body: Section) -> float:
-        """Potential energy [J], zero at the height of the origin."""
+        """Potential energy [J]."""
         return self.weight * body.chain.integral(body.line, 0, 1)[0]
 
     def force(self, body: Section) -> Floats:

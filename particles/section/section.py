@@ -15,6 +15,8 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.section.chain import Chain
 
 NO_TRIANGLES = np.zeros((0, 3), np.int32)
+NARROW = 1e-3  # [rad]
+MERIDIANS = 64  # around the axis, of the triangles that a body is shown with
 
 
 @dataclass(slots=True)
@@ -50,6 +52,65 @@ class Section(Body):
         volume, gradient = self.chain.integral(self.line, 0, 0)
         return volume, self.on_particles(gradient)
 
+    def whole(self) -> Body:
+        """The body with triangles: a meridian turned about its axis, a plane as a sheet of a unit depth without ends.
+
+        The particles below the surface stay in the section.
+        """
+        if self.chain.power:
+            return self.swept(turns(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
+        sheets = np.broadcast_to(np.eye(3), (2, 3, 3))
+        return self.swept((sheets, np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])), is_closed=False)
+
+    def narrow(self) -> Body:
+        """The surface between two meridians so close that triangles are as exact as the chain."""
+        return self.swept(turns(np.array([0.0, NARROW])), is_closed=False)
+
+    def swept(self, places: tuple[Floats, Floats], is_closed: bool) -> Body:
+        """The surface between copies of the chain, one after the other in the sense of y.
+
+        Args:
+            places: rotation `(m, 3, 3)` and translation `(m, 3)` [m] of each copy.
+            is_closed: whether the first copy follows the last.
+        """
+        rotations, shifts = places
+        chain, count, copies = self.chain, self.cloud.surface_count, len(rotations)
+        single = (self.line[:, 0] == 0.0) & bool(chain.power)
+        number = np.cumsum(np.where(single, 1, copies))[:, None] - np.where(single, 1, copies)[:, None]
+        number = number + np.where(single[:, None], 0, np.arange(copies))
+        along = np.arange(count) if chain.is_closed else np.arange(count - 1)
+        around = np.arange(copies) if is_closed else np.arange(copies - 1)
+        k, j = (grid.ravel() for grid in np.meshgrid(along, around, indexing="ij"))
+        after, beside = (k + 1) % count, (j + 1) % copies
+        a, b, c, d = number[k, j], number[k, beside], number[after, beside], number[after, j]
+        triangles = np.concatenate((np.column_stack((a, b, c)), np.column_stack((a, c, d)))).astype(np.int32)
+        triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+
+        def copied(field: Floats, moves: Floats) -> Floats:
+            turned = np.einsum("mcd,kd->kmc", rotations, field[:count]) + moves
+            surface = np.zeros((int(number.max()) + 1, 3))
+            surface[number] = turned
+            return np.concatenate((surface, field[count:]))
+
+        points = copied(self.points, shifts)
+        pressure = np.concatenate((np.zeros(len(points) - len(self.points) + count), self.pressure[count:]))
+        pressure[number] = self.pressure[:count, None]
+        wall = np.full(len(points), -1, np.int8)
+        wall[len(points) - len(self.points) + count :] = self.cloud.wall[count:]
+        rings = (number[0].astype(np.int32),) if self.plates else ()
+        wall[np.concatenate([*rings, NO_TRIANGLES[:, 0]])] = 0
+        first = int(number.max()) + 1
+        cloud = Cloud(points, first, triangles, rings, self.plates, wall, self.cloud.spacing)
+        velocity, volumes = copied(self.velocity, np.zeros_like(shifts)), np.zeros(len(points))
+        return Body(cloud, points, velocity, pressure, self.surface_pressure, triangles, volumes, self.plates)
+
+
+def turns(angles: Floats) -> tuple[Floats, Floats]:
+    """Rotations about the z axis by angles `(m,)` [rad], and no translations."""
+    cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
+    rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, none + 1.0]]
+    return np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3))
+
 
 def block(chain: Chain, height: float, count: int) -> Cloud:
     """A lattice on the wall z = 0, as high as it is wide from its middle.
@@ -71,7 +132,8 @@ def block(chain: Chain, height: float, count: int) -> Cloud:
     points = np.column_stack((lattice[:, 0], np.zeros(len(lattice)), lattice[:, 1])) * (height / last)
     wall = np.where(lattice[:, 1] == 0, 0, -1).astype(np.int8)
     axes = (0,) if chain.power else ()
-    return Cloud(points, len(surface), NO_TRIANGLES, (), (Plate.horizontal(0.0),), wall, height / last, axes)
+    contact = np.array([0] if chain.power else [0, len(surface) - 1], np.int32)
+    return Cloud(points, len(surface), NO_TRIANGLES, (contact,), (Plate.horizontal(0.0),), wall, height / last, axes)
 
 
 def disc(chain: Chain, radius: float, rings: int) -> Cloud:

@@ -6,6 +6,7 @@ as in space.
 
 from dataclasses import dataclass
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 from scipy import sparse
@@ -19,12 +20,14 @@ from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep, SMO
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_motions
 from reflowshock.particles.physics.operators import Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.section.chain import Chain
 from reflowshock.particles.section.forces import ChainTension
 from reflowshock.particles.section.section import Section
 from reflowshock.particles.section.section_space import SectionSpace
 from reflowshock.particles.steps.descent import Evening, correct_volume
-from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow
 from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.surface.profile import Profile, fit_areas
 from reflowshock.particles.surface.surface_quality import SMOOTHING as EVENING
 
 
@@ -147,6 +150,12 @@ class SectionFlow(LiquidFlow):
     """A liquid body that flows in section."""
 
     body: Section
+    records: ClassVar[tuple[type, ...]] = (*FLOW_RECORDS, Section, Chain)
+
+    def profile(self) -> Profile:
+        """Cross-sections of the body against their height."""
+        body = self.body
+        return fit_areas(lambda heights: body.chain.areas(body.line, heights), *body.span())
 
     def outward(self) -> Floats:
         """Unit normals of the chain `(s, 3)`."""

@@ -7,7 +7,7 @@ ends each step with no more energy than it had (`descent`).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -59,7 +59,13 @@ class StepRecord:
 
 
 class LiquidFlow:
-    """A liquid body that flows under its physics."""
+    """A liquid body that flows under its physics.
+
+    Attributes:
+        records: what a saved one consists of.
+    """
+
+    records: ClassVar[tuple[type, ...]] = FLOW_RECORDS
 
     def __init__(self, body: Body, physics: Physics, time_step: TimeStep, solver: StepSolver) -> None:
         """Set up the neighbour list of the solver and remember the volume to keep.
@@ -130,7 +136,8 @@ class LiquidFlow:
 
     def snapshot(self) -> Snapshot:
         """Particles and surface as they are."""
-        return Snapshot(self.time, self.body.points.copy(), self.body.triangles.copy())
+        body = self.body.whole()
+        return Snapshot(self.time, body.points.copy(), body.triangles.copy())
 
     def _descend(self) -> tuple[Motion, int]:
         """Move so that the energy does not rise; return the motion and the number of flips."""

@@ -149,7 +149,7 @@ def run_to_rest(
 
 def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, checkpoint: Checkpoint | None) -> Run:
     """Start a run, or continue that of the checkpoint, whose state the flow takes over."""
-    saved = None if checkpoint is None else checkpoint.read(RECORDS)
+    saved = None if checkpoint is None else checkpoint.read((*flow.records, Snapshot))
     if saved is not None:
         flow.restore(saved["flow"])
         return Run.restored(saved["run"])
