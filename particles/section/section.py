@@ -115,20 +115,22 @@ def turns(angles: Floats) -> tuple[Floats, Floats]:
 def block(chain: Chain, height: float, count: int) -> Cloud:
     """A lattice on the wall z = 0, as high as it is wide from its middle.
 
+    Below the surface none lie on the axis, the first are half a spacing away: each particle has a pressure that keeps
+    its volume, and on the axis one velocity only, so that a column of them locks.
+
     Args:
         chain: of a meridian, where only the part x >= 0 is filled, or of an open plane.
         height: [m].
         count: particles along the height.
     """
     last = count - 1
-    columns = np.arange(0 if chain.power else -last, last + 1)
-    x, z = (grid.ravel() for grid in np.meshgrid(columns, np.arange(count), indexing="ij"))
+    columns = np.linspace(0.5, last - 1.0, last - 1) if chain.power else np.arange(1.0 - last, last)
+    x, z = (grid.ravel() for grid in np.meshgrid(columns, np.arange(last), indexing="ij"))
     up = [(last, level) for level in range(count)]
-    over = [(column, last) for column in columns[-2::-1]]
+    over = [(column, last) for column in range(last - 1, (-1 if chain.power else -last - 1), -1)]
     down = [] if chain.power else [(-last, level) for level in range(last - 1, -1, -1)]
     surface = np.array(up + over + down)
-    inside = (z < last) & (x < last) & (x > (-1 if chain.power else -last))
-    lattice = np.concatenate((surface, np.column_stack((x, z))[inside]))
+    lattice = np.concatenate((surface, np.column_stack((x, z))))
     points = np.column_stack((lattice[:, 0], np.zeros(len(lattice)), lattice[:, 1])) * (height / last)
     wall = np.where(lattice[:, 1] == 0, 0, -1).astype(np.int8)
     axes = (0,) if chain.power else ()
@@ -137,7 +139,7 @@ def block(chain: Chain, height: float, count: int) -> Cloud:
 
 
 def disc(chain: Chain, radius: float, rings: int) -> Cloud:
-    """Circles about a particle at the origin, half circles of a meridian; no wall touches it.
+    """Circles about a particle at the origin, half circles of a meridian, as in `block`; no wall touches it.
 
     Args:
         chain: of a meridian or of a closed plane.
@@ -147,12 +149,16 @@ def disc(chain: Chain, radius: float, rings: int) -> Cloud:
     shells = []
     for ring in range(rings, 0, -1):
         arcs = max(2, round(np.pi * ring))
-        turn = np.pi * (np.arange(arcs + 1) / arcs - 0.5) if chain.power else np.pi * np.arange(2 * arcs) / arcs
-        circle = np.column_stack((np.cos(turn), np.zeros(len(turn)), np.sin(turn))) * (radius * ring / rings)
+        turn = np.pi * np.arange(2 * arcs) / arcs
         if chain.power:
-            circle[[0, -1], 0] = 0.0
+            turn = np.pi * ((np.arange(arcs + 1) if ring == rings else np.arange(arcs) + 0.5) / arcs - 0.5)
+        circle = np.column_stack((np.cos(turn), np.zeros(len(turn)), np.sin(turn))) * (radius * ring / rings)
         shells.append(circle)
-    points = np.concatenate([*shells, np.zeros((1, 3))])
+    if chain.power:
+        shells[0][[0, -1], 0] = 0.0
+    else:
+        shells.append(np.zeros((1, 3)))
+    points = np.concatenate(shells)
     wall = np.full(len(points), -1, np.int8)
     axes = (0,) if chain.power else ()
     return Cloud(points, len(shells[0]), NO_TRIANGLES, (), (), wall, radius / rings, axes)

@@ -19,6 +19,8 @@ from reflowshock.particles.section.section import Section
 
 # Support radius in spacings; but the 7th neighbour lies within 1 / 1.2 of it.
 SUPPORT, FEWEST, WIDER = 2.0, 7, 1.2
+# Mean square of the offsets across a stencil, over its support, below which it is too thin; 0.1 where points are even.
+THIN, ROUNDING = 0.005, 1e-10
 # Of a spacing: hoops that are smaller stretch by dv_x/dx.
 SMALLEST_HOOP = 1e-6
 Matrix = sparse.csr_matrix
@@ -51,16 +53,19 @@ class SectionSpace:
             NoVolumes: the particles do not fill the body.
         """
         count, spacing = len(body.points), body.cloud.spacing
-        for reach in REACHES:
-            ghosts = mirror(body.points, (*body.plates, *symmetry_planes(body.cloud)), reach * spacing)
-            points = np.concatenate((body.points, ghosts.points))
-            pairs = _Pairs.within(points, count, reach * spacing, spacing)
-            if (pairs.supports > 0.0).all():
+        least = np.full(count, SUPPORT * spacing)
+        for reach in spacing * np.array(REACHES):
+            ghosts = mirror(body.points, (*body.plates, *symmetry_planes(body.cloud)), reach)
+            pairs = _Pairs.within(np.concatenate((body.points, ghosts.points)), least, reach)
+            has_enough, across = pairs.supports > 0.0, pairs.across()
+            is_thin = has_enough & (across < THIN)
+            if (has_enough & ~is_thin).all():
                 break
-        check_stencils(body, pairs.supports > 0.0, f"has fewer than {FEWEST} neighbours within {REACHES[-1]} spacings")
+            least[is_thin] = reach
+        check_stencils(body, has_enough, f"has fewer than {FEWEST} neighbours within {REACHES[-1]} spacings")
+        check_stencils(body, across > ROUNDING, "has all its neighbours on a line")
         source = np.concatenate((np.arange(count), ghosts.source))
-        weights, density, is_sound = pairs.shape_functions(cell_share(body)[source])
-        check_stencils(body, is_sound, "has all its neighbours on a line")
+        weights, density = pairs.shape_functions(cell_share(body)[source])
         rows, columns = pairs.rows, source[pairs.columns]
         # Plates are level and the axis is upright: images have each component with a factor of its own.
         reflection = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), ghosts.reflection))[pairs.columns]
@@ -136,15 +141,16 @@ class _Pairs:
     columns: NDArray[np.int64]
 
     @classmethod
-    def within(cls, points: Floats, count: int, reach: float, spacing: float) -> "_Pairs":
-        """Find them among the points that a search of some reach [m] finds."""
+    def within(cls, points: Floats, least: Floats, reach: float) -> "_Pairs":
+        """Find them, with supports of at least `(n,)` [m], among the points that a search of some reach [m] finds."""
+        count = len(least)
         offsets, found = find_neighbours(points, reach, rows=count)
         rows = np.repeat(np.arange(count), np.diff(offsets))
         distances = np.linalg.norm(points[found] - points[rows], axis=1)
         nearest = np.lexsort((distances, rows))
         enough = np.diff(offsets) >= FEWEST
         last = np.where(enough, offsets[:-1] + FEWEST - 1, 0)
-        supports = np.maximum(SUPPORT * spacing, WIDER * distances[nearest][last])
+        supports = np.maximum(least, WIDER * distances[nearest][last])
         supports[~enough | (supports > reach)] = 0.0
         kept = distances < supports[rows]
         rows = np.concatenate((np.arange(count), rows[kept]))
@@ -153,20 +159,31 @@ class _Pairs:
         starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=count))))
         return cls(points, supports, rows[order], starts, columns[order])
 
-    def shape_functions(self, shares: Floats) -> tuple[tuple[Floats, ...], Floats, NDArray[np.bool_]]:
-        """Weights of psi, psi,x and psi,z of all pairs; density of particles [1/m^2], and which stencils are sound.
+    @property
+    def offset(self) -> Floats:
+        """From the particles to the points, over the support, `(k, 2)`."""
+        support = np.where(self.supports > 0.0, self.supports, 1.0)[self.rows]
+        return (self.points[self.columns] - self.points[self.rows])[:, [0, 2]] / support[:, None]
 
-        The density counts each point by its share `(n + g,)`, without a constant factor. As in `galerkin_kernels`.
+    def across(self) -> Floats:
+        """Mean square of the offsets in the direction in which the points of a row spread least `(n,)`."""
+        offset = self.offset
+        weight = (1.0 - (offset**2).sum(axis=1)) ** 3
+        spread = np.add.reduceat(weight[:, None, None] * offset[:, :, None] * offset[:, None, :], self.starts[:-1])
+        return np.linalg.eigvalsh(spread)[:, 0] / np.add.reduceat(weight, self.starts[:-1])
+
+    def shape_functions(self, shares: Floats) -> tuple[tuple[Floats, ...], Floats]:
+        """Weights of psi, psi,x and psi,z of all pairs, and density of particles [1/m^2]. As in `galerkin_kernels`.
+
+        The density counts each point by its share `(n + g,)`, without a constant factor.
         """
         rows, support, first = self.rows, self.supports[self.rows], self.starts[:-1]
-        offset = (self.points[self.columns] - self.points[rows])[:, [0, 2]] / support[:, None]
+        offset = self.offset
         basis = np.column_stack((np.ones(len(rows)), offset))
         rest = 1.0 - (offset**2).sum(axis=1)
         weight, slope = rest**3, 6.0 * rest[:, None] ** 2 * offset
         products = basis[:, :, None] * basis[:, None, :]
         moments = np.add.reduceat(weight[:, None, None] * products, first)
-        sound = np.linalg.cond(moments) < 1.0 / ROUNDING
-        moments[~sound] = np.eye(3)
         by = [np.add.reduceat(slope[:, c, None, None] * products, first) for c in range(2)]
         unit = np.eye(3)
         found = np.linalg.solve(moments, np.broadcast_to(unit[:, :1], (len(first), 3, 1)))
@@ -177,11 +194,7 @@ class _Pairs:
             for c in range(2)
         ]
         density = np.add.reduceat(shares[self.columns] * weight, first) / self.supports**2
-        return (values * weight, *along), density, sound
-
-
-# Condition of the moments of a stencil: neighbours on a line have none.
-ROUNDING = 1e-10
+        return (values * weight, *along), density
 
 
 def _hoops(body: Section, rows: NDArray, values: Floats, slopes: Floats) -> Floats:
