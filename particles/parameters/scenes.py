@@ -63,8 +63,7 @@ class Drop(Parameters):
     angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
-    With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as its radius,
-    which is the edge then.
+    With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as the cube.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -87,18 +86,18 @@ class Drop(Parameters):
     def particles(self) -> int:
         """Number of particles of the cube, or of the part of it that is computed."""
         if self.section != "none":
-            return self.count**2
+            return self.count * (1 + round((self.count - 1) / pi**0.5))
         cuts = len(self.symmetry_axes)
         return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
 
     @property
     def edge(self) -> float:
-        """Edge of the cube that the drop starts as, in section the radius of the cylinder [m]."""
-        return (self.volume if self.section == "none" else self.volume / pi) ** (1.0 / 3.0)
+        """Edge of the cube that the drop starts as [m]."""
+        return self.volume ** (1.0 / 3.0)
 
     @property
     def count(self) -> int:
-        """Particles along an edge of the cube, in section along the radius of the cylinder."""
+        """Particles along an edge of the cube."""
         if self.spacing is not None:
             return max(2, 1 + round(self.edge / self.spacing))
         return self.particles_per_edge or DEFAULT_PER_EDGE

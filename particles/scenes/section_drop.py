@@ -1,10 +1,12 @@
 """A drop on a uniform wall computed in section, by the scheme ispg: half a meridian of a body of revolution.
 
-It starts as a cylinder as high as its radius. What acts on it is what acts on a body, with the forces of a chain in the
+It starts as a cylinder as high as the cube that other drops start as. What acts on it is what acts on a body, with the forces of a chain in the
 place of those of triangles.
 """
 
 from dataclasses import replace
+
+import numpy as np
 
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
@@ -21,7 +23,7 @@ from reflowshock.particles.steps.time_step import TimeStep, largest_step
 def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> SectionFlow:
     """Set up the flow of a drop's meridian from rest, with only the effects that are on."""
     chain = Chain.meridian()
-    body = Section.filled(block(chain, drop.edge, drop.count), chain)
+    body = Section.filled(block(chain, drop.edge / np.sqrt(np.pi), drop.edge, drop.count), chain)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
     return SectionFlow(body, section_physics(solder, effects), time_step, SectionStep())

@@ -112,30 +112,33 @@ def turns(angles: Floats) -> tuple[Floats, Floats]:
     return np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3))
 
 
-def block(chain: Chain, height: float, count: int) -> Cloud:
-    """A lattice on the wall z = 0, as high as it is wide from its middle.
+def block(chain: Chain, width: float, height: float, count: int) -> Cloud:
+    """A lattice on the wall z = 0.
 
     Below the surface none lie on the axis, the first are half a spacing away: each particle has a pressure that keeps
     its volume, and on the axis one velocity only, so that a column of them locks.
 
     Args:
         chain: of a meridian, where only the part x >= 0 is filled, or of an open plane.
+        width: from the middle to the sides [m].
         height: [m].
         count: particles along the height.
     """
     last = count - 1
-    columns = np.linspace(0.5, last - 1.0, last - 1) if chain.power else np.arange(1.0 - last, last)
+    across = max(3, round(width / height * last))
+    columns = np.linspace(0.5, across - 1.0, across - 1) if chain.power else np.arange(1.0 - across, across)
     x, z = (grid.ravel() for grid in np.meshgrid(columns, np.arange(last), indexing="ij"))
-    up = [(last, level) for level in range(count)]
-    over = [(column, last) for column in range(last - 1, (-1 if chain.power else -last - 1), -1)]
-    down = [] if chain.power else [(-last, level) for level in range(last - 1, -1, -1)]
+    up = [(across, level) for level in range(count)]
+    over = [(column, last) for column in range(across - 1, (-1 if chain.power else -across - 1), -1)]
+    down = [] if chain.power else [(-across, level) for level in range(last - 1, -1, -1)]
     surface = np.array(up + over + down)
     lattice = np.concatenate((surface, np.column_stack((x, z))))
-    points = np.column_stack((lattice[:, 0], np.zeros(len(lattice)), lattice[:, 1])) * (height / last)
+    points = np.column_stack((lattice[:, 0] * (width / across), np.zeros(len(lattice)), lattice[:, 1] * (height / last)))
     wall = np.where(lattice[:, 1] == 0, 0, -1).astype(np.int8)
-    axes = (0,) if chain.power else ()
     contact = np.array([0] if chain.power else [0, len(surface) - 1], np.int32)
-    return Cloud(points, len(surface), NO_TRIANGLES, (contact,), (Plate.horizontal(0.0),), wall, height / last, axes)
+    axes = (0,) if chain.power else ()
+    walls = ((contact,), (Plate.horizontal(0.0),))
+    return Cloud(points, len(surface), NO_TRIANGLES, *walls, wall, height / last, axes)
 
 
 def disc(chain: Chain, radius: float, rings: int) -> Cloud:

@@ -42,7 +42,7 @@ SCHEMES = {
     "ISPG": {"solder.numerics.scheme": "ispg", "solder.effects.inertia": "on"},
 }
 SCHEME_EDGES = (5, 7, 9)  # particles per edge
-SECTION_EDGES = (8, 11, 15, 21)  # along the radius
+SECTION_EDGES = (8, 11, 15, 21)
 GRIPC = MOVING | {
     "solder.numerics.scheme": "gripc",
     "solder.numerics.time_step_limit": "0.5",
