@@ -18,17 +18,38 @@ that do.
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
+
+
+class Space(Protocol):
+    """Shape functions and volumes at n particles; `Galerkin` says what its operators are."""
+
+    @property
+    def volumes(self) -> Floats: ...  # noqa: D102
+
+    def averages(self, coefficients: Floats) -> Floats: ...  # noqa: D102
+
+    def rough(self, field: Floats) -> Floats: ...  # noqa: D102
+
+    def gradient(self, field: Floats) -> Floats: ...  # noqa: D102
+
+    def resistance(self, field: Floats, factors: Floats) -> Floats: ...  # noqa: D102
+
+    def divergence(self, field: Floats) -> Floats: ...  # noqa: D102
+
+    def divergence_load(self, factor: Floats) -> Floats: ...  # noqa: D102
+
+    def divergence_rows(self) -> sparse.csr_matrix: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +91,7 @@ class GalerkinEquations:
         time_step: [s].
     """
 
-    space: Galerkin
+    space: Space
     fluid: Flow
     basis: sparse.csr_matrix
     stiffness: sparse.csr_matrix
@@ -180,7 +201,7 @@ class GalerkinEquations:
         return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
 
     def pull(self, field: Floats) -> Floats:
-        """gamma K x of a displacement, `(n, 3)`."""
+        """Pull gamma K x of a displacement, `(n, 3)`."""
         return self.stiffness @ field
 
     def constraint(self, field: Floats) -> Floats:

@@ -222,17 +222,23 @@ class PreparedIspgStep:
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
 
+    def fluid(self, spacing: float) -> Flow:
+        """What the liquid is made of, of particles at a spacing [m]."""
+        parts = self.physics.operators
+        density = sum(part.density for part in parts if isinstance(part, Mass))
+        viscosity = sum(part.coefficient for part in parts if isinstance(part, Viscosity))
+        tension = sum(part.coefficient for part in parts if isinstance(part, SurfaceTension))
+        return Flow(density, viscosity, SMOOTHING * float(np.sqrt(tension / (density * spacing**3))))
+
     def equations(self, body: Body, time_step: float) -> GalerkinEquations:
         """The equations of a body at other positions, for a time step [s]."""
         tensions = [part for part in self.physics.operators if isinstance(part, SurfaceTension)]
-        density = sum(part.density for part in self.physics.operators if isinstance(part, Mass))
-        viscosity = sum(part.coefficient for part in self.physics.operators if isinstance(part, Viscosity))
+        fluid = self.fluid(body.cloud.spacing)
+        density = fluid.density
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
         held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
-        slip = viscosity / friction if friction else np.inf
+        slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
-        coefficient = sum(part.coefficient for part in tensions)
-        fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         basis = _by_particle(Admissible(body, self.physics.pinned(body), ()).basis)
         nothing = sparse.csr_matrix((len(body.points),) * 2)
         rigid = rigid_motions(body.points)[self.admitted]

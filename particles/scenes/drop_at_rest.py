@@ -71,7 +71,9 @@ def flow_to_rest(
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":
         section = start_section(drop, solder, acting)
-        return section, run_to_rest(section, stop_rule(section.body.cloud, solder, acting), progress, checkpoint=checkpoint)
+        return section, run_to_rest(
+            section, stop_rule(section.body.cloud, solder, acting), progress, checkpoint=checkpoint
+        )
     whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
     cloud = cut(whole, drop.symmetry_axes)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))

@@ -1,7 +1,7 @@
 """A drop on a uniform wall computed in section, by the scheme ispg: half a meridian of a body of revolution.
 
-It starts as a cylinder as high as the cube that other drops start as. What acts on it is what acts on a body, with the forces of a chain in the
-place of those of triangles.
+It starts as a cylinder as high as the cube that other drops start as. What acts on it is what acts on a body, with the
+forces of a chain in the place of those of triangles.
 """
 
 from dataclasses import replace
@@ -11,7 +11,7 @@ import numpy as np
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, SurfaceTension
-from reflowshock.particles.physics.physics import Force, Operator, Physics
+from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.section.chain import Chain
 from reflowshock.particles.section.forces import ChainTension, ChainWeight, ChainWetting
@@ -34,10 +34,10 @@ def section_physics(solder: Solder, effects: dict[str, bool]) -> Physics:
     physics = build_physics(solder, effects | {"wall_adhesion": False}, ())
     wetting = (ChainWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
 
-    def of_chain(part: Force | Operator) -> Force | Operator:
-        if isinstance(part, SurfaceTension):
-            return ChainTension(part.coefficient)
-        return ChainWeight(part.weight) if isinstance(part, Gravity) else part
-
-    forces, operators = (tuple(of_chain(part) for part in parts) for parts in (physics.forces, physics.operators))
-    return replace(physics, forces=(*forces, *wetting), operators=operators)
+    forces = [part for part in physics.forces if not isinstance(part, SurfaceTension | Gravity)]
+    forces += [ChainTension(part.coefficient) for part in physics.forces if isinstance(part, SurfaceTension)]
+    forces += [ChainWeight(part.weight) for part in physics.forces if isinstance(part, Gravity)]
+    operators = [
+        ChainTension(part.coefficient) if isinstance(part, SurfaceTension) else part for part in physics.operators
+    ]
+    return replace(physics, forces=(*forces, *wetting), operators=tuple(operators))

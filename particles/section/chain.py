@@ -1,10 +1,10 @@
 """A surface in section: a chain of segments that stands for cones, or for planes of a unit depth.
 
 Next to the axis a segment is a parabola with its apex there: the curvature of a cone's tip is a quarter too small.
-The liquid is on its left: counter-clockwise from the right contact point, or from the lower end of the axis. What it
-encloses with the wall z = 0 and the axis x = 0 are integrals over the chain, exact as the sums here:
-of x^p z^q over the section, weighed by c x^k, by the divergence theorem c / (p + k + 1) times that of x^(p + k + 1) z^q dz.
-A meridian stands for half a body of revolution (k = 1, c = pi), which is what a plane of symmetry leaves of it.
+The liquid is on its left: counter-clockwise from the right contact point, or from the lower end of the axis. Integrals
+of x^p z^q over what it encloses with the wall z = 0 and the axis x = 0, weighed by c x^k, are those over the chain of
+x^(p + k + 1) z^q dz, times c / (p + k + 1), by the divergence theorem; the sums here are exact. A meridian stands for
+half a body of revolution (k = 1, c = pi), which is what a plane of symmetry leaves of it.
 """
 
 from dataclasses import dataclass

@@ -6,36 +6,42 @@ import numpy as np
 from scipy import sparse
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
 from reflowshock.particles.physics.forces import Gravity, SurfaceTension
-from reflowshock.particles.section.section import Section
+from reflowshock.particles.section.section import as_section
 
 
 class ChainTension(SurfaceTension):
     """Energy gamma A of the surface."""
 
-    def energy(self, body: Section) -> float:
+    def energy(self, body: Body) -> float:
         """Surface energy [J]."""
-        return self.coefficient * body.chain.area(body.line)[0]
+        section = as_section(body)
+        return self.coefficient * section.chain.area(section.line)[0]
 
-    def force(self, body: Section) -> Floats:
+    def force(self, body: Body) -> Floats:
         """Force -dE/dx, `(n, 3)` [N]."""
-        return -self.coefficient * body.on_particles(body.chain.area(body.line)[1])
+        section = as_section(body)
+        return -self.coefficient * section.on_particles(section.chain.area(section.line)[1])
 
-    def stiffness(self, body: Section) -> sparse.csr_matrix:
+    def stiffness(self, body: Body) -> sparse.csr_matrix:
         """Stiffness gamma K of the surface, `(3 n, 3 n)` by particle [N/m]."""
-        return self.coefficient * body.chain.stiffness(body.line, len(body.points))
+        section = as_section(body)
+        return self.coefficient * section.chain.stiffness(section.line, len(section.points))
 
 
 class ChainWeight(Gravity):
     """Potential energy of the weight, zero at the height of the origin."""
 
-    def energy(self, body: Section) -> float:
+    def energy(self, body: Body) -> float:
         """Potential energy [J]."""
-        return self.weight * body.chain.integral(body.line, 0, 1)[0]
+        section = as_section(body)
+        return self.weight * section.chain.integral(section.line, 0, 1)[0]
 
-    def force(self, body: Section) -> Floats:
+    def force(self, body: Body) -> Floats:
         """Force -dE/dx, `(n, 3)` [N]."""
-        return -self.weight * body.on_particles(body.chain.integral(body.line, 0, 1)[1])
+        section = as_section(body)
+        return -self.weight * section.on_particles(section.chain.integral(section.line, 0, 1)[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +56,14 @@ class ChainWetting:
     coefficient: float
     angle: float
 
-    def energy(self, body: Section) -> float:
+    def energy(self, body: Body) -> float:
         """Energy of the wall [J]."""
-        return -self.coefficient * float(np.cos(self.angle)) * body.chain.wetted(body.line)[0]
+        section = as_section(body)
+        return -self.coefficient * float(np.cos(self.angle)) * section.chain.wetted(section.line)[0]
 
-    def force(self, body: Section) -> Floats:
+    def force(self, body: Body) -> Floats:
         """Force -dE/dx on the contact points, `(n, 3)` [N]."""
-        return self.coefficient * float(np.cos(self.angle)) * body.on_particles(body.chain.wetted(body.line)[1])
+        section = as_section(body)
+        return (
+            self.coefficient * float(np.cos(self.angle)) * section.on_particles(section.chain.wetted(section.line)[1])
+        )

@@ -105,6 +105,17 @@ class Section(Body):
         return Body(cloud, points, velocity, pressure, self.surface_pressure, triangles, volumes, self.plates)
 
 
+def as_section(body: Body) -> Section:
+    """The same body, for what acts on sections alone.
+
+    Raises:
+        TypeError: it is none.
+    """
+    if not isinstance(body, Section):
+        raise TypeError("the forces and steps of a section act on no other body")
+    return body
+
+
 def turns(angles: Floats) -> tuple[Floats, Floats]:
     """Rotations about the z axis by angles `(m,)` [rad], and no translations."""
     cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
@@ -133,7 +144,9 @@ def block(chain: Chain, width: float, height: float, count: int) -> Cloud:
     down = [] if chain.power else [(-across, level) for level in range(last - 1, -1, -1)]
     surface = np.array(up + over + down)
     lattice = np.concatenate((surface, np.column_stack((x, z))))
-    points = np.column_stack((lattice[:, 0] * (width / across), np.zeros(len(lattice)), lattice[:, 1] * (height / last)))
+    points = np.column_stack(
+        (lattice[:, 0] * (width / across), np.zeros(len(lattice)), lattice[:, 1] * (height / last))
+    )
     wall = np.where(lattice[:, 1] == 0, 0, -1).astype(np.int8)
     contact = np.array([0] if chain.power else [0, len(surface) - 1], np.int32)
     axes = (0,) if chain.power else ()

@@ -1,10 +1,11 @@
 """Space of the Galerkin scheme in section: as `ispg/galerkin.py`, with matrices, and the strain of hoops about an axis.
 
-Linear MLS in x and z, the wall and the axis mirrored. Around the axis a velocity v_x stretches hoops by N v_x / x; on the
-axis that is dv_x/dx.
+Linear MLS in x and z, the wall and the axis mirrored. Around the axis a velocity v_x stretches hoops by N v_x / x; on
+the axis that is dv_x/dx.
 """
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,8 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import find_neighbours
-from reflowshock.particles.ispg.galerkin import REACHES, check_stencils, symmetry_planes
 from reflowshock.particles.ispg.collocation import mirror
+from reflowshock.particles.ispg.galerkin import REACHES, check_stencils, symmetry_planes
 from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
 from reflowshock.particles.section.section import Section
 
@@ -23,7 +24,7 @@ SUPPORT, FEWEST, WIDER = 2.0, 7, 1.2
 THIN, ROUNDING = 0.005, 1e-10
 # Of a spacing: hoops that are smaller stretch by dv_x/dx.
 SMALLEST_HOOP = 1e-6
-Matrix = sparse.csr_matrix
+Matrix: TypeAlias = sparse.csr_matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +236,6 @@ def section_volumes(body: Section, density: Floats) -> Floats:
 
 
 def _mean_radius(body: Section) -> Floats:
-    """Mean distance from the axis over the part of each particle's cell, a spacing wide, on this side of it `(n,)` [m]."""
+    """Mean distance from the axis over each particle's cell, a spacing wide, on this side of it `(n,)` [m]."""
     radius, half = body.points[:, 0], 0.5 * body.cloud.spacing
     return np.where(radius < half, (radius + half) ** 2 / (4.0 * half), radius)

@@ -1,7 +1,7 @@
 """Steps of a body in section by the scheme ispg: the step of bodies, with the space and the surface of a section.
 
-The vertices of the chain are spaced evenly at the rate at which triangles are evened out, particles below it are shifted
-as in space.
+The vertices of the chain are spaced evenly at the rate at which triangles are evened out, particles below it are
+shifted as in space.
 """
 
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
-from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep, SMOOTHING
+from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_motions
-from reflowshock.particles.physics.operators import Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.chain import Chain
 from reflowshock.particles.section.forces import ChainTension
-from reflowshock.particles.section.section import Section
+from reflowshock.particles.section.section import Section, as_section
 from reflowshock.particles.section.section_space import SectionSpace
 from reflowshock.particles.steps.descent import Evening, correct_volume
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow
@@ -80,7 +80,7 @@ class SectionEquations(GalerkinEquations):
     inertia: StiffMass
 
     def pull(self, field: Floats) -> Floats:
-        """gamma K x of a displacement, `(n, 3)`."""
+        """Pull gamma K x of a displacement, `(n, 3)`."""
         return (self.stiffness @ field.ravel()).reshape(-1, 3)
 
     def pulled(self, _start: Floats, end: Floats) -> Floats:
@@ -100,7 +100,7 @@ class SectionEquations(GalerkinEquations):
 class SectionStep(IspgStep):
     """The scheme ispg of a section."""
 
-    def prepare(self, body: Section, physics: Physics, neighbours: NeighbourList) -> "PreparedSectionStep":
+    def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedSectionStep":
         """Carry the velocity to where the particles are now."""
         prepared = IspgStep.prepare(self, body, physics, neighbours)
         return PreparedSectionStep(self, body, physics, prepared.past, admitted_motions(body, physics))
@@ -109,34 +109,30 @@ class SectionStep(IspgStep):
 class PreparedSectionStep(PreparedIspgStep):
     """A step from the section's current positions."""
 
-    def equations(self, body: Section, time_step: float) -> GalerkinEquations:
+    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
         """The equations of a section at other positions, for a time step [s]."""
-        density, viscosity = (
-            sum(part.coefficient if isinstance(part, Viscosity) else part.density for part in self.physics.operators if isinstance(part, kind))
-            for kind in (Mass, Viscosity)
-        )
+        section, fluid = as_section(body), self.fluid(body.cloud.spacing)
         tensions = [part for part in self.physics.operators if isinstance(part, ChainTension)]
-        tension, spacing = sum(part.coefficient for part in tensions), body.cloud.spacing
-        space, basis = SectionSpace.of(body), admissible(body)
-        masses = density * space.volumes
+        space, basis = SectionSpace.of(section), admissible(body)
+        masses = fluid.density * space.volumes
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
-        stiffness = sum(part.stiffness(body) for part in tensions)
+        stiffness = sum((part.stiffness(body) for part in tensions), sparse.csr_matrix((masses.size * 3,) * 2))
         free = (basis.T @ np.repeat(masses, 3), basis.T @ stiffness @ basis, rigid @ basis)
         return SectionEquations(
             space=space,
-            fluid=Flow(density, viscosity, SMOOTHING * float(np.sqrt(tension / (density * spacing**3)))),
+            fluid=fluid,
             basis=basis,
             stiffness=stiffness,
             rigid=rigid,
             drag=np.zeros(len(masses)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
-            spacing=spacing,
+            spacing=body.cloud.spacing,
             time_step=time_step,
             inertia=StiffMass.of(*free, time_step),
         )
 
 
-def admissible(body: Section) -> sparse.csr_matrix:
+def admissible(body: Body) -> sparse.csr_matrix:
     """Velocities that a section admits, `(3 n, d)` by particle: within its plane, along walls and the axis."""
     free = np.ones((len(body.points), 3), bool)
     free[:, 1] = False

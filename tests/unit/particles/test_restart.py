@@ -86,16 +86,16 @@ def stand(checkpoint):
     return [flow.body.points, *(line.state for line in flow.physics.lines)]
 
 
-def flow_of(scheme, limit):
+def flow_of(scheme, limit, section="none"):
     """A drop that moves with inertia, for the time of some steps."""
     effects = SolderEffects(inertia="on", viscosity="on")
     numerics = SolderNumerics(spacing=1e-4, scheme=scheme, time_step_limit=limit)
     solder = Solder(volume=1e-9, effects=effects, numerics=numerics, process_time=2e-4)
-    return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7), solder
+    return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7, section=section), solder
 
 
-def flow_with(scheme, limit, checkpoint):
-    flow, run = flow_to_rest(*flow_of(scheme, limit), checkpoint=checkpoint)
+def flow_with(scheme, limit, checkpoint, section="none"):
+    flow, run = flow_to_rest(*flow_of(scheme, limit, section), checkpoint=checkpoint)
     assert len(run.records) > 8
     return [flow.body.points, flow.body.velocity, flow.body.pressure, run.history(1.0)["energy"]]
 
@@ -106,6 +106,10 @@ def flow_as_printed(checkpoint):
 
 def flow_in_galerkin_form(checkpoint):
     return flow_with("ispg", 0.5, checkpoint)
+
+
+def flow_in_section(checkpoint):
+    return flow_with("ispg", 0.5, checkpoint, "axisymmetric")
 
 
 def swing(checkpoint):
@@ -123,7 +127,9 @@ def merge(checkpoint):
     return [drop.flow.body.points for drop in drops]
 
 
-@pytest.mark.parametrize("run", [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, swing, merge])
+@pytest.mark.parametrize(
+    "run", [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, flow_in_section, swing, merge]
+)
 def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):

@@ -141,7 +141,7 @@ def test_the_projection_keeps_volumes_and_momenta(body):
 
 
 def swung(chain, rings, steps_per_period, periods):
-    """A drop that swings in its second mode, slowly: errors of period and, beyond viscosity's, of decay; and the flow."""
+    """A drop that swings in its second mode: error of the period, decay over that by viscosity, and the flow."""
     omega = np.sqrt(8.0 if chain.power else 6.0)
     drop = Section.filled(disc(chain, 1.0, rings), chain)
     flow, time_step = InertialFlow(drop, water(viscosity=0.005), SectionStep()), 2.0 * np.pi / omega / steps_per_period
@@ -160,10 +160,10 @@ def swung(chain, rings, steps_per_period, periods):
 
 @pytest.mark.parametrize("chain", [MERIDIAN, RING], ids=["meridian", "plane"])
 def test_a_free_drop_swings_in_time(chain):
-    """Rayleigh's period, in a plane omega^2 = n (n^2 - 1) gamma / (rho R^3); decay by viscosity, smoothing and steps."""
-    period, decay, _ = swung(chain, 10, 200, 1.5)
+    """Rayleigh's period, in a plane omega^2 = n (n^2 - 1) gamma / (rho R^3); decay by viscosity and some smoothing."""
+    period, decay, _ = swung(chain, 8, 100, 1.2)
     assert abs(period) < 0.02
-    assert 0.9 < decay < 1.2
+    assert 0.9 < decay < 1.25
 
 
 @pytest.mark.parametrize("chain", [MERIDIAN, RING], ids=["meridian", "plane"])
@@ -199,7 +199,7 @@ def test_a_plane_drop_becomes_a_circular_segment():
     flow = SectionFlow(
         drop, water(ChainWetting(1.0, angle), viscosity=0.2), TimeStep(0.2, drop.cloud.spacing, 0.02), SectionStep()
     )
-    for _ in range(250):
+    for _ in range(150):
         flow.step()
     radius = np.sqrt(2.0 / (angle - np.sin(angle) * np.cos(angle)))
     assert drop.line[:, 2].max() == pytest.approx(radius * (1.0 - np.cos(angle)), rel=5e-3)
