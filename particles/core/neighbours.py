@@ -186,10 +186,8 @@ class NeighbourList:
 
     def update(self, points: Points) -> None:
         """Make the list valid for these points `(n, 3)` [m]."""
-        if len(points) == len(self._built_at):
-            moved = np.sqrt(((points - self._built_at) ** 2).sum(axis=1).max())
-            if moved <= 0.5 * self.skin:
-                return
+        if len(points) == len(self._built_at) and not have_moved(points, self._built_at, self.skin):
+            return
         self.offsets, self.indices = find_neighbours(points, self.radius + self.skin)
         self._built_at = points.copy()
         self.builds += 1

@@ -19,7 +19,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.collocation import Ghosts, mirror
 from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
+from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes, with_moments
 
 # Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
 REACHES = (2.6, 3.4, 4.4)
@@ -31,12 +31,14 @@ class Galerkin:
 
     Attributes:
         volumes: `(n,)` of the particles as points of integration [m^3].
+        carried: `(n,)` volumes whose mass the particles carry [m^3].
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
     """
 
     volumes: Floats
+    carried: Floats
     starts: NDArray[np.int64]
     columns: NDArray[np.int32]
     weights: Floats
@@ -68,7 +70,11 @@ class Galerkin:
         columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
         check_stencils(body, density > 0.0, "has all its neighbours in a plane")
         shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
-        return cls(nodal_volumes(body, density), starts, columns, weights, shape, ghosts)
+        volumes = nodal_volumes(body, density)
+        spread = shape.T @ volumes
+        of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
+        carried = with_moments(body, volumes + of_shapes)
+        return cls(volumes, carried, starts, columns, weights, shape, ghosts)
 
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""

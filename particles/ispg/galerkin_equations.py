@@ -10,6 +10,9 @@ particles move with N v and forces act as N^T f, as printed, a zigzag of the sur
 thousandth. What evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its
 energy is least.
 
+Masses are those of the mean of the volumes V and of N^T V, of which a pressure that is linear in space pushes a
+particle on the surface with 1.3 and 0.9 times the first and the second: with masses of V alone it roughens velocities.
+
 The rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface.
 They add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces of an
@@ -110,7 +113,7 @@ class GalerkinEquations:
     @property
     def masses(self) -> Floats:
         """Of the particles, `(n,)` [kg]."""
-        return self.fluid.density * self.space.volumes
+        return self.fluid.density * self.space.carried
 
     def momentum(self, field: Floats) -> Floats:
         """Momenta of the particles, `(n, 3)` [kg m/s]."""

@@ -1,7 +1,7 @@
 """Conjugate gradients without a matrix, and preconditioned with the factors of an earlier step's matrix."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg, sparse
@@ -16,16 +16,19 @@ MAX_ITERATIONS = 500
 RESIDUAL_LIMIT = 1e-4
 # Factors cost as much as some forty iterations.
 MANY_ITERATIONS = 16
+# With factors of another matrix: where these do not do, new ones cost less than to go on.
+TOO_MANY_ITERATIONS = 80
 # Of the mean of the diagonal, added to it in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """When a solve ends: at this share of the norm of the right-hand side, or at this residual."""
+    """When a solve ends: at this share of the norm of the right-hand side, or at this residual; it fails at `most`."""
 
     relative: float
     absolute: float
+    most: int = MAX_ITERATIONS
 
 
 def conjugate_gradients(
@@ -51,7 +54,7 @@ def conjugate_gradients(
     solution = start.copy()
     residual = right - operator(solution)
     direction, product, iterations = np.zeros_like(right), 1.0, 0
-    while np.linalg.norm(residual) > enough and iterations < MAX_ITERATIONS:
+    while np.linalg.norm(residual) > enough and iterations < tolerance.most:
         scaled = precondition(residual)
         before, product = product, float(residual @ scaled)
         direction = scaled + (product / before if iterations else 0.0) * direction
@@ -83,14 +86,27 @@ class LaggedCholesky(LaggedSolver):
         """
         if self.origin is None or self.iterations > MANY_ITERATIONS or self.origin.shape[0] != len(right):
             self.origin, self._solver = matrix(), None
-        if self._solver is None:
+        fresh = self._solver is None
+        try:
+            most = MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS
+            return self._solved(operator, right, replace(tolerance, most=most))
+        except SolveFailed:
+            if fresh:
+                raise
+        self.origin, self._solver = matrix(), None
+        return self._solved(operator, right, tolerance)
+
+    def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
+        """Solve with the factors of the matrix that is kept."""
+        if self.origin is not None and self._solver is None:
             self._solver = _factored(self.origin)
         factors = self._solver
 
         def precondition(residual: Floats) -> Floats:
             return linalg.cho_solve(factors, residual, check_finite=False)
 
-        solution, self.iterations = conjugate_gradients(operator, right, np.zeros_like(right), precondition, tolerance)
+        start = np.zeros_like(right)
+        solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance)
         return solution
 
 

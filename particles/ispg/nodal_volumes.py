@@ -1,4 +1,4 @@
-"""Volumes of particles, the weights of direct nodal integration: exact for linear, nearly for quadratic polynomials.
+"""Volumes of particles, weights of direct nodal integration or masses: exact for 1 and x, nearly for x x.
 
 A particle has the cell that the density of particles around it leaves, half of one on the free surface or a wall. These
 volumes, which know the shape of the liquid only roughly, become v exp(q), q a quadratic polynomial, so that sums over
@@ -66,9 +66,18 @@ def nodal_volumes(body: Body, density: Floats) -> Floats:
     Raises:
         NoVolumes: there are none.
     """
-    volume, first, second = body_moments(body)
     # Around a particle of the free surface only half of its surroundings are liquid.
-    cells = cell_share(body) ** 2 / density * np.where(body.cloud.wall >= 0, 0.5, 1.0) * share(body.cloud)
+    on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
+    return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud))
+
+
+def with_moments(body: Body, cells: Floats) -> Floats:
+    """The volumes `(n,)` [m^3] closest to some cells `(n,)`, in any unit, that have the moments of the body.
+
+    Raises:
+        NoVolumes: there are none.
+    """
+    volume, first, second = body_moments(body)
     found = cells * (volume / cells.sum())
     centre, length = first / volume, np.cbrt(volume)
     offset = (body.points - centre) / length

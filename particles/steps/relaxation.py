@@ -67,6 +67,11 @@ class Relaxation:
         return SMOOTHING_PASSES
 
     @property
+    def flip_worth(self) -> float:
+        """None: flips are Delaunay's."""
+        return 0.0
+
+    @property
     def descends(self) -> bool:
         """Always: the step goes along the forces."""
         return True

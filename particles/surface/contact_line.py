@@ -79,6 +79,12 @@ class ContactLine:
         for name in SAVED:
             setattr(self, name, saved[name])
 
+    def follow(self, before: Indices, after: Indices) -> None:
+        """Keep the states of the vertices of a line that has changed: `after (k,)` names those of `before` they are."""
+        place = {vertex: number for number, vertex in enumerate(before.tolist())}
+        index = [place[vertex] for vertex in after.tolist()]
+        self.pad, self.state, self.stopped = self.pad[index], self.state[index], self.stopped[index]
+
     @property
     def has_edge(self) -> bool:
         """Whether there is a mask to leave a pad for; a uniform wall has none."""

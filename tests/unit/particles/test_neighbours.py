@@ -48,10 +48,11 @@ def test_list_is_rebuilt_only_past_half_the_skin():
     points = np.random.default_rng(2).uniform(size=(50, 3))
     neighbours = NeighbourList(radius=0.3, skin=0.1)
     neighbours.update(points)
-    neighbours.update(points + [0.04, 0.0, 0.0])
+    neighbours.update(points + [0.4, 0.0, 0.0])
     assert neighbours.builds == 1
     moved = points.copy()
     moved[7] += [0.06, 0.0, 0.0]
+    moved[8] -= [0.06, 0.0, 0.0]
     neighbours.update(moved)
     assert neighbours.builds == 2
 
