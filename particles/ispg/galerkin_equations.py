@@ -40,6 +40,9 @@ class Space(Protocol):
     @property
     def volumes(self) -> Floats: ...  # noqa: D102
 
+    @property
+    def carried(self) -> Floats: ...  # noqa: D102
+
     def averages(self, coefficients: Floats) -> Floats: ...  # noqa: D102
 
     def rough(self, field: Floats) -> Floats: ...  # noqa: D102

@@ -13,7 +13,7 @@ import numpy as np
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import ring_area, wall_corners
+from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.core.symmetry import share
 
 PAIRS = np.triu_indices(3)
@@ -28,16 +28,8 @@ class NoVolumes(RuntimeError):
 
 
 def body_moments(body: Body) -> tuple[float, Floats, Floats]:
-    """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
-    walls = zip(body.cloud.rings, body.plates, strict=True)
-    faces = [body.points[body.triangles], *(wall_corners(body.points, ring, plate) for ring, plate in walls)]
-    corners = np.concatenate(faces)
-    volumes = np.einsum("td,td->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    total = corners.sum(axis=1)
-    second = (total * volumes[:, None]).T @ total
-    flat = corners.reshape(-1, 3)
-    second += (flat * np.repeat(volumes, 3)[:, None]).T @ flat
-    return float(volumes.sum()), volumes @ total / 4.0, second / 20.0
+    """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid."""
+    return body.moments()
 
 
 def cell_share(body: Body) -> Floats:

@@ -19,16 +19,9 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-<<<<<<< HEAD
-ISPG_EDGES = (5, 11)
-SECTION_EDGES = (8, 41)
-# Below this angle a cube of fewer particles along an edge becomes a film, in which particles lack neighbours.
-ISPG_FILM_ANGLE, ISPG_FILM_EDGE = radians(60.0), 6
-=======
-ISPG_EDGES = (5, 15)
+ISPG_EDGES, SECTION_EDGES = (5, 15), (8, 21)
 ISPG_PAD_EDGE = 11
 ISPG_PAIR = 2000
->>>>>>> main
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -83,13 +76,8 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what the scheme ispg is not verified for."""
     if solder.numerics.scheme != "ispg":
         return []
-<<<<<<< HEAD
-    inertia = decide_drop(solder, drop.is_free)["inertia"]
-    angle, few = _angle_at_rest(drop), drop.count < ISPG_FILM_EDGE
-    fewest, most = ISPG_EDGES if drop.section == "none" else SECTION_EDGES
-=======
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
->>>>>>> main
+    fewest, most = ISPG_EDGES if drop.section == "none" else SECTION_EDGES
     places = {
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
@@ -97,17 +85,9 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "walls that hold the liquid": solder.wall != "free-slip",
         "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
-<<<<<<< HEAD
         f"{drop.count} particles along an edge (for {fewest} to {most} it is)": not fewest <= drop.count <= most,
-        f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
-            few and angle is not None and angle < ISPG_FILM_ANGLE - ROUNDING
-=======
-        f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
-            ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
-        ),
         f"{drop.count} particles along an edge on a pad (up to {ISPG_PAD_EDGE} it is)": (
             drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
->>>>>>> main
         ),
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])

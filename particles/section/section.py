@@ -52,6 +52,16 @@ class Section(Body):
         volume, gradient = self.chain.integral(self.line, 0, 0)
         return volume, self.on_particles(gradient)
 
+    def moments(self) -> tuple[float, Floats, Floats]:
+        """Integrals of 1, x `(3,)` and x x `(3, 3)` over the part of the liquid that the section stands for, y = 0."""
+
+        def integral(p: int, q: int) -> float:
+            return self.chain.integral(self.line, p, q)[0]
+
+        xz = integral(1, 1)
+        second = np.array([[integral(2, 0), 0.0, xz], [0.0, 0.0, 0.0], [xz, 0.0, integral(0, 2)]])
+        return integral(0, 0), np.array([integral(1, 0), 0.0, integral(0, 1)]), second
+
     def whole(self) -> Body:
         """The body with triangles: a meridian turned about its axis, a plane as a sheet of a unit depth without ends.
 

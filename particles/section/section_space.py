@@ -91,6 +91,11 @@ class SectionSpace:
         pairs_of = [(one, one.T.tocsr()) for one in (shown, slopes, rates)]
         return cls(section_volumes(body, density), scalar, *pairs_of)
 
+    @property
+    def carried(self) -> Floats:
+        """Volumes whose mass the particles carry: here those that they have."""
+        return self.volumes
+
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
         return self.scalar @ coefficients

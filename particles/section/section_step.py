@@ -18,7 +18,7 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_motions
+from reflowshock.particles.ispg.rigid_motions import orthonormal, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.chain import Chain
 from reflowshock.particles.section.forces import ChainTension
@@ -103,7 +103,7 @@ class SectionStep(IspgStep):
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedSectionStep":
         """Carry the velocity to where the particles are now."""
         prepared = IspgStep.prepare(self, body, physics, neighbours)
-        return PreparedSectionStep(self, body, physics, prepared.past, admitted_motions(body, physics))
+        return PreparedSectionStep(self, body, physics, prepared.past, prepared.admitted)
 
 
 class PreparedSectionStep(PreparedIspgStep):
