@@ -8,7 +8,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core import symmetry
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.core.surface_measure import volume_and_gradient, wall_corners
+from reflowshock.particles.core.surface_measure import volume_and_gradient
 
 
 @dataclass(slots=True)
@@ -77,17 +77,9 @@ class Body:
         parts = (self.points[:count], self.velocity[:count], self.pressure[:count])
         return Body(cloud, *parts, self.surface_pressure, self.triangles, self.volumes[:count], self.plates)
 
-    def moments(self) -> tuple[float, Floats, Floats]:
-        """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra to the origin."""
-        walls = zip(self.cloud.rings, self.plates, strict=True)
-        faces = [self.points[self.triangles], *(wall_corners(self.points, ring, plate) for ring, plate in walls)]
-        corners = np.concatenate(faces)
-        volumes = np.einsum("td,td->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-        total = corners.sum(axis=1)
-        second = (total * volumes[:, None]).T @ total
-        flat = corners.reshape(-1, 3)
-        second += (flat * np.repeat(volumes, 3)[:, None]).T @ flat
-        return float(volumes.sum()), volumes @ total / 4.0, second / 20.0
+    def moments(self) -> tuple[float, Floats, Floats] | None:
+        """Integrals of 1, x `(3,)` and x x `(3, 3)` over the liquid, where triangles do not tell them."""
+        return None
 
     def whole(self) -> "Body":
         """The body with its triangles, as products have it: itself, where it is not a section of one."""

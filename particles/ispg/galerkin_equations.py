@@ -21,41 +21,17 @@ that do.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from scipy import sparse
 
-from reflowshock.arrays import Floats
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.ispg import step_kernels as kernels
+from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
-
-
-class Space(Protocol):
-    """Shape functions and volumes at n particles; `Galerkin` says what its operators are."""
-
-    @property
-    def volumes(self) -> Floats: ...  # noqa: D102
-
-    @property
-    def carried(self) -> Floats: ...  # noqa: D102
-
-    def averages(self, coefficients: Floats) -> Floats: ...  # noqa: D102
-
-    def rough(self, field: Floats) -> Floats: ...  # noqa: D102
-
-    def gradient(self, field: Floats) -> Floats: ...  # noqa: D102
-
-    def resistance(self, field: Floats, factors: Floats) -> Floats: ...  # noqa: D102
-
-    def divergence(self, field: Floats) -> Floats: ...  # noqa: D102
-
-    def divergence_load(self, factor: Floats) -> Floats: ...  # noqa: D102
-
-    def divergence_rows(self) -> sparse.csr_matrix: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,19 +64,19 @@ class GalerkinEquations:
     Attributes:
         space: shape functions and volumes.
         fluid: its density, viscosity and smoothing.
-        basis: `(3 n, d)` admissible velocities, orthonormal columns, by particle.
-        stiffness: `(n, n)` of the surface tension, gamma K [N/m].
-        rigid: `(k, 3 n)` rigid motions that walls admit, by particle, orthonormal by the masses [1/sqrt(kg)].
+        admitted: `(n, 3, 3)` projections of the particles' velocities onto those that walls admit.
+        surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
+        rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
     """
 
-    space: Space
+    space: Galerkin
     fluid: Flow
-    basis: sparse.csr_matrix
-    stiffness: sparse.csr_matrix
+    admitted: Floats
+    surface: tuple[Indices, Floats]
     rigid: Floats
     drag: Floats
     unbalanced: Floats
@@ -137,18 +113,20 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        basis, across = self.basis, self.basis.T
         load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
-        inverse = self.time_step * self._inverse_masses()
+        inertia = self.masses / self.time_step
+        inverse = 1.0 / inertia[:, None]
+        implicit = (self.surface, self.rigid, self.masses, self.time_step)
+        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
         solution, _ = conjugate_gradients(
-            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
-            across @ load.ravel(),
-            across @ velocity.ravel(),
+            lambda field: kernels.momentum_operator(*parts, field),
+            kernels.projected(self.admitted, load),
+            kernels.projected(self.admitted, velocity),
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
-        return (basis @ solution).reshape(-1, 3)
+        return solution
 
     def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
         """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].
@@ -162,63 +140,43 @@ class GalerkinEquations:
             SolveFailed: the linear solve failed.
         """
         space, divergence = self.space, self.constraint(start)
+        mobility = (self.time_step / self.masses)[:, None, None] * self.admitted
+        roots = np.sqrt(self.time_step / self.masses)[:, None, None] * self.admitted
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        parts = (space.rows, space.images, self._parts, mobility)
         potential = factors.solve(
-            lambda pressure: self.constraint(self.accelerated(pressure)),
-            self.pressure_matrix,
+            lambda pressure: kernels.pressure_operator(*parts, pressure),
+            lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
         change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + self.accelerated(potential), change
+        return start + kernels.projected(mobility, self.push(potential)), change
 
     def pulled(self, start: Floats, _end: Floats) -> Floats:
         """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
         return start
 
-    def accelerated(self, pressure: Floats) -> Floats:
-        """Change of the velocity in a step under a pressure `(n,)` [Pa], dt m^-1 B^T p."""
-        moved = self.time_step * self._inverse_masses() * (self.basis.T @ self.push(pressure).ravel())
-        return (self.basis @ moved).reshape(-1, 3)
-
-    def pressure_matrix(self) -> sparse.csr_matrix:
-        """Rates of volume under such changes, `(n, n)` [m^3/(s Pa)], but for what nodal integration misses."""
-        rows = (sparse.diags(self.space.volumes) @ self.space.divergence_rows() @ self.basis).tocsr()
-        return (rows @ sparse.diags(self.time_step * self._inverse_masses()) @ rows.T).tocsr()
-
-    def _inverse_masses(self) -> Floats:
-        """One over the mass of the particle of each admissible velocity, `(d,)` [1/kg]."""
-        return np.asarray(self.basis.multiply(self.basis).T @ np.repeat(1.0 / self.masses, 3)).ravel()
-
-    def operator(self, field: Floats) -> Floats:
-        """m/dt + V + S + dt K of a velocity, [N]."""
-        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
-        return direct + self.space.resistance(field, self.factors)
+    @property
+    def _parts(self) -> tuple[Floats, Floats]:
+        """Of the constraint: volumes of the particles, and what their gradients miss."""
+        return self.space.volumes, self.unbalanced
 
     def tension(self, field: Floats) -> Floats:
         """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, and no moment.
 
         K alone resists turning, which a surface does not: a drop would be left turning on its wall.
         """
-        rigid = self.rigid
-        moving = (rigid @ self.momentum(field).ravel()) @ rigid
-        pull = self.pull(field - moving.reshape(-1, 3))
-        return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
-
-    def pull(self, field: Floats) -> Floats:
-        """Pull gamma K x of a displacement, `(n, 3)`."""
-        return self.stiffness @ field
+        return kernels.pull_back(self.surface, self.rigid, self.masses, field)
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
-        volumes = self.space.volumes
-        return volumes * (self.space.divergence(field) + (self.unbalanced * field).sum() / volumes.sum())
+        return kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
 
     def push(self, pressure: Floats) -> Floats:
         """B^T p, [N]."""
-        parts = self.space.volumes * pressure
-        return self.space.divergence_load(parts) + parts.sum() / self.space.volumes.sum() * self.unbalanced
+        return kernels.pressure_forces(self.space.rows, self.space.images, self._parts, pressure)
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
         """What a velocity loses to forces that the prediction v* has set."""

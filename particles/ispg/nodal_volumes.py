@@ -10,10 +10,11 @@ thickness h, and particles without mass are thrown out of the liquid.
 """
 
 import numpy as np
+from numba import njit
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import ring_area
+from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import share
 
 PAIRS = np.triu_indices(3)
@@ -28,8 +29,31 @@ class NoVolumes(RuntimeError):
 
 
 def body_moments(body: Body) -> tuple[float, Floats, Floats]:
-    """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid."""
-    return body.moments()
+    """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
+    if (own := body.moments()) is not None:
+        return own
+    walls = zip(body.cloud.rings, body.plates, strict=True)
+    moments = _moments(body.points[body.triangles])
+    for ring, plate in walls:
+        moments += _moments(wall_corners(body.points, ring, plate))
+    return float(moments[0]), moments[1:4], moments[4:].reshape(3, 3)
+
+
+@njit(cache=True)
+def _moments(corners):
+    """Integrals of 1, x and x x over tetrahedra with the origin, `corners (t, 3, 3)`, one after the other."""
+    result, total = np.zeros(13), np.empty(3)
+    for a, b, c in corners:
+        volume = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
+        volume = (volume + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0
+        result[0] += volume
+        total[:] = a + b + c
+        for d in range(3):
+            result[1 + d] += volume * total[d] / 4.0
+            for e in range(3):
+                product = total[d] * total[e] + a[d] * a[e] + b[d] * b[e] + c[d] * c[e]
+                result[4 + 3 * d + e] += volume * product / 20.0
+    return result
 
 
 def cell_share(body: Body) -> Floats:
@@ -94,13 +118,26 @@ def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floa
     Raises:
         NoVolumes: there are none.
     """
-    factors, volume = np.zeros(len(wanted)), wanted[0]
+    volume = wanted[0]
+    found, missing = _fitted(powers, found, wanted, softness)
+    if missing < TOLERANCE * volume:
+        return found
+    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+
+
+@njit(cache=True)
+def _fitted(powers, volumes, wanted, softness):
+    """Volumes `(n,)` times exp(powers q) with wanted sums of powers `(n, k)`, and the largest that is missing of one.
+
+    Newton's method for q; what is missing may be softness times q.
+    """
+    factors, missing = np.zeros(len(wanted)), wanted - powers.T @ volumes
     for _ in range(NEWTON_STEPS):
-        missing = wanted - powers.T @ found - softness * factors
-        if np.abs(missing).max() < TOLERANCE * volume:
-            return found
-        change = np.linalg.solve((powers * found[:, None]).T @ powers + np.diag(softness), missing)
+        if np.abs(missing).max() < TOLERANCE * wanted[0]:
+            break
+        change = np.linalg.solve((powers * volumes.reshape(-1, 1)).T @ powers + np.diag(softness), missing)
         change /= max(1.0, np.abs(powers @ change).max())
         factors += change
-        found = found * np.exp(powers @ change)
-    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+        volumes = volumes * np.exp(powers @ change)
+        missing = wanted - powers.T @ volumes - softness * factors
+    return volumes, np.abs(missing).max()

@@ -10,6 +10,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
 
@@ -87,15 +88,17 @@ class GalerkinPast:
         at_rest = (body.pressure, unknown, 1.0, still, still)
         return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
 
-    def carried_on(self, body: Body, physics: Physics, admitted: NDArray[np.bool_]) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them.
+    def carried_on(
+        self, body: Body, physics: Physics, projections: Floats, admitted: NDArray[np.bool_]
+    ) -> "GalerkinPast":
+        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it.
 
         The body is put where its momentum took its centre, along axes that walls admit `(3,)`: evening out triangles
         gives volume to one side and takes it from another, and would let a drop wander over its wall.
         """
-        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
+        change = projected(self.gradient, body.points - self.points)
         body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
-        velocity = physics.admit(body, self.velocity + change)
+        velocity = projected(projections, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))
         return replace(self, points=body.points, velocity=velocity, history=history)
 

@@ -51,8 +51,10 @@ class Moving:
     def equations(self) -> GalerkinEquations:
         """Its masses and shape functions where it is."""
         past = self.solver.past or GalerkinPast.start(self.body, 0.0)
-        admitted = admitted_motions(self.body, self.physics)
-        return PreparedIspgStep(self.solver, self.body, self.physics, past, admitted).equations(self.body, 1.0)
+        body, projections = self.body, self.physics.projections(self.body)
+        admitted = admitted_motions(body.points, projections)
+        step = PreparedIspgStep(self.solver, body, self.physics, past, 0.0, projections, admitted)
+        return step.equations(body, 1.0)
 
 
 def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
@@ -77,7 +79,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
             gradient=here.space.gradient(velocity),
             kinetic=here.kinetic(velocity),
             momenta=rigid_momenta(motions, here.masses, velocity),
-            volumes=here.space.volumes,
+            volumes=here.space.carried,
         )
         part.solver.first_energy = 0.0
         energy += own + here.kinetic(velocity)
@@ -107,7 +109,9 @@ def _with_momenta(
     new: Sequence[Moving], equations: Sequence[GalerkinEquations], velocities: Sequence[Floats], momenta: Floats
 ) -> list[Floats]:
     """Velocities with the momenta `(6,)` in all, as far as walls and edges admit a motion of all bodies."""
-    kept = np.logical_and.reduce([admitted_motions(part.body, part.physics) for part in new])
+    kept = np.logical_and.reduce(
+        [admitted_motions(part.body.points, part.physics.projections(part.body)) for part in new]
+    )
     if not kept.any():
         return list(velocities)
     motions = [rigid_motions(part.body.points)[kept] for part in new]

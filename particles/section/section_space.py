@@ -14,10 +14,11 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.ispg.collocation import mirror
-from reflowshock.particles.ispg.galerkin import REACHES, check_stencils, symmetry_planes
+from reflowshock.particles.ispg.galerkin import check_stencils, symmetry_planes
 from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
 from reflowshock.particles.section.section import Section
 
+REACHES = (2.6, 3.4, 4.4)  # of the search for neighbours, in spacings
 # Support radius in spacings; but the 7th neighbour lies within 1 / 1.2 of it.
 SUPPORT, FEWEST, WIDER = 2.0, 7, 1.2
 # Mean square of the offsets across a stencil, over its support, below which it is too thin; 0.1 where points are even.

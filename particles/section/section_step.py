@@ -4,11 +4,12 @@ The vertices of the chain are spaced evenly at the rate at which triangles are e
 shifted as in space.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import ceil
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -16,8 +17,15 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin_equations import (
+    MOMENTUM_TOLERANCE,
+    NEGLIGIBLE,
+    VOLUME_TOLERANCE,
+    GalerkinEquations,
+)
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
+from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg.rigid_motions import orthonormal, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.chain import Chain
@@ -67,21 +75,73 @@ class StiffMass:
 
 @dataclass(frozen=True, slots=True)
 class SectionEquations(GalerkinEquations):
-    """The equations of a section, whose stiffness is `(3 n, 3 n)` by particle.
+    """The equations of a section, by matrices.
 
     The projection, too, has the implicit surface tension: where pressures accelerate masses alone, what tension resists
     is taken back a step later. That error, dt^3 gamma K m^-1 grad dp/dt, lets swings grow, the more the finer particles
     are: with 25 steps a period 10 of them along the radius no longer decay.
 
     Attributes:
+        matrices: shape functions and volumes.
+        basis: `(3 n, d)` admissible velocities, by particle.
+        stiffness: `(3 n, 3 n)` of the surface tension [N/m].
         inertia: masses and surface tension.
     """
 
+    matrices: SectionSpace
+    basis: sparse.csr_matrix
+    stiffness: sparse.csr_matrix
     inertia: StiffMass
 
-    def pull(self, field: Floats) -> Floats:
-        """Pull gamma K x of a displacement, `(n, 3)`."""
-        return (self.stiffness @ field.ravel()).reshape(-1, 3)
+    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
+        """Velocity v* [m/s] under the last pressure, as in space."""
+        basis, across = self.basis, self.basis.T
+        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
+        inverse = self.time_step / (across @ np.repeat(self.masses, 3))
+        solution, _ = conjugate_gradients(
+            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
+            across @ load.ravel(),
+            across @ velocity.ravel(),
+            lambda residual: inverse * residual,
+            Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
+        )
+        return (basis @ solution).reshape(-1, 3)
+
+    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
+        """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa], as in space."""
+        volumes, divergence = self.matrices.volumes, self.constraint(start)
+        missing = rate * volumes / volumes.sum() - divergence
+        enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        potential = factors.solve(
+            lambda pressure: self.constraint(self.accelerated(pressure)),
+            self.pressure_matrix,
+            missing,
+            Tolerance(VOLUME_TOLERANCE, enough),
+        )
+        return start + self.accelerated(potential), potential - self.fluid.viscosity * divergence / volumes
+
+    def operator(self, field: Floats) -> Floats:
+        """m/dt + V + S + dt K of a velocity, [N]."""
+        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
+        return direct + self.matrices.resistance(field, self.factors)
+
+    def tension(self, field: Floats) -> Floats:
+        """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, no moment."""
+        rigid = self.rigid.reshape(len(self.rigid), field.size)
+        moving = (rigid @ self.momentum(field).ravel()) @ rigid
+        pull = self.stiffness @ (field.ravel() - moving)
+        return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
+
+    def constraint(self, field: Floats) -> Floats:
+        """B v: rates of volume `(n,)` [m^3/s]."""
+        volumes = self.matrices.volumes
+        return volumes * (self.matrices.divergence(field) + (self.unbalanced * field).sum() / volumes.sum())
+
+    def push(self, pressure: Floats) -> Floats:
+        """B^T p, [N]."""
+        parts = self.matrices.volumes * pressure
+        return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
 
     def pulled(self, _start: Floats, end: Floats) -> Floats:
         """The projected velocity is what the implicit surface tension has resisted."""
@@ -91,10 +151,15 @@ class SectionEquations(GalerkinEquations):
         """Change of the velocity in a step under a pressure `(n,)` [Pa]."""
         return (self.basis @ self.inertia.solve(self.basis.T @ self.push(pressure).ravel())).reshape(-1, 3)
 
-    def pressure_matrix(self) -> sparse.csr_matrix:
-        """Rates of volume under such changes, `(n, n)` [m^3/(s Pa)], but for what nodal integration misses."""
-        rows = sparse.diags(self.space.volumes) @ self.space.divergence_rows() @ self.basis
-        return sparse.csr_matrix(rows @ self.inertia.solve(rows.T.toarray()))
+    def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
+        """Rates of volume under such changes, A, but for what nodal integration misses.
+
+        Returns the lower triangle of S A S `(n, n)`, whose diagonal is one, and S `(n,)`.
+        """
+        rows = sparse.diags(self.matrices.volumes) @ self.matrices.divergence_rows() @ self.basis
+        matrix = rows @ self.inertia.solve(rows.T.toarray())
+        scale = 1.0 / np.sqrt(matrix.diagonal())
+        return np.tril(scale[:, None] * matrix * scale).astype(np.float32), scale
 
 
 class SectionStep(IspgStep):
@@ -103,7 +168,7 @@ class SectionStep(IspgStep):
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedSectionStep":
         """Carry the velocity to where the particles are now."""
         prepared = IspgStep.prepare(self, body, physics, neighbours)
-        return PreparedSectionStep(self, body, physics, prepared.past, prepared.admitted)
+        return PreparedSectionStep(*(getattr(prepared, entry.name) for entry in fields(prepared)))
 
 
 class PreparedSectionStep(PreparedIspgStep):
@@ -117,9 +182,13 @@ class PreparedSectionStep(PreparedIspgStep):
         masses = fluid.density * space.volumes
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
         stiffness = sum((part.stiffness(body) for part in tensions), sparse.csr_matrix((masses.size * 3,) * 2))
-        free = (basis.T @ np.repeat(masses, 3), basis.T @ stiffness @ basis, rigid @ basis)
+        motions = rigid.reshape(len(rigid), 3 * len(masses)) @ basis
+        free = (basis.T @ np.repeat(masses, 3), basis.T @ stiffness @ basis, motions)
         return SectionEquations(
-            space=space,
+            space=cast(Galerkin, space),  # what a step asks of either is the same
+            matrices=space,
+            admitted=self.projections,
+            surface=(body.triangles, np.zeros((0, 3))),
             fluid=fluid,
             basis=basis,
             stiffness=stiffness,

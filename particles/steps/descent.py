@@ -135,17 +135,20 @@ def _smooth(body: Body, physics: Physics, volume: float, evening: Evening) -> bo
     """Smooth as far as the energy permits, at a volume [m^3]; return whether it permits any."""
     start, offset, held = body.points, _offset(body, physics, evening.passes), Held.of(physics.lines)
 
-    def excess(share: float) -> float:
+    def smooth(share: float) -> None:
         held.restore(physics.lines)
         body.points = start + share * offset
         correct_volume(body, physics, volume)
         for line in physics.lines:
             line.stop_at_edges(body)
         correct_volume(body, physics, volume)  # of the vertices that were caught
+
+    def excess(share: float) -> float:
+        smooth(share)
         return physics.energy(body) - evening.highest
 
     if np.isinf(evening.highest):
-        excess(1.0)
+        smooth(1.0)
         return True
     above = excess(1.0)
     if above <= 0.0:

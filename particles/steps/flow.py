@@ -112,7 +112,6 @@ class LiquidFlow:
         for event in self.physics.events:
             event.update(body)
         correct_volume(body, self.physics, self.volume)  # events move the vertices that they catch
-        self.neighbours.update(body.points)
         before = body.points[: body.cloud.surface_count].copy()
         motion, flips = self._descend()
         self.neighbours.update(body.points)

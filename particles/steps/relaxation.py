@@ -92,6 +92,7 @@ class Relaxation:
             self.centre = centre_of_volume(body.points, body.triangles)
         surface = body.surface()
         equations = StepEquations(surface, physics, _volume_only(surface))
+        neighbours.update(body.points)
         return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
 
     def saved(self) -> dict[str, Any]:
