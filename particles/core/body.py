@@ -77,6 +77,14 @@ class Body:
         parts = (self.points[:count], self.velocity[:count], self.pressure[:count])
         return Body(cloud, *parts, self.surface_pressure, self.triangles, self.volumes[:count], self.plates)
 
+    def moments(self) -> tuple[float, Floats, Floats] | None:
+        """Integrals of 1, x `(3,)` and x x `(3, 3)` over the liquid, where triangles do not tell them."""
+        return None
+
+    def whole(self) -> "Body":
+        """The body with its triangles, as products have it: itself, where it is not a section of one."""
+        return self
+
     def span(self) -> tuple[float, float]:
         """Heights [m] between which horizontal sections cut the surface, but no plate, tilted ones neither."""
         z, rings = self.points[: self.cloud.surface_count, 2], self.cloud.rings

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import find_beside, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
@@ -53,7 +54,7 @@ class Galerkin:
             NoVolumes: the particles do not fill the body.
         """
         count, spacing = len(body.points), body.cloud.spacing
-        planes = [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in body.cloud.symmetry]
+        planes = symmetry_planes(body.cloud)
         slips = [slip_length] * len(body.plates) + [np.inf] * len(planes)
         ghosts = mirror(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
         points = np.concatenate((body.points, ghosts.points))
@@ -63,12 +64,12 @@ class Galerkin:
         if len(lacking):
             lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
             squares, lengths = kernels.supports(count, points, (*lists, WIDEST * spacing), spacing)
-        _check(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
+        check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)
         shares = np.concatenate((shares, shares[ghosts.source]))
         columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
-        _check(body, density > 0.0, "has all its neighbours in a plane")
+        check_stencils(body, density > 0.0, "has all its neighbours in a plane")
         shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
         volumes = nodal_volumes(body, density)
         spread = shape.T @ volumes
@@ -139,7 +140,17 @@ class Galerkin:
         return np.zeros((len(self.starts) - 1 + len(self.ghosts.source), 3))
 
 
-def _check(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
+def symmetry_planes(cloud: Cloud) -> list[Plate]:
+    """The planes of symmetry as plates, which are mirrored like walls."""
+    return [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in cloud.symmetry]
+
+
+def check_stencils(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
+    """Refuse particles `(n,)` whose stencils are not sound; the message names the first and its trouble.
+
+    Raises:
+        DegenerateStencil: there is one.
+    """
     if not sound.all():
         worst = int(np.argmin(sound))
         place = ", ".join(f"{coordinate:.4g}" for coordinate in body.points[worst])

@@ -154,6 +154,10 @@ class GalerkinEquations:
         change = potential - self.fluid.viscosity * divergence / space.volumes
         return start + kernels.projected(mobility, self.push(potential)), change
 
+    def pulled(self, start: Floats, _end: Floats) -> Floats:
+        """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
+        return start
+
     @property
     def _parts(self) -> tuple[Floats, Floats]:
         """Of the constraint: volumes of the particles, and what their gradients miss."""

@@ -182,7 +182,7 @@ class PreparedIspgStep:
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(start)
+        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
@@ -238,17 +238,23 @@ class PreparedIspgStep:
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
 
+    def fluid(self, spacing: float) -> Flow:
+        """What the liquid is made of, of particles at a spacing [m]."""
+        parts = self.physics.operators
+        density = sum(part.density for part in parts if isinstance(part, Mass))
+        viscosity = sum(part.coefficient for part in parts if isinstance(part, Viscosity))
+        tension = sum(part.coefficient for part in parts if isinstance(part, SurfaceTension))
+        return Flow(density, viscosity, SMOOTHING * float(np.sqrt(tension / (density * spacing**3))))
+
     def equations(self, body: Body, time_step: float) -> GalerkinEquations:
         """The equations of a body at other positions, for a time step [s]."""
         tensions = [part for part in self.physics.operators if isinstance(part, SurfaceTension)]
-        density = sum(part.density for part in self.physics.operators if isinstance(part, Mass))
-        viscosity = sum(part.coefficient for part in self.physics.operators if isinstance(part, Viscosity))
+        fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
         held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
-        slip = viscosity / friction if friction else np.inf
+        slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
         coefficient = sum(part.coefficient for part in tensions)
-        fluid = Flow(density, viscosity, SMOOTHING * float(np.sqrt(coefficient / (density * spacing**3))))
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -256,7 +262,7 @@ class PreparedIspgStep:
             admitted=self.projections,
             surface=(body.triangles, 0.5 * coefficient * cotangents(body.points, body.triangles)),
             spacing=spacing,
-            rigid=orthonormal(rigid, density * space.carried),
+            rigid=orthonormal(rigid, fluid.density * space.carried),
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,

@@ -30,6 +30,8 @@ class NoVolumes(RuntimeError):
 
 def body_moments(body: Body) -> tuple[float, Floats, Floats]:
     """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
+    if (own := body.moments()) is not None:
+        return own
     walls = zip(body.cloud.rings, body.plates, strict=True)
     moments = _moments(body.points[body.triangles])
     for ring, plate in walls:
@@ -101,6 +103,22 @@ def with_moments(body: Body, cells: Floats) -> Floats:
     # Products of two directions stand for two entries of x x.
     entries = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
+    return fitted_volumes(found, powers, wanted, softness)
+
+
+def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floats) -> Floats:
+    """Volumes v exp(q) of n particles `(n,)` with k moments, q a polynomial.
+
+    Args:
+        found: v, `(n,)` [m^3]; they add up to the volume of the body.
+        powers: `(n, k)` monomials at the particles, without unit, the first one is 1.
+        wanted: `(k,)` their integrals over the body [m^3].
+        softness: `(k,)` of them [m^3], 0 where they are exact.
+
+    Raises:
+        NoVolumes: there are none.
+    """
+    volume = wanted[0]
     found, missing = _fitted(powers, found, wanted, softness)
     if missing < TOLERANCE * volume:
         return found

@@ -16,6 +16,9 @@ INERTIAL_COST_EXPONENT = 1.5
 # Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
 SECONDS_PER_ISPG_STEP = 0.0018
 SECONDS_PER_ISPG_STEP_AND_PARTICLE = 1.35e-5
+# Steps of a section, whose pressures have dense matrices; measured with 121 to 1681 particles.
+SECONDS_PER_SECTION_STEP, SECONDS_PER_SECTION_STEP_AND_PARTICLE = 0.008, 3e-5
+SECONDS_PER_SECTION_STEP_AND_PAIR = 2.3e-8
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
@@ -43,6 +46,12 @@ def inertial_seconds(particles: int, steps: int) -> float:
 def ispg_seconds(particles: int, steps: int) -> float:
     """Expected time of steps of the scheme ispg on one core [s]."""
     return steps * (SECONDS_PER_ISPG_STEP + SECONDS_PER_ISPG_STEP_AND_PARTICLE * particles)
+
+
+def section_seconds(particles: int, steps: int) -> float:
+    """Expected time of steps of a section on one core [s]."""
+    of_matrices = SECONDS_PER_SECTION_STEP_AND_PAIR * particles**2
+    return steps * (SECONDS_PER_SECTION_STEP + SECONDS_PER_SECTION_STEP_AND_PARTICLE * particles + of_matrices)
 
 
 def _seconds_per_step(particles: int) -> float:

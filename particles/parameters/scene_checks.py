@@ -19,7 +19,7 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-ISPG_EDGES = (5, 15)
+ISPG_EDGES, SECTION_EDGES = (5, 15), (8, 21)
 ISPG_PAD_EDGE = 11
 ISPG_PAIR = 2000
 KEYS = {
@@ -39,7 +39,8 @@ class HasWall(Protocol):
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
-    found = _flow_problems(drop, solder) or _pad_problems(drop) or _ispg_problems(drop, solder)
+    found = _flow_problems(drop, solder) or _pad_problems(drop) or _section_problems(drop, solder)
+    found = found or _ispg_problems(drop, solder)
     found = found or _resolution_problems(drop) or _symmetry_problems(drop, solder)
     return found or _wall_problems(drop) or free_problems(drop, solder)
 
@@ -56,11 +57,27 @@ def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     return checks.scheme_problems(solder) + checks.effect_problems(solder, decide_drop(solder, scene.is_free))
 
 
+def _section_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find drops that are no bodies of revolution that the scheme ispg computes in section."""
+    if drop.section == "none":
+        return []
+    if solder.numerics.scheme != "ispg":
+        message = f'a drop in section (drop.section = "{drop.section}") needs the scheme "ispg"'
+        return [Problem("solder.numerics.scheme", message, solder.numerics.scheme, "ispg")]
+    places = {"a free drop": drop.is_free, "a pad": drop.pad_radius is not None}
+    for place, is_met in places.items():
+        if is_met:
+            message = f"a section is computed of a drop on a uniform wall, not of {place}"
+            return [Problem("drop.section", message, drop.section, "none")]
+    return []
+
+
 def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what the scheme ispg is not verified for."""
     if solder.numerics.scheme != "ispg":
         return []
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
+    fewest, most = ISPG_EDGES if drop.section == "none" else SECTION_EDGES
     places = {
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
@@ -68,9 +85,7 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "walls that hold the liquid": solder.wall != "free-slip",
         "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
-        f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
-            ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
-        ),
+        f"{drop.count} particles along an edge (for {fewest} to {most} it is)": not fewest <= drop.count <= most,
         f"{drop.count} particles along an edge on a pad (up to {ISPG_PAD_EDGE} it is)": (
             drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
         ),

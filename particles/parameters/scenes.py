@@ -63,6 +63,7 @@ class Drop(Parameters):
     angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
+    With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as the cube.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -74,6 +75,7 @@ class Drop(Parameters):
     spacing: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
+    section: Literal["none", "axisymmetric"] = "none"
 
     @property
     def symmetry_axes(self) -> tuple[int, ...]:
@@ -83,6 +85,8 @@ class Drop(Parameters):
     @property
     def particles(self) -> int:
         """Number of particles of the cube, or of the part of it that is computed."""
+        if self.section != "none":
+            return self.count * (1 + round((self.count - 1) / pi**0.5))
         cuts = len(self.symmetry_axes)
         return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
 

@@ -14,6 +14,8 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
 from reflowshock.particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
+from reflowshock.particles.scenes.section_drop import start_section
+from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
@@ -55,7 +57,8 @@ def drop_to_rest(
     reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
     shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics))
-    return DropAtRest(with_shape_error(shape, solder, reference), effects, reference)
+    surface = flow.body.narrow() if isinstance(flow.body, Section) else flow.body
+    return DropAtRest(with_shape_error(shape, solder, reference, surface), effects, reference)
 
 
 def flow_to_rest(
@@ -66,6 +69,11 @@ def flow_to_rest(
 ) -> tuple[LiquidFlow, Run]:
     """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
     acting = switched(decide_drop(solder, drop.is_free))
+    if drop.section != "none":
+        section = start_section(drop, solder, acting)
+        return section, run_to_rest(
+            section, stop_rule(section.body.cloud, solder, acting), progress, checkpoint=checkpoint
+        )
     whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
     cloud = cut(whole, drop.symmetry_axes)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))

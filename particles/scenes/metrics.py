@@ -78,11 +78,17 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
-def with_shape_error(shape: JointShape, solder: Solder, reference: Meridian | None) -> JointShape:
-    """Add the error of the whole free surface, over the cube root of the volume, where there is an exact one."""
+def with_shape_error(
+    shape: JointShape, solder: Solder, reference: Meridian | None, surface: Body | None = None
+) -> JointShape:
+    """Add the error of the whole free surface, over the cube root of the volume, where there is an exact one.
+
+    That of a body that is not shown as it was computed is measured on its own surface.
+    """
     if reference is None or shape.verdict in ("open", "bridged"):
         return shape
-    error = shape_error(shape.points, shape.triangles, reference) / float(np.cbrt(solder.volume))
+    measured = shape if surface is None else surface
+    error = shape_error(measured.points, measured.triangles, reference) / float(np.cbrt(solder.volume))
     return replace(shape, metrics=shape.metrics | {"shape_error": (error, "")})
 
 
@@ -125,7 +131,8 @@ def _weight(flow: LiquidFlow) -> float:
 
 def particle_pressure(flow: LiquidFlow) -> Floats:
     """Pressure of the particles above ambient `(n,)` [Pa], with the hydrostatic part that acts as a surface force."""
-    return flow.body.pressure - _weight(flow) * flow.body.points[:, 2]
+    body = flow.body.whole()
+    return body.pressure - _weight(flow) * body.points[:, 2]
 
 
 def contact_radius(body: Body, wall: int) -> float:
@@ -216,7 +223,8 @@ def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | 
     The scatter is the standard deviation from the hydrostatic pressure, over the capillary pressure of a sphere of the
     body's width.
     """
-    body, first = flow.body, flow.body.cloud.surface_count
+    body = flow.body.whole()
+    first = body.cloud.surface_count
     mean = float(particle_pressure(flow)[first:].mean())
     capillary = 4.0 * solder.surface_tension / run.profiles[-1].max_width
     metrics: Metrics = {"mean_pressure": (mean, "Pa")}
@@ -247,6 +255,7 @@ def particles_lost(body: Body) -> int:
 
     Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
     """
+    body = body.whole()
     cloud, inside, corners = body.cloud, body.points.copy(), [body.points[body.triangles]]
     for wall, plate in enumerate(body.plates):
         inside[cloud.wall == wall] -= LITTLE * cloud.spacing * plate.side * plate.normal

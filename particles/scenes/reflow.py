@@ -191,14 +191,14 @@ def joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: 
 
 def collect_shape(solder: Solder, flow: LiquidFlow, run: Run, metrics: Metrics) -> JointShape:
     """Collect the result of a run."""
-    body, cloud = flow.body, flow.body.cloud
+    body = flow.body.whole()
     return JointShape(
         points=body.points,
         velocity=body.velocity,
         pressure=particle_pressure(flow),
-        surface_points=body.points[: cloud.surface_count],
+        surface_points=body.points[: body.cloud.surface_count],
         triangles=body.triangles,
-        rings=cloud.rings,
+        rings=body.cloud.rings,
         history=run.history(solder.viscosity / solder.surface_tension),
         snapshots=run.snapshots,
         metrics=metrics,

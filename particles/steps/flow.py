@@ -7,7 +7,7 @@ ends each step with no more energy than it had (`descent`).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,8 +19,11 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
 from reflowshock.particles.steps.interior_shift import interior_shift
+from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
 from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep
+from reflowshock.particles.surface.profile import Profile, fit_profile
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 SKIN = 0.2
 FLIP_INTERVAL = 2
@@ -56,7 +59,13 @@ class StepRecord:
 
 
 class LiquidFlow:
-    """A liquid body that flows under its physics."""
+    """A liquid body that flows under its physics.
+
+    Attributes:
+        records: what a saved one consists of.
+    """
+
+    records: ClassVar[tuple[type, ...]] = FLOW_RECORDS
 
     def __init__(self, body: Body, physics: Physics, time_step: TimeStep, solver: StepSolver) -> None:
         """Set up the neighbour list of the solver and remember the volume to keep.
@@ -106,7 +115,7 @@ class LiquidFlow:
         before = body.points[: body.cloud.surface_count].copy()
         motion, flips = self._descend()
         self.neighbours.update(body.points)
-        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours)
+        body.points[body.cloud.surface_count :] += interior_shift(body, self.neighbours, self.outward())
         self.steps += 1
         self.time += self.time_step.size
         self.pace = (body.points[: len(before)] - before) / self.time_step.size
@@ -114,6 +123,20 @@ class LiquidFlow:
         # Where momentum is kept, the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
+
+    def outward(self) -> Floats:
+        """Unit normals out of the liquid at the vertices of the surface `(s, 3)`."""
+        return vertex_normals(self.body.points, self.body.triangles, self.body.cloud.surface_count)
+
+    def profile(self) -> Profile:
+        """Cross-sections of the surface against their height."""
+        body = self.body
+        return fit_profile(body.points, body.triangles, body.span(), body.cloud.parts)
+
+    def snapshot(self) -> Snapshot:
+        """Particles and surface as they are."""
+        body = self.body.whole()
+        return Snapshot(self.time, body.points.copy(), body.triangles.copy())
 
     def _descend(self) -> tuple[Motion, int]:
         """Move so that the energy does not rise; return the motion and the number of flips."""

@@ -8,7 +8,6 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.core.symmetry import fold, on_plane, unit
-from reflowshock.particles.surface.surface_quality import vertex_normals
 
 REPULSION_RANGE = 1.1
 REPULSION_STRENGTH = 0.15
@@ -68,20 +67,20 @@ def _penetration(rows, points, lists, normals, depth):
     return result
 
 
-def interior_shift(body: Body, neighbours: NeighbourList) -> Floats:
+def interior_shift(body: Body, neighbours: NeighbourList, normals: Floats) -> Floats:
     """Displacements of the particles below the surface, `(m, 3)` [m]; on a wall within the wall.
 
     Args:
         body: the liquid body.
         neighbours: a valid list that reaches at least 1.1 spacings.
+        normals: out of the liquid at the vertices of the surface, `(s, 3)`.
     """
     cloud, rows = body.cloud, body.interior
     lists = (neighbours.offsets, neighbours.indices)
     shift = _repulsion(rows, body.points, lists, REPULSION_RANGE * cloud.spacing) * (REPULSION_STRENGTH * cloud.spacing)
     length = np.linalg.norm(shift, axis=1)
     shift *= np.minimum(1.0, LARGEST_SHIFT * cloud.spacing / np.maximum(length, 1e-300))[:, None]
-    normals = unit(fold(cloud, vertex_normals(body.points, body.triangles, cloud.surface_count)))
-    shift += _penetration(rows, body.points, lists, normals, SMALLEST_DEPTH * cloud.spacing)
+    shift += _penetration(rows, body.points, lists, unit(fold(cloud, normals)), SMALLEST_DEPTH * cloud.spacing)
     shift = fold(cloud, slide(body.plates, cloud.wall[rows], shift), cloud.surface_count)
     shift += _away_from_plates(body, body.points[rows] + shift)
     return shift + _away_from_symmetry(body, body.points[rows] + shift)

@@ -16,7 +16,7 @@ from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.time_step import StepCollapsed
-from reflowshock.particles.surface.profile import Profile, fit_profile
+from reflowshock.particles.surface.profile import Profile
 
 CALM_STEPS = 3
 CALM_DISPLACEMENT = 1e-4
@@ -149,7 +149,7 @@ def run_to_rest(
 
 def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, checkpoint: Checkpoint | None) -> Run:
     """Start a run, or continue that of the checkpoint, whose state the flow takes over."""
-    saved = None if checkpoint is None else checkpoint.read(RECORDS)
+    saved = None if checkpoint is None else checkpoint.read((*flow.records, Snapshot))
     if saved is not None:
         flow.restore(saved["flow"])
         return Run.restored(saved["run"])
@@ -185,7 +185,7 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     record = _step(flow)
     _refuse_plates_that_met(flow)
     run.records.append(record)
-    run.profiles.append(fit_profile(flow.body.points, flow.body.triangles, flow.body.span(), flow.body.cloud.parts))
+    run.profiles.append(flow.profile())
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
     run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
     run.moved += record.displacement
@@ -246,7 +246,7 @@ def fraction_done(records: Sequence[StepRecord], rule: StopRule) -> float:
 
 
 def _snap(run: Run, flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None) -> None:
-    snapshot = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
+    snapshot = flow.snapshot()
     run.snapshots.append(snapshot)
     run.moved = 0.0
     if on_snapshot is not None:

@@ -4,6 +4,7 @@ The area A(z) of the polygonal cross-sections is fitted by a polynomial. The int
 keeps exactly, so the fit is free of the bias of single vertices (outside the smooth surface) and chords (inside it).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,6 +107,10 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
     """
     z = points[np.unique(triangles), 2]
     low, high = span or (float(z.min()), float(z.max()))
+    return fit_areas(lambda heights: parts * section_areas(points, triangles, heights), low, high)
+
+
+def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Profile:
+    """Fit the areas `(k,)` [m^2] of cross-sections at heights `(k,)` between two [m]."""
     heights = 0.5 * (low + high) + 0.5 * (high - low) * NODES
-    areas = parts * section_areas(points, triangles, heights)
-    return Profile.of(Legendre.fit(heights, areas, DEGREE, domain=[low, high]))
+    return Profile.of(Legendre.fit(heights, areas(heights), DEGREE, domain=[low, high]))

@@ -42,6 +42,7 @@ SCHEMES = {
     "ISPG": {"solder.numerics.scheme": "ispg", "solder.effects.inertia": "on"},
 }
 SCHEME_EDGES = (5, 7, 9)  # particles per edge
+SECTION_EDGES = (8, 11, 15, 21)
 GRIPC = MOVING | {
     "solder.numerics.scheme": "gripc",
     "solder.numerics.time_step_limit": "0.5",
@@ -89,6 +90,8 @@ def drop_study(case: DropCase) -> ConvergenceStudy:
     drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
     exact = "sphere" if drop.is_free else "Young-Laplace"
     if decide_drop(case.molten, drop.is_free)["inertia"]["on"]:
+        if drop.section != "none":
+            return _study(exact, errors, (_spacing_of_drop(case, SECTION_EDGES),))
         own = "ISPG" if case.molten.numerics.scheme == "ispg" else "tetrahedra"
         return _study(exact, errors, (_spacing_of_drop(case, SCHEME_EDGES), *_other_schemes(case, own, {})))
     parameters, choices = [_spacing_of_drop(case, PER_EDGE)], _steps_of_drop(case)

@@ -54,10 +54,13 @@ def forecast_solder(case: Case) -> SolderForecast:
 
 def _of_drop(case: DropCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_drop
-    from reflowshock.particles.parameters.estimate import drop_seconds
+    from reflowshock.particles.parameters.estimate import drop_seconds, section_seconds
 
     drop = case.drop
-    return _towards_rest(case, decide_drop(case.molten, drop.is_free), drop.particles, drop_seconds(drop.particles))
+    effects = decide_drop(case.molten, drop.is_free)
+    if drop.section == "none":
+        return _towards_rest(case, effects, drop.particles, drop_seconds(drop.particles))
+    return _towards_rest(case, effects, drop.particles, 0.0, section_seconds)
 
 
 def _of_joint(case: JointCase) -> SolderForecast:
@@ -81,7 +84,13 @@ def _of_drops(case: DropsCase) -> SolderForecast:
     return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
 
 
-def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, seconds: float) -> SolderForecast:
+def _towards_rest(
+    case: SolderCase,
+    effects: Mapping[str, Any],
+    particles: int,
+    seconds: float,
+    of_ispg: Callable[[int, int], float] | None = None,
+) -> SolderForecast:
     from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
     from reflowshock.particles.steps.time_step import capillary_limit, largest_step, most_steps
 
@@ -94,7 +103,7 @@ def _towards_rest(case: SolderCase, effects: Mapping[str, Any], particles: int, 
     if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
         scheme, seconds = "inertia", inertial_seconds(particles, steps)
     if scheme == "ispg":
-        seconds = ispg_seconds(particles, steps)
+        seconds = (of_ispg or ispg_seconds)(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
     return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
 

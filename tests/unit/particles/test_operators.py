@@ -12,6 +12,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
 from reflowshock.particles.steps.time_step import TimeStep, capillary_limit
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 
 @pytest.fixture
@@ -59,18 +60,18 @@ def test_shift_keeps_particles_below_the_surface_and_on_their_wall(body):
     body.points[near_top, 2] = 1.0 + 0.1 * spacing
     neighbours = NeighbourList(2.4 * spacing, 0.0)
     neighbours.update(body.points)
-    shift = interior_shift(body, neighbours)
+    shift = interior_shift(body, neighbours, vertex_normals(body.points, body.triangles, count))
     assert body.points[near_top, 2] + shift[near_top - count, 2] < 1.0 - (SMALLEST_DEPTH - 0.11) * spacing
     assert (shift[body.cloud.wall[body.interior] >= 0, 2] == 0.0).all()
 
 
 def test_shift_equals_numpy_twin(body):
     """Twin of the repulsion, for particles deep inside."""
-    rng, spacing = np.random.default_rng(12), body.cloud.spacing
+    rng, spacing, count = np.random.default_rng(12), body.cloud.spacing, body.cloud.surface_count
     body.points[body.interior] += 0.1 * spacing * rng.uniform(-1, 1, (len(body.interior), 3))
     neighbours = NeighbourList(2.4 * spacing, 0.0)
     neighbours.update(body.points)
-    found = interior_shift(body, neighbours)
+    found = interior_shift(body, neighbours, vertex_normals(body.points, body.triangles, count))
     for k, i in enumerate(body.interior):
         if not (np.abs(body.points[i] - [0, 0, 0.5]) < 0.25).all():
             continue

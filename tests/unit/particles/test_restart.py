@@ -87,16 +87,16 @@ def stand(checkpoint):
     return [flow.body.points, *(line.state for line in flow.physics.lines)]
 
 
-def flow_of(scheme, limit):
+def flow_of(scheme, limit, section="none"):
     """A drop that moves with inertia, for the time of some steps."""
     effects = SolderEffects(inertia="on", viscosity="on")
     numerics = SolderNumerics(spacing=1e-4, scheme=scheme, time_step_limit=limit)
     solder = Solder(volume=1e-9, effects=effects, numerics=numerics, process_time=2e-4)
-    return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7), solder
+    return Drop(volume=1e-9, contact_angle=1.7, particles_per_edge=7, section=section), solder
 
 
-def flow_with(scheme, limit, checkpoint):
-    flow, run = flow_to_rest(*flow_of(scheme, limit), checkpoint=checkpoint)
+def flow_with(scheme, limit, checkpoint, section="none"):
+    flow, run = flow_to_rest(*flow_of(scheme, limit, section), checkpoint=checkpoint)
     assert len(run.records) > 8
     return [flow.body.points, flow.body.velocity, flow.body.pressure, run.history(1.0)["energy"]]
 
@@ -107,6 +107,10 @@ def flow_as_printed(checkpoint):
 
 def flow_in_galerkin_form(checkpoint):
     return flow_with("ispg", 0.5, checkpoint)
+
+
+def flow_in_section(checkpoint):
+    return flow_with("ispg", 0.5, checkpoint, "axisymmetric")
 
 
 def swing(checkpoint):
@@ -134,7 +138,8 @@ def merge_with_inertia(checkpoint):
     return [shape.points, shape.velocity, shape.pressure, shape.history["energy"]]
 
 
-RUNS = [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, swing, merge, merge_with_inertia]
+FLOWS = [flow_as_printed, flow_in_galerkin_form, flow_in_section]
+RUNS = [settle, follow, carry, stand, *FLOWS, swing, merge, merge_with_inertia]
 
 
 @pytest.mark.parametrize("run", RUNS)

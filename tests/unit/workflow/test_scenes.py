@@ -218,6 +218,26 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
 
 
 @pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("solder.numerics.scheme=energy", 'needs the scheme "ispg"; allowed: ispg'),
+        ("drop.section=plane", "one of none, axisymmetric"),
+        ("drop.pad_radius=0.4 mm", "not of a pad; allowed: none"),
+        ("drop={volume='1 mm^3',section='axisymmetric'}", "not of a free drop; allowed: none"),
+        ("drop.symmetry=half", "planes of symmetry"),
+        ("drop.particles_per_edge=45", "45 particles along an edge (for 8 to 21 it is)"),
+        ("drop.particles_per_edge=7", "7 particles along an edge (for 8 to 21 it is)"),
+        ("solder.effects.inertia=off", "drops without inertia"),
+        ("solder.wall=no-slip", "walls that hold the liquid"),
+    ],
+)
+def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, message):
+    asked = ["drop.section=axisymmetric", "solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    assert read_case(DROP, asked).drop.particles == 77
+    assert message in problems_of(DROP, *asked, setting)
+
+
+@pytest.mark.parametrize(
     ("setting", "place"),
     [
         ("joint.tilt=3 deg", "plates that are not parallel"),
