@@ -25,6 +25,7 @@ from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
+from reflowshock.particles.ispg.normal_pull import has_friction, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, with_step
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_momenta, rigid_motions
 from reflowshock.particles.physics.forces import SurfaceTension
@@ -156,7 +157,7 @@ class PreparedIspgStep:
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
-        force = self.physics.force(predicted) + base.time_step * equations.tension(guess)
+        force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
         start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
@@ -214,6 +215,12 @@ class PreparedIspgStep:
 
         start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
         return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+
+    def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
+        """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
+        if has_friction(self.physics):
+            return normal_pull(body, self.physics, equations.masses)
+        return self.physics.force(body)
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""

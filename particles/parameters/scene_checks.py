@@ -66,7 +66,6 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
         "hysteresis": drop.hysteresis is not None,
-        "walls that hold the liquid": solder.wall != "free-slip",
         "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (

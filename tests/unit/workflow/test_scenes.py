@@ -204,7 +204,6 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
         ("drop.symmetry=half", "planes of symmetry"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
-        ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
         (
@@ -218,6 +217,12 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG]
     assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(DROP, *asked, setting)
+
+
+@pytest.mark.parametrize("wall", [("wall=no-slip",), ("wall=slip", "slip_length=0.05 mm")])
+def test_the_scheme_ispg_takes_walls_with_friction(wall):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
+    assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
 
 
 @pytest.mark.parametrize(

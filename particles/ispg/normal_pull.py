@@ -1,0 +1,53 @@
+"""Forces of the surface across it only, for walls with friction.
+
+A uniform tension pulls a surface along its normals, and its contact line across it. The gradient of the energy of
+triangles has a part along the surface, too: it moves vertices back from where evening out has taken them. Evening out
+feels no friction, the way back does: where triangles are not symmetric a drop crawled along its wall at 1e-3 spacings
+a step for ever. Without friction its momentum forbids that, and forces are left the gradient of an energy.
+
+The net force stays what it was, zero: that of the part along the surface acts across it, like a pressure; its moment
+acts as a swirl.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
+from reflowshock.particles.physics.physics import Physics
+
+
+def has_friction(physics: Physics) -> bool:
+    """Whether walls resist liquid that slides on them."""
+    return bool(physics.frictions or physics.holds)
+
+
+def normal_pull(body: Body, physics: Physics, masses: Floats) -> Floats:
+    """Forces of the surface and its walls `(n, 3)` [N]; masses of the particles `(n,)` [kg].
+
+    Net force and moment are those of the whole forces, along the rigid motions that the walls would admit without
+    friction.
+    """
+    force = physics.force(body)
+    slope = physics.admit(body, body.volume()[1])
+    normal = slope / np.maximum(np.linalg.norm(slope, axis=1), np.finfo(float).tiny)[:, None]
+    along = physics.admit(body, force)
+    along -= (along * normal).sum(axis=1)[:, None] * normal
+    shifts, turns = np.split(admitted_motions(body, replace(physics, lines=(), holds=())), 2)
+    centre = masses @ body.points / masses.sum()
+    motions = rigid_motions(body.points - centre)
+    across = np.einsum("kid,id->ki", motions[:3][shifts], normal)[..., None] * slope
+    along -= _with_net(along, motions[:3][shifts], across)
+    swirls = motions[3:][turns]
+    along -= _with_net(along, swirls, masses[:, None] * swirls)
+    return force - along
+
+
+def _with_net(force: Floats, motions: Floats, fields: Floats) -> Floats:
+    """The sum of k force fields `(k, n, 3)` that has the power of a force `(n, 3)` in k rigid motions `(k, n, 3)`."""
+    unit = np.ones(len(force))
+    powers = np.array([rigid_momenta(motions, unit, field) for field in fields]).T
+    shares = np.linalg.solve(powers, rigid_momenta(motions, unit, force)) if len(fields) else np.zeros(0)
+    return np.tensordot(shares, fields, axes=1)
