@@ -84,10 +84,8 @@ def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find joints that the scheme ispg is not verified for."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     places = {
-        "plates that are not parallel": joint.tilt != 0.0,
         "packages that float": joint.package is not None,
         "packages that are moved": joint.path is not None,
-        "walls that hold the liquid": solder.wall != "free-slip",
         f"joints without inertia ({inertia['why']})": not inertia["on"],
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])

@@ -38,9 +38,11 @@ def test_nothing_pulls_along_the_surface_but_a_swirl(body):
     pull = physics.admit(body, normal_pull(body, physics, masses))
     normal = physics.admit(body, body.volume()[1])[:count]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    swirl = pull[-1, 0] / (body.points.mean(axis=0) - body.points[-1])[1] * rigid_motions(
-        body.points - body.points.mean(axis=0)
-    )[5]
+    swirl = (
+        pull[-1, 0]
+        / (body.points.mean(axis=0) - body.points[-1])[1]
+        * rigid_motions(body.points - body.points.mean(axis=0))[5]
+    )
     assert pull[count:] == pytest.approx(swirl[count:], abs=1e-12)
     along = (pull - swirl)[:count]
     assert along - (along * normal).sum(axis=1)[:, None] * normal == pytest.approx(0.0, abs=1e-12)

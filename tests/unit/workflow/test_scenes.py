@@ -228,16 +228,19 @@ def test_the_scheme_ispg_takes_walls_with_friction(wall):
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
-        ("joint.tilt=3 deg", "plates that are not parallel"),
         ("joint.package.load=0.1 mN", "packages that float"),
         ("joint.path.standoff=0.4 mm", "packages that are moved"),
-        ("solder.wall=no-slip", "walls that hold the liquid"),
     ],
 )
 def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
     assert read_case(JOINT, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(JOINT, *asked, setting)
+
+
+@pytest.mark.parametrize("setting", ["joint.tilt=3 deg", "solder.wall=no-slip"])
+def test_the_scheme_ispg_takes_joints_with_tilted_plates_and_walls_with_friction(setting):
+    read_case(JOINT, ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", setting])
 
 
 def test_the_scheme_ispg_takes_a_pad_that_holds_the_drop():
