@@ -66,7 +66,6 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
         "hysteresis": drop.hysteresis is not None,
-        "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
             ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
@@ -264,8 +263,11 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
     if drop.count % 2 == 0:
         message = f"with {drop.count} particles along an edge none lie in the plane of symmetry"
         return [Problem(key, message, drop.symmetry, "an odd number of particles along an edge")]
-    if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
-        message = "symmetry needs a drop that relaxes to rest, without inertia or viscosity, and not the scheme gripc"
+    flows = effects["inertia"]["on"] or effects["viscosity"]["on"]
+    if solder.numerics.scheme == "gripc" or (flows and solder.numerics.scheme != "ispg"):
+        message = (
+            "symmetry needs a drop that relaxes to rest, without inertia or viscosity, or the scheme ispg; not gripc"
+        )
         return [Problem(key, message, drop.symmetry, "none")]
     return []
 

@@ -31,7 +31,7 @@ LONG = [
 ]
 
 
-def at_rest(count, degrees, bond=0.0, **wall):
+def at_rest(count, degrees, bond=0.0, symmetry="none", **wall):
     """Metrics of a drop at rest, and its history; gravity by the Bond number."""
     angle = float(np.radians(degrees))
     numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (count - 1), time_step_limit=100.0)
@@ -39,7 +39,8 @@ def at_rest(count, degrees, bond=0.0, **wall):
     gravity = bond * PAPER["surface_tension"] / (8930.0 * 1e-6)
     fluid = {"effects": effects, "numerics": numerics, "gravity": gravity, **PAPER, **wall}
     solder = Solder(volume=1e-9, pad_contact_angle=angle, **fluid)
-    drop = drop_to_rest(Drop(volume=1e-9, contact_angle=angle, particles_per_edge=count), solder)
+    cube = Drop(volume=1e-9, contact_angle=angle, particles_per_edge=count, symmetry=symmetry)
+    drop = drop_to_rest(cube, solder)
     metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0
     return metrics, drop.shape.history
@@ -166,6 +167,18 @@ FINER = [(count, angle, wall) for count in (7, 11) for angle in (60.0, 120.0) fo
 def test_walls_with_friction_do_not_change_the_rest(count, degrees, wall):
     """Such drops crawled along their wall for ever, driven by the evening out of triangles."""
     metrics, _ = at_rest(count, degrees, **wall)
+    assert abs(metrics["height_error"]) < 0.005
+    assert abs(metrics["max_width_error"]) < 0.005
+    assert abs(metrics["energy_imbalance"]) < 0.002
+    assert abs(metrics["volume_drift"]) < 1e-12
+    assert metrics["particles_lost"] == 0
+
+
+@pytest.mark.parametrize(
+    ("count", "symmetry"), [(5, "half"), *(pytest.param(*row, marks=pytest.mark.long) for row in [(11, "quarter")])]
+)
+def test_a_part_of_a_drop_rests_as_the_whole(count, symmetry):
+    metrics, _ = at_rest(count, 60.0, symmetry=symmetry)
     assert abs(metrics["height_error"]) < 0.005
     assert abs(metrics["max_width_error"]) < 0.005
     assert abs(metrics["energy_imbalance"]) < 0.002
