@@ -1,6 +1,6 @@
 """The same sessile drop by OpenFOAM's interFoam (volume of fluid) and by this program: time to rest and errors.
 
-Run: .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes results/interfoam_drop.json)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes results/interfoam_drop.json)
 Without interFoam (Debian package openfoam) it says so and measures nothing. 1 mm^3, 60 degrees, slip wall, no gravity,
 the values that Hu et al. print. interFoam starts from a cylinder as high as the cube and solves a wedge of a body of
 revolution: one layer of cells against particles in three dimensions, which is to its advantage; its lengths are
@@ -10,39 +10,34 @@ Seconds are those of the processor, one core each.
 """
 
 import json
-import os
 import platform
-import re
 import shutil
-import subprocess
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
+from benchmarks.support import interfoam
+from benchmarks.support.interfoam import State, Wedge
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian
 from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
 from reflowshock.particles.steps.time_step import capillary_limit
 
-CASE, RESULTS = Path(__file__).parent / "interfoam", Path(__file__).parent / "results" / "interfoam_drop.json"
+RESULTS = Path(__file__).parent / "results" / "interfoam_drop.json"
 VOLUME, ANGLE = 1e-9, 60.0
 PAPER = {"density": 8930.0, "surface_tension": 4.985, "viscosity": 0.227}
-CELL, COLUMNS, ROWS = 5e-5, 32, 40
-HALF_WEDGE = np.radians(2.5)
-# Width of a cell along the radius of the circle whose sector has the area of the flat wedge.
-RADIAL = CELL * np.sqrt(np.sin(2.0 * HALF_WEDGE) / (2.0 * HALF_WEDGE))
-START_COLUMNS, START_ROWS = 11, 21
+WEDGE = Wedge(cell=5e-5, columns=32, rows=40)
+START = f"""cylinderToCell {{ p1 (0 0 -1); p2 (0 0 {21 * WEDGE.cell}); radius {11 * WEDGE.cell};
+fieldValues ( volScalarFieldValue alpha.solder 1 ); }}"""
 END_TIME, SAMPLES = 0.02, 80
 CAPILLARY_SHARE = 1.0
 STILL = 0.02
 PER_EDGE = 11
-NUMBERS = re.compile(r"List<scalar>\s*\d+\s*\((.*?)\)\s*;", re.DOTALL)
-VECTORS = re.compile(r"List<vector>\s*\d+\s*\((.*?)\)\s*;", re.DOTALL)
-CLOCK = re.compile(r"^Time = (\S+)$.*?^ExecutionTime = (\S+) s", re.DOTALL | re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,76 +52,39 @@ class Sample:
     capillary_number: float
 
 
-def parameters(solder: Solder) -> str:
-    """The dictionary that the OpenFOAM case includes."""
-    values = {
-        "across": COLUMNS * CELL * np.cos(HALF_WEDGE),
-        "aside": COLUMNS * CELL * np.sin(HALF_WEDGE),
-        "back": -COLUMNS * CELL * np.sin(HALF_WEDGE),
-        "height": ROWS * CELL,
-        "columns": COLUMNS,
-        "rows": ROWS,
-        "startHeight": START_ROWS * CELL,
-        "startRadius": START_COLUMNS * CELL,
+def parameters(solder: Solder) -> dict[str, float | str]:
+    """What the OpenFOAM case includes."""
+    return {
         "contactAngle": ANGLE,
+        "onWall": "slip",
         "solderViscosity": solder.viscosity / solder.density,
         "solderDensity": solder.density,
         "surfaceTension": solder.surface_tension,
         "endTime": END_TIME,
         "writeInterval": END_TIME / SAMPLES,
-        "largestStep": CAPILLARY_SHARE * capillary_limit(solder.density, CELL, solder.surface_tension),
+        "firstStep": 1e-8,
+        "largestStep": CAPILLARY_SHARE * capillary_limit(solder.density, WEDGE.cell, solder.surface_tension),
     }
-    return "\n".join(f"{name} {value:.12g};" for name, value in values.items()) + "\n"
 
 
-def openfoam(command: str, folder: Path) -> str:
-    """Run a command of OpenFOAM in a folder and return its log; its settings lie in the share folder beside it."""
-    installed = Path(shutil.which(command)).parent.parent / "share" / "openfoam"
-    surroundings = {"WM_PROJECT_DIR": str(installed)} | dict(os.environ)
-    return subprocess.run([command], cwd=folder, env=surroundings, check=True, capture_output=True, text=True).stdout
-
-
-def run_interfoam(folder: Path, solder: Solder) -> str:
-    """Mesh, start and run the case in a folder; return the log of interFoam."""
-    shutil.copytree(CASE, folder, dirs_exist_ok=True)
-    shutil.copytree(folder / "0.orig", folder / "0")
-    (folder / "parameters").write_text(parameters(solder))
-    for command in ("blockMesh", "setFields"):
-        openfoam(command, folder)
-    return openfoam("interFoam", folder)
-
-
-def samples(folder: Path, log: str, solder: Solder) -> list[Sample]:
+def samples(states: Iterable[State], solder: Solder) -> list[Sample]:
     """The drop at each time that was written."""
-    clock = {float(time): float(seconds) for time, seconds in CLOCK.findall(log)}
-    times = np.array(sorted(clock))
     found = []
-    for path in sorted((path for path in folder.iterdir() if is_time(path.name)), key=lambda path: float(path.name)):
-        time = float(path.name)
-        seconds = clock[times[np.abs(times - time).argmin()]]
-        alpha = np.fromstring(NUMBERS.search((path / "alpha.solder").read_text())[1], sep=" ").reshape(ROWS, COLUMNS)
-        words = VECTORS.search((path / "U").read_text())[1].replace("(", " ").replace(")", " ")
-        speed = np.linalg.norm(np.fromstring(words, sep=" ").reshape(-1, 3), axis=1).reshape(ROWS, COLUMNS)
-        fastest = float(speed[alpha > 0.9].max())
+    for state in states:
+        fastest = float(state.speed[state.alpha > 0.9].max())
         number = solder.viscosity * fastest / solder.surface_tension
-        found.append(Sample(time, seconds, *extent(alpha), number))
+        found.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
     return found
-
-
-def is_time(name: str) -> bool:
-    """Whether a folder is that of a written time after the start."""
-    return re.fullmatch(r"[0-9.e-]+", name) is not None and float(name) > 0.0
 
 
 def extent(alpha: np.ndarray) -> tuple[float, float, float]:
     """Height along the axis and width at the wall [m] from the volume fractions `(rows, columns)`; volume [m^3].
 
-    The radius of a row of cells is that of the disc with its volume; at the wall the two lowest rows are extrapolated.
+    At the wall the radii of the two lowest rows are extrapolated.
     """
-    edges = RADIAL * np.arange(COLUMNS + 1)
-    radius = np.sqrt((alpha * np.diff(edges**2)).sum(axis=1))
-    volume = np.pi * CELL * float((radius**2).sum())
-    return CELL * float(alpha[:, 0].sum()), 2.0 * float(1.5 * radius[0] - 0.5 * radius[1]), volume
+    radius = WEDGE.radii(alpha)
+    volume = np.pi * WEDGE.cell * float((radius**2).sum())
+    return WEDGE.cell * float(alpha[:, 0].sum()), 2.0 * float(1.5 * radius[0] - 0.5 * radius[1]), volume
 
 
 def settled(found: list[Sample]) -> tuple[Sample | None, list[Sample]]:
@@ -145,16 +103,16 @@ def settled(found: list[Sample]) -> tuple[Sample | None, list[Sample]]:
 def by_interfoam(solder: Solder, exact: Meridian) -> dict:
     """Time to rest and errors of interFoam."""
     with tempfile.TemporaryDirectory() as name:
-        log = run_interfoam(Path(name), solder)
-        found = samples(Path(name), log, solder)
+        log = interfoam.run(Path(name), WEDGE, parameters(solder), START)
+        found = samples(interfoam.states(Path(name), log, WEDGE), solder)
     rest, third = settled(found)
     volume, height, width, number = np.mean(
         [(sample.volume, sample.height, sample.width, sample.capillary_number) for sample in third], axis=0
     )
     scale = np.cbrt(VOLUME / volume)
     return {
-        "version": re.search(r"^Build\s*:\s*(.+)$", log, re.MULTILINE)[1],
-        "cells": ROWS * COLUMNS,
+        "version": interfoam.version(log),
+        "cells": WEDGE.rows * WEDGE.columns,
         "seconds": found[-1].seconds,
         "physical_time_to_rest": rest and rest.time,
         "seconds_to_rest": rest and rest.seconds,

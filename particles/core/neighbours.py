@@ -1,6 +1,7 @@
 """Neighbour lists: cell grid, compressed rows, Verlet skin."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ Points = NDArray[np.float64]
 
 # Cells in a radius. Three of four visited pairs are too far apart to be neighbours; with one cell, five of six.
 REACH = 2
+# Rows that are made at once.
+BLOCK = 8192
 
 
 @njit(cache=True)
@@ -51,46 +54,85 @@ def _cell_of(place, origin, size, shape):
 
 
 @njit(cache=True)
+def _columns(place, grid):
+    """Cells around a place: first and last along x, y and z, the last one excluded."""
+    _, _, _, origin, size, shape = grid
+    x, y, z = _cell_of(place, origin, size, shape)
+    along_x = max(x - REACH, 0), min(x + REACH + 1, shape[0])
+    along_y = max(y - REACH, 0), min(y + REACH + 1, shape[1])
+    return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
+
+
+@njit(cache=True)
+def _candidates(place, grid):
+    """Number of points in the cells around a place."""
+    start, shape = grid[0], grid[5]
+    along_x, along_y, (low, high) = _columns(place, grid)
+    count = 0
+    for ix in range(*along_x):
+        for iy in range(*along_y):
+            column = (ix * shape[1] + iy) * shape[2]
+            count += start[column + high] - start[column + low]
+    return count
+
+
+@njit(cache=True)
 def _visit(place, left_out, radius, grid, found):
-    """Write the points near a place into found (unless it is empty) and return their number.
+    """Write the points near a place into found, which has room for all candidates, and return their number.
 
     ``left_out``: a point that is not listed, and the first of those that are not.
     """
-    start, order, places, origin, size, shape = grid
+    start, order, places, shape = grid[0], grid[1], grid[2], grid[5]
     x, y, z = place[0], place[1], place[2]
-    cx, cy, cz = _cell_of(place, origin, size, shape)
     own, end = left_out
-    low, high = max(cz - REACH, 0), min(cz + REACH + 1, shape[2])
-    count, writes, limit = 0, found.shape[0] > 0, radius * radius
-    for ix in range(max(cx - REACH, 0), min(cx + REACH + 1, shape[0])):
-        for iy in range(max(cy - REACH, 0), min(cy + REACH + 1, shape[1])):
+    along_x, along_y, (low, high) = _columns(place, grid)
+    count, limit = 0, radius * radius
+    for ix in range(*along_x):
+        for iy in range(*along_y):
             column = (ix * shape[1] + iy) * shape[2]
             for k in range(start[column + low], start[column + high]):
                 dx, dy, dz = x - places[0, k], y - places[1, k], z - places[2, k]
                 j = order[k]
-                near = (dx * dx + dy * dy + dz * dz < limit) & (j != own) & (j < end)
-                if writes and near:
-                    found[count] = j
-                count += near
+                found[count] = j  # without a branch: the next one takes the place where this one is too far away
+                count += (dx * dx + dy * dy + dz * dz < limit) & (j != own) & (j < end)
     return count
 
 
 @njit(cache=True, parallel=True)
-def _rows(places, radius, grid, own, movers):
-    """Compressed rows: one pass counts, the other writes. ``own``: whether a point is listed in its own row."""
-    count, points = places.shape[0], grid[1].shape[0]
-    nothing = np.empty(0, np.int32)
-    offsets = np.zeros(count + 1, np.int32)
-    for i in prange(count):
+def _rows(rows, places, radius, grid, listed):
+    """Compressed rows of some places, first and last.
+
+    ``listed``: whether a point is listed in its own row, and how many places see all points.
+    """
+    (first, last), (own, movers), points = rows, listed, grid[1].shape[0]
+    count = last - first
+    room, offsets = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int32)
+    for r in prange(count):
+        room[r + 1] = _candidates(places[first + r], grid)
+    room = np.cumsum(room)
+    found = np.empty(room[count], np.int32)
+    for r in prange(count):
+        i = first + r
         left_out = (-1 if own else i, points if i < movers else movers)
-        offsets[i + 1] = _visit(places[i], left_out, radius, grid, nothing)
-    for i in range(count):
-        offsets[i + 1] += offsets[i]
+        offsets[r + 1] = _visit(places[i], left_out, radius, grid, found[room[r] : room[r + 1]])
+    for r in range(count):
+        offsets[r + 1] += offsets[r]
     indices = np.empty(offsets[count], np.int32)
-    for i in prange(count):
-        left_out = (-1 if own else i, points if i < movers else movers)
-        _visit(places[i], left_out, radius, grid, indices[offsets[i] : offsets[i + 1]])
+    for r in prange(count):
+        indices[offsets[r] : offsets[r + 1]] = found[room[r] : room[r] + offsets[r + 1] - offsets[r]]
     return offsets, indices
+
+
+def _in_blocks(
+    places: Points, radius: float, grid: tuple[Any, ...], listed: tuple[bool, int]
+) -> tuple[Indices, Indices]:
+    """Compressed rows of all places, some thousands at a time: candidates, four times the neighbours, need room."""
+    bounds = [*range(0, max(len(places), 1), BLOCK), len(places)]
+    parts = [_rows(pair, places, radius, grid, listed) for pair in pairwise(bounds)]
+    if len(parts) == 1:
+        return parts[0]
+    lengths = np.concatenate([[0], *(np.diff(offsets) for offsets, _ in parts)])
+    return np.cumsum(lengths, dtype=np.int32), np.concatenate([indices for _, indices in parts])
 
 
 def find_neighbours(points: Points, radius: float, rows: int | None = None) -> tuple[Indices, Indices]:
@@ -107,7 +149,7 @@ def find_neighbours(points: Points, radius: float, rows: int | None = None) -> t
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    return _rows(points[:rows], radius, _grid(points, points, radius), False, len(points))
+    return _in_blocks(points[:rows], radius, _grid(points, points, radius), (False, len(points)))
 
 
 def find_beside(places: Points, points: Points, radius: float, movers: int | None = None) -> tuple[Indices, Indices]:
@@ -127,7 +169,7 @@ def find_beside(places: Points, points: Points, radius: float, movers: int | Non
         FloatingPointError: a coordinate is not finite.
     """
     moving = max(len(places), len(points)) if movers is None else movers
-    return _rows(places, radius, _grid(places, points, radius), True, moving)
+    return _in_blocks(places, radius, _grid(places, points, radius), (True, moving))
 
 
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
@@ -186,10 +228,8 @@ class NeighbourList:
 
     def update(self, points: Points) -> None:
         """Make the list valid for these points `(n, 3)` [m]."""
-        if len(points) == len(self._built_at):
-            moved = np.sqrt(((points - self._built_at) ** 2).sum(axis=1).max())
-            if moved <= 0.5 * self.skin:
-                return
+        if len(points) == len(self._built_at) and not have_moved(points, self._built_at, self.skin):
+            return
         self.offsets, self.indices = find_neighbours(points, self.radius + self.skin)
         self._built_at = points.copy()
         self.builds += 1

@@ -4,9 +4,11 @@ The liquid body is closed by the polygons of its contact lines, each of which li
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats, Indices
@@ -103,10 +105,20 @@ def _wall_volume_and_gradient(points, ring, sixth, gradient):
     return sixth * (centre[0] * normals[0] + centre[1] * normals[1] + centre[2] * normals[2])
 
 
+def ahead(values: NDArray[Any]) -> NDArray[Any]:
+    """The values of the next vertices of a closed line, `(k, ...)`: np.roll by -1, which takes five times as long."""
+    return np.concatenate((values[1:], values[:1]))
+
+
+def behind(values: NDArray[Any]) -> NDArray[Any]:
+    """The values of the vertices before those of a closed line, `(k, ...)`."""
+    return np.concatenate((values[-1:], values[:-1]))
+
+
 def _area_vector(points: Floats, ring: Indices) -> Floats:
     """Normal of the polygon of a contact line times its area, `(3,)` [m^2] (shoelace formula in space)."""
     x = points[ring] - points[ring].mean(axis=0)
-    return 0.5 * np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+    return 0.5 * np.cross(x, ahead(x)).sum(axis=0)
 
 
 def ring_area(points: Floats, ring: Indices) -> float:
@@ -118,13 +130,13 @@ def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
     """Gradient of `ring_area` with respect to the vertices of the ring, `(k, 3)` [m]."""
     x, normal = points[ring], _area_vector(points, ring)
     normal /= np.linalg.norm(normal)
-    return 0.5 * np.cross(np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0), normal)
+    return 0.5 * np.cross(ahead(x) - behind(x), normal)
 
 
 def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
     """Triangles around the mean of a contact line that close the body on a wall, `(k, 3, 3)`, outward oriented."""
     x = points[ring]
-    after = np.roll(x, -1, axis=0)
+    after = ahead(x)
     centre = np.broadcast_to(x.mean(axis=0), x.shape)
     return np.stack((centre, x, after) if plate.side > 0.0 else (centre, after, x), axis=1)
 
@@ -172,7 +184,7 @@ def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices]
 
 
 @njit(cache=True)
-def _cotangents(points, triangles):
+def cotangents(points, triangles):
     """Cotangent of the angle at each corner of each triangle, `(t, 3)`."""
     result = np.empty(triangles.shape)
     for t in range(triangles.shape[0]):
@@ -186,13 +198,27 @@ def _cotangents(points, triangles):
     return result
 
 
+@njit(cache=True)
+def laplacian_product(triangles, weights, field):
+    """K v `(n, 3)` of a field `(n, 3)`, K of `cotangent_laplacian` by its half cotangents, `weights (t, 3)`."""
+    result = np.zeros_like(field)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            i, j = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            for d in range(3):
+                pull = weights[t, k] * (field[i, d] - field[j, d])
+                result[i, d] += pull
+                result[j, d] -= pull
+    return result
+
+
 def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse.csr_matrix:
     """Stiffness K of the surface Laplacian, `(size, size)`, no unit.
 
     Symmetric, positive semidefinite; K x is exactly the gradient of the area of the triangulation
     (Pinkall & Polthier 1993).
     """
-    half = 0.5 * _cotangents(points, triangles)
+    half = 0.5 * cotangents(points, triangles)
     i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
     weight = half.ravel()
     rows = np.concatenate((i, j, i, j))

@@ -13,15 +13,15 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.neighbours import find_neighbours
+from reflowshock.particles.core.neighbours import find_beside, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.collocation import Ghosts, mirror
 from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes
+from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes, with_moments
 
-# Reaches of the search for neighbours, in spacings: where one does not hold enough of them, the next is tried.
-REACHES = (2.6, 3.4, 4.4)
+# Reach of the search for neighbours in spacings, and that of particles with too few of them.
+REACH, WIDEST = 2.6, 4.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,14 @@ class Galerkin:
 
     Attributes:
         volumes: `(n,)` of the particles as points of integration [m^3].
+        carried: `(n,)` volumes whose mass the particles carry [m^3].
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
     """
 
     volumes: Floats
+    carried: Floats
     starts: NDArray[np.int64]
     columns: NDArray[np.int32]
     weights: Floats
@@ -53,13 +55,14 @@ class Galerkin:
         count, spacing = len(body.points), body.cloud.spacing
         planes = [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in body.cloud.symmetry]
         slips = [slip_length] * len(body.plates) + [np.inf] * len(planes)
-        for reach in REACHES:
-            ghosts = mirror(body.points, (*body.plates, *planes), reach * spacing, slips)
-            points = np.concatenate((body.points, ghosts.points))
-            lists = find_neighbours(points, reach * spacing, rows=count)
-            squares, lengths = kernels.supports(count, points, (*lists, reach * spacing), spacing)
-            if (squares > 0.0).all():
-                break
+        ghosts = mirror(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
+        points = np.concatenate((body.points, ghosts.points))
+        lists = find_neighbours(points, REACH * spacing, rows=count)
+        squares, lengths = kernels.supports(count, points, (*lists, REACH * spacing), spacing)
+        lacking = np.flatnonzero(squares == 0.0)
+        if len(lacking):
+            lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
+            squares, lengths = kernels.supports(count, points, (*lists, WIDEST * spacing), spacing)
         _check(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)
@@ -67,7 +70,21 @@ class Galerkin:
         columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
         _check(body, density > 0.0, "has all its neighbours in a plane")
         shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
-        return cls(nodal_volumes(body, density), starts, columns, weights, shape, ghosts)
+        volumes = nodal_volumes(body, density)
+        spread = shape.T @ volumes
+        of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
+        carried = with_moments(body, volumes + of_shapes)
+        return cls(volumes, carried, starts, columns, weights, shape, ghosts)
+
+    @property
+    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:
+        """Starts, columns and weights of the shape functions, for kernels."""
+        return self.starts, self.columns, self.weights
+
+    @property
+    def images(self) -> tuple[NDArray[np.int64], Floats]:
+        """Sources and reflections of the images, for kernels."""
+        return self.ghosts.source, self.ghosts.reflection
 
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
@@ -111,21 +128,6 @@ class Galerkin:
         result = self._nothing()
         kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
         return self._folded(result)
-
-    def divergence_rows(self) -> sparse.csr_matrix:
-        """Rows of `divergence` as a matrix `(n, 3 n)`, velocities by particle."""
-        count = len(self.starts) - 1
-        columns = (3 * self.columns[:, None] + np.arange(3, dtype=np.int32)).ravel()
-        size = 3 * (count + len(self.ghosts.source))
-        rows = sparse.csr_matrix((self.weights[:, 1:].ravel(), columns, 3 * self.starts), shape=(count, size))
-        return rows @ self._reflection(count)
-
-    def _reflection(self, count: int) -> sparse.csr_matrix:
-        """Extension of velocities by their images, `(3 (n + g), 3 n)`."""
-        blocks = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), self.ghosts.reflection))
-        source = np.concatenate((np.arange(count), self.ghosts.source))
-        starts = np.arange(len(source) + 1)
-        return sparse.bsr_matrix((blocks, source, starts), shape=(3 * len(source), 3 * count)).tocsr()
 
     def _with_images(self, field: Floats) -> Floats:
         return kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)

@@ -10,6 +10,9 @@ particles move with N v and forces act as N^T f, as printed, a zigzag of the sur
 thousandth. What evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its
 energy is least.
 
+Masses are those of the mean of the volumes V and of N^T V, of which a pressure that is linear in space pushes a
+particle on the surface with 1.3 and 0.9 times the first and the second: with masses of V alone it roughens velocities.
+
 The rows of B are V_I div at all particles, those on the free surface included, whose pressure is that of the surface.
 They add up to the rate of the enclosed volume: what nodal integration misses of it is spread over all rows, so that a
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces of an
@@ -20,9 +23,9 @@ that do.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
-from reflowshock.arrays import Floats
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 
@@ -61,9 +64,9 @@ class GalerkinEquations:
     Attributes:
         space: shape functions and volumes.
         fluid: its density, viscosity and smoothing.
-        basis: `(3 n, d)` admissible velocities, orthonormal columns, by particle.
-        stiffness: `(n, n)` of the surface tension, gamma K [N/m].
-        rigid: `(k, 3 n)` rigid motions that walls admit, by particle, orthonormal by the masses [1/sqrt(kg)].
+        admitted: `(n, 3, 3)` projections of the particles' velocities onto those that walls admit.
+        surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
+        rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
@@ -72,8 +75,8 @@ class GalerkinEquations:
 
     space: Galerkin
     fluid: Flow
-    basis: sparse.csr_matrix
-    stiffness: sparse.csr_matrix
+    admitted: Floats
+    surface: tuple[Indices, Floats]
     rigid: Floats
     drag: Floats
     unbalanced: Floats
@@ -89,7 +92,7 @@ class GalerkinEquations:
     @property
     def masses(self) -> Floats:
         """Of the particles, `(n,)` [kg]."""
-        return self.fluid.density * self.space.volumes
+        return self.fluid.density * self.space.carried
 
     def momentum(self, field: Floats) -> Floats:
         """Momenta of the particles, `(n, 3)` [kg m/s]."""
@@ -110,18 +113,20 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        basis, across = self.basis, self.basis.T
         load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
-        inverse = self.time_step * self._inverse_masses()
+        inertia = self.masses / self.time_step
+        inverse = 1.0 / inertia[:, None]
+        implicit = (self.surface, self.rigid, self.masses, self.time_step)
+        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
         solution, _ = conjugate_gradients(
-            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
-            across @ load.ravel(),
-            across @ velocity.ravel(),
+            lambda field: kernels.momentum_operator(*parts, field),
+            kernels.projected(self.admitted, load),
+            kernels.projected(self.admitted, velocity),
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
-        return (basis @ solution).reshape(-1, 3)
+        return solution
 
     def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
         """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].
@@ -134,55 +139,40 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, basis, across = self.space, self.basis, self.basis.T
-        divergence, inverse = self.constraint(start), self.time_step * self._inverse_masses()
-
-        def accelerated(pressure: Floats) -> Floats:
-            return (basis @ (inverse * (across @ self.push(pressure).ravel()))).reshape(-1, 3)
-
-        def matrix() -> sparse.csr_matrix:
-            rows = (sparse.diags(space.volumes) @ space.divergence_rows() @ basis).tocsr()
-            return (rows @ sparse.diags(inverse) @ rows.T).tocsr()
-
+        space, divergence = self.space, self.constraint(start)
+        mobility = (self.time_step / self.masses)[:, None, None] * self.admitted
+        roots = np.sqrt(self.time_step / self.masses)[:, None, None] * self.admitted
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        parts = (space.rows, space.images, self._parts, mobility)
         potential = factors.solve(
-            lambda pressure: self.constraint(accelerated(pressure)),
-            matrix,
+            lambda pressure: kernels.pressure_operator(*parts, pressure),
+            lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
         change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + accelerated(potential), change
+        return start + kernels.projected(mobility, self.push(potential)), change
 
-    def _inverse_masses(self) -> Floats:
-        """One over the mass of the particle of each admissible velocity, `(d,)` [1/kg]."""
-        return np.asarray(self.basis.multiply(self.basis).T @ np.repeat(1.0 / self.masses, 3)).ravel()
-
-    def operator(self, field: Floats) -> Floats:
-        """m/dt + V + S + dt K of a velocity, [N]."""
-        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
-        return direct + self.space.resistance(field, self.factors)
+    @property
+    def _parts(self) -> tuple[Floats, Floats]:
+        """Of the constraint: volumes of the particles, and what their gradients miss."""
+        return self.space.volumes, self.unbalanced
 
     def tension(self, field: Floats) -> Floats:
         """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, and no moment.
 
         K alone resists turning, which a surface does not: a drop would be left turning on its wall.
         """
-        rigid = self.rigid
-        moving = (rigid @ self.momentum(field).ravel()) @ rigid
-        pull = self.stiffness @ (field - moving.reshape(-1, 3))
-        return pull - self.momentum(((rigid @ pull.ravel()) @ rigid).reshape(-1, 3))
+        return kernels.pull_back(self.surface, self.rigid, self.masses, field)
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
-        volumes = self.space.volumes
-        return volumes * (self.space.divergence(field) + (self.unbalanced * field).sum() / volumes.sum())
+        return kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
 
     def push(self, pressure: Floats) -> Floats:
         """B^T p, [N]."""
-        parts = self.space.volumes * pressure
-        return self.space.divergence_load(parts) + parts.sum() / self.space.volumes.sum() * self.unbalanced
+        return kernels.pressure_forces(self.space.rows, self.space.images, self._parts, pressure)
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
         """What a velocity loses to forces that the prediction v* has set."""

@@ -21,87 +21,124 @@ def supports(count, points, lists, spacing):
     The radius is zero where the lists, which reach `lists[2]`, do not hold enough points.
     """
     offsets, indices, reach = lists
-    squares, lengths = np.zeros(count), np.zeros(count, np.int64)
+    squares, lengths = np.zeros(count), np.ones(count, np.int64)
     for i in prange(count):
-        first, last = offsets[i], offsets[i + 1]
-        distances = np.empty(last - first)
-        near = 0
-        for k in range(first, last):
-            j, square = indices[k], 0.0
-            for d in range(3):
-                square += (points[j, d] - points[i, d]) ** 2
-            distances[k - first] = square
-            near += square < (SUPPORT / WIDER * spacing) ** 2
-        support = (SUPPORT * spacing) ** 2
-        if near < FEWEST:
-            support = 0.0
-            if last - first >= FEWEST:
-                support = WIDER**2 * np.partition(distances, FEWEST - 1)[FEWEST - 1]
-                support = max(support, (SUPPORT * spacing) ** 2)
-        if support > reach**2:
-            support = 0.0
-        squares[i] = support
-        lengths[i] = 1 + (distances < support).sum()
+        own, support = indices[offsets[i] : offsets[i + 1]], (SUPPORT * spacing) ** 2
+        near, within = _count_within(points, i, own, support / WIDER**2), _count_within(points, i, own, support)
+        if near < FEWEST and len(own) >= FEWEST:
+            support = max(support, WIDER**2 * _square_of_the_fewest(points, i, own))
+            within = _count_within(points, i, own, support)
+        if max(near, len(own)) >= FEWEST and support <= reach**2:
+            squares[i] = support
+            lengths[i] += within
     return squares, lengths
 
 
 @njit(cache=True)
-def _offset(points, pair, support, basis):
-    """Linear basis of a pair (written), offsets in units of the support; square of the distance."""
-    i, j = pair
-    square = 0.0
-    basis[0] = 1.0
-    for d in range(3):
-        basis[1 + d] = (points[j, d] - points[i, d]) / support
-        square += basis[1 + d] * basis[1 + d]
-    return square
+def _square(points, i, j):
+    """Square of the distance of two points."""
+    x, y, z = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+    return x * x + y * y + z * z
 
 
 @njit(cache=True)
-def _moments(points, row, support, moments, basis):
-    """Moment matrix and its three derivatives by the position of the row's particle, lower triangles."""
+def _count_within(points, i, neighbours, limit):
+    """How many neighbours of a point are nearer than a limit, the square of a distance."""
+    count = 0
+    for j in neighbours:
+        count += _square(points, i, j) < limit
+    return count
+
+
+@njit(cache=True)
+def _square_of_the_fewest(points, i, neighbours):
+    """Square of the distance within which are just enough neighbours of a point."""
+    nearest = np.full(FEWEST, np.inf)  # ascending
+    for j in neighbours:
+        square, at = _square(points, i, j), FEWEST - 1
+        if square < nearest[at]:
+            while at > 0 and nearest[at - 1] > square:
+                nearest[at] = nearest[at - 1]
+                at -= 1
+            nearest[at] = square
+    return nearest[-1]
+
+
+@njit(cache=True)
+def with_rows(lists, rows, others):
+    """Lists of neighbours in which some rows are others, which list the point itself, too."""
+    (offsets, indices), (starts, found) = lists, others
+    number = np.full(offsets.shape[0] - 1, -1)
+    number[rows] = np.arange(rows.shape[0])
+    result, ends = np.empty(indices.shape[0] + found.shape[0], np.int32), np.zeros_like(offsets)
+    at = 0
+    for i in range(number.shape[0]):
+        n = number[i]
+        for j in indices[offsets[i] : offsets[i + 1]] if n < 0 else found[starts[n] : starts[n + 1]]:
+            if j != i:
+                result[at] = j
+                at += 1
+        ends[i + 1] = at
+    return ends, result[:at]
+
+
+@njit(cache=True)
+def _stencil(points, row, support, offsets):
+    """Offsets of a row's points in units of the support (written), and 1 - their squares `(m,)`."""
     i, columns = row
-    moments[:] = 0.0
-    for j in columns:
-        rest = 1.0 - _offset(points, (i, j), support, basis)
-        weight, slope = rest * rest * rest, 6.0 * rest * rest
-        for a in range(4):
-            for b in range(a + 1):
-                product = basis[a] * basis[b]
-                moments[0, a, b] += weight * product
-                product *= slope
-                moments[1, a, b] += product * basis[1]
-                moments[2, a, b] += product * basis[2]
-                moments[3, a, b] += product * basis[3]
+    rests = np.empty(columns.shape[0])
+    for k in range(columns.shape[0]):
+        j, square = columns[k], 0.0
+        for d in range(3):
+            offsets[k, d] = (points[j, d] - points[i, d]) / support
+            square += offsets[k, d] * offsets[k, d]
+        rests[k] = 1.0 - square
+    return rests
 
 
 @njit(cache=True)
-def _coefficients(moments, right):
-    """B and b,x b,y b,z, columns of `right` (4, 4); M b = (1, 0, 0, 0), M b,c = e_c - M,c b. False if M is singular."""
-    if not factor_spd(moments[0], 4):
-        return False
-    right[:, :] = 0.0
-    right[0, 0] = 1.0
-    first = right[:, :1]
-    substitute(moments[0], first, 4)
+def _moments(offsets, rests, moments):
+    """Moment matrix of the linear basis (1, x, y, z), lower triangle: M = sum of w p p^T, w = rest^3."""
+    m0 = mx = my = mz = xx = xy = xz = yy = yz = zz = 0.0
+    for k in range(rests.shape[0]):
+        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        weight = rests[k] * rests[k] * rests[k]
+        wx, wy, wz = weight * x, weight * y, weight * z
+        m0, mx, my, mz = m0 + weight, mx + wx, my + wy, mz + wz
+        xx, xy, xz, yy, yz, zz = xx + wx * x, xy + wx * y, xz + wx * z, yy + wy * y, yz + wy * z, zz + wz * z
+    moments[0, 0], moments[1, 0], moments[2, 0], moments[3, 0] = m0, mx, my, mz
+    moments[1, 1], moments[2, 1], moments[3, 1] = xx, xy, xz
+    moments[2, 2], moments[3, 2], moments[3, 3] = yy, yz, zz
+
+
+@njit(cache=True)
+def _slope_loads(offsets, rests, first, loads):
+    """Right-hand sides e_c - M,c b, columns of `loads (4, 3)`, by the position of the row's particle; b is `first`."""
+    loads[:] = 0.0
+    for k in range(rests.shape[0]):
+        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        slope = 6.0 * rests[k] * rests[k] * (first[0] + first[1] * x + first[2] * y + first[3] * z)
+        sx, sy, sz = slope * x, slope * y, slope * z
+        loads[0, 0] -= sx
+        loads[0, 1] -= sy
+        loads[0, 2] -= sz
+        loads[1, 0] -= sx * x
+        loads[2, 0] -= sx * y
+        loads[3, 0] -= sx * z
+        loads[2, 1] -= sy * y
+        loads[3, 1] -= sy * z
+        loads[3, 2] -= sz * z
+    loads[1, 1], loads[1, 2], loads[2, 2] = loads[2, 0], loads[3, 0], loads[3, 1]
     for c in range(3):
-        for a in range(4):
-            total = 0.0
-            for b in range(4):
-                total += (moments[1 + c, a, b] if b <= a else moments[1 + c, b, a]) * right[b, 0]
-            right[a, 1 + c] = -total
-        right[1 + c, 1 + c] += 1.0
-    rest = right[:, 1:]
-    substitute(moments[0], rest, 4)
-    return True
+        loads[1 + c, c] += 1.0
 
 
 @njit(cache=True, parallel=True)
 def shape_rows(points, lists, squares, starts, shares):
     """Columns and weights `(k, 4)` of all rows, and the density of particles `(count,)` [1/m^3].
 
-    The density counts each point by its share `(n + g,)`, without a constant factor; it is zero where the moment matrix
-    of a row is singular.
+    psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b. The
+    density counts each point by its share `(n + g,)`, without a constant factor; it is zero where M is singular.
     """
     offsets, indices = lists
     count = squares.shape[0]
@@ -109,31 +146,30 @@ def shape_rows(points, lists, squares, starts, shares):
     density = np.zeros(count)
     for i in prange(count):
         support, at = np.sqrt(squares[i]), starts[i]
-        basis, moments, right = np.empty(4), np.empty((4, 4, 4)), np.empty((4, 4))
         columns[at] = i
         for k in range(offsets[i], offsets[i + 1]):
-            square = 0.0
-            for d in range(3):
-                square += (points[indices[k], d] - points[i, d]) ** 2
-            if square < squares[i]:
+            if _square(points, i, indices[k]) < squares[i]:
                 at += 1
                 columns[at] = indices[k]
-        own = columns[starts[i] : starts[i + 1]]
-        _moments(points, (i, own), support, moments, basis)
-        if not _coefficients(moments, right):
+        own, result = columns[starts[i] : starts[i + 1]], weights[starts[i] : starts[i + 1]]
+        places, moments, first, slopes = np.empty((len(own), 3)), np.empty((4, 4)), np.zeros((4, 1)), np.empty((4, 3))
+        rests = _stencil(points, (i, own), support, places)
+        _moments(places, rests, moments)
+        if not factor_spd(moments, 4):
             continue
-        for k in range(starts[i], starts[i + 1]):
-            rest = 1.0 - _offset(points, (i, columns[k]), support, basis)
-            density[i] += shares[columns[k]] * rest * rest * rest / support**3
-            value = 0.0
-            for a in range(4):
-                value += basis[a] * right[a, 0]
-            weights[k, 0] = value * rest * rest * rest
+        first[0, 0] = 1.0
+        substitute(moments, first, 4)
+        _slope_loads(places, rests, first[:, 0], slopes)
+        substitute(moments, slopes, 4)
+        for k in range(rests.shape[0]):
+            place, rest = places[k], rests[k]
+            square = rest * rest
+            density[i] += shares[own[k]] * square * rest / support**3
+            value = first[0, 0] + first[1, 0] * place[0] + first[2, 0] * place[1] + first[3, 0] * place[2]
+            result[k, 0] = value * square * rest
             for c in range(3):
-                slope = 0.0
-                for a in range(4):
-                    slope += basis[a] * right[a, 1 + c]
-                weights[k, 1 + c] = (slope * rest + 6.0 * value * basis[1 + c]) * rest * rest / support
+                slope = slopes[0, c] + slopes[1, c] * place[0] + slopes[2, c] * place[1] + slopes[3, c] * place[2]
+                result[k, 1 + c] = (slope * rest + 6.0 * value * place[c]) * square / support
     return columns, weights, density
 
 

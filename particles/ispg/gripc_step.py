@@ -60,6 +60,11 @@ class GripcStep:
         return 1
 
     @property
+    def flip_worth(self) -> float:
+        """None: flips are Delaunay's."""
+        return 0.0
+
+    @property
     def descends(self) -> bool:
         """No: its pressure is explicit, and it loses volume."""
         return False

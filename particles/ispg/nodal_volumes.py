@@ -1,4 +1,4 @@
-"""Volumes of particles, the weights of direct nodal integration: exact for linear, nearly for quadratic polynomials.
+"""Volumes of particles, weights of direct nodal integration or masses: exact for 1 and x, nearly for x x.
 
 A particle has the cell that the density of particles around it leaves, half of one on the free surface or a wall. These
 volumes, which know the shape of the liquid only roughly, become v exp(q), q a quadratic polynomial, so that sums over
@@ -10,6 +10,7 @@ thickness h, and particles without mass are thrown out of the liquid.
 """
 
 import numpy as np
+from numba import njit
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
@@ -30,14 +31,27 @@ class NoVolumes(RuntimeError):
 def body_moments(body: Body) -> tuple[float, Floats, Floats]:
     """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
     walls = zip(body.cloud.rings, body.plates, strict=True)
-    faces = [body.points[body.triangles], *(wall_corners(body.points, ring, plate) for ring, plate in walls)]
-    corners = np.concatenate(faces)
-    volumes = np.einsum("td,td->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    total = corners.sum(axis=1)
-    second = (total * volumes[:, None]).T @ total
-    flat = corners.reshape(-1, 3)
-    second += (flat * np.repeat(volumes, 3)[:, None]).T @ flat
-    return float(volumes.sum()), volumes @ total / 4.0, second / 20.0
+    moments = _moments(body.points[body.triangles])
+    for ring, plate in walls:
+        moments += _moments(wall_corners(body.points, ring, plate))
+    return float(moments[0]), moments[1:4], moments[4:].reshape(3, 3)
+
+
+@njit(cache=True)
+def _moments(corners):
+    """Integrals of 1, x and x x over tetrahedra with the origin, `corners (t, 3, 3)`, one after the other."""
+    result, total = np.zeros(13), np.empty(3)
+    for a, b, c in corners:
+        volume = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
+        volume = (volume + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0
+        result[0] += volume
+        total[:] = a + b + c
+        for d in range(3):
+            result[1 + d] += volume * total[d] / 4.0
+            for e in range(3):
+                product = total[d] * total[e] + a[d] * a[e] + b[d] * b[e] + c[d] * c[e]
+                result[4 + 3 * d + e] += volume * product / 20.0
+    return result
 
 
 def cell_share(body: Body) -> Floats:
@@ -66,9 +80,18 @@ def nodal_volumes(body: Body, density: Floats) -> Floats:
     Raises:
         NoVolumes: there are none.
     """
-    volume, first, second = body_moments(body)
     # Around a particle of the free surface only half of its surroundings are liquid.
-    cells = cell_share(body) ** 2 / density * np.where(body.cloud.wall >= 0, 0.5, 1.0) * share(body.cloud)
+    on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
+    return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud))
+
+
+def with_moments(body: Body, cells: Floats) -> Floats:
+    """The volumes `(n,)` [m^3] closest to some cells `(n,)`, in any unit, that have the moments of the body.
+
+    Raises:
+        NoVolumes: there are none.
+    """
+    volume, first, second = body_moments(body)
     found = cells * (volume / cells.sum())
     centre, length = first / volume, np.cbrt(volume)
     offset = (body.points - centre) / length
@@ -78,13 +101,25 @@ def nodal_volumes(body: Body, density: Floats) -> Floats:
     # Products of two directions stand for two entries of x x.
     entries = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
-    factors = np.zeros(len(wanted))
+    found, missing = _fitted(powers, found, wanted, softness)
+    if missing < TOLERANCE * volume:
+        return found
+    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+
+
+@njit(cache=True)
+def _fitted(powers, volumes, wanted, softness):
+    """Volumes `(n,)` times exp(powers q) with wanted sums of powers `(n, k)`, and the largest that is missing of one.
+
+    Newton's method for q; what is missing may be softness times q.
+    """
+    factors, missing = np.zeros(len(wanted)), wanted - powers.T @ volumes
     for _ in range(NEWTON_STEPS):
-        missing = wanted - powers.T @ found - softness * factors
-        if np.abs(missing).max() < TOLERANCE * volume:
-            return found
-        change = np.linalg.solve((powers * found[:, None]).T @ powers + np.diag(softness), missing)
+        if np.abs(missing).max() < TOLERANCE * wanted[0]:
+            break
+        change = np.linalg.solve((powers * volumes.reshape(-1, 1)).T @ powers + np.diag(softness), missing)
         change /= max(1.0, np.abs(powers @ change).max())
         factors += change
-        found = found * np.exp(powers @ change)
-    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+        volumes = volumes * np.exp(powers @ change)
+        missing = wanted - powers.T @ volumes - softness * factors
+    return volumes, np.abs(missing).max()

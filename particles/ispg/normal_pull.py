@@ -58,7 +58,8 @@ def normal_pull(body: Body, physics: Physics, masses: Floats, kept: float = 0.0)
     normal = slope / np.maximum(np.linalg.norm(slope, axis=1), np.finfo(float).tiny)[:, None]
     along = physics.admit(body, force)
     along = (1.0 - kept) * (along - (along * normal).sum(axis=1)[:, None] * normal)
-    shifts, turns = np.split(admitted_motions(body, replace(physics, lines=(), holds=())), 2)
+    unheld = replace(physics, lines=(), holds=()).projections(body)
+    shifts, turns = np.split(admitted_motions(body.points, unheld), 2)
     centre = masses @ body.points / masses.sum()
     motions = rigid_motions(body.points - centre)
     across = np.einsum("kid,id->ki", motions[:3][shifts], normal)[..., None] * slope

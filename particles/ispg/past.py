@@ -1,12 +1,16 @@
 """What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
 
@@ -21,6 +25,7 @@ class LostEnergy:
         integration: to the time integration: of the momentum, and of the way that the forces act along.
         transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
+        rebuilding: to bodies made anew, where liquids meet or part.
     """
 
     viscous: float = 0.0
@@ -28,11 +33,17 @@ class LostEnergy:
     integration: float = 0.0
     transfer: float = 0.0
     evening: float = 0.0
+    rebuilding: float = 0.0
 
     @property
     def total(self) -> float:
         """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening
+        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening + self.rebuilding
+
+
+def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
+    """Losses of several flows, each by its kind."""
+    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +52,12 @@ class GalerkinPast:
 
     Attributes:
         points: `(n, 3)` where it took the particles [m].
+        centre: `(3,)` to which its momentum took that of the liquid [m].
         velocity: `(n, 3)` of the particles [m/s].
         gradient: `(n, 3, 3)` of the velocity [1/s].
         kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
         pressure: `(n,)` coefficients [Pa].
-        volumes: `(n,)` of the particles in it [m^3].
+        volumes: `(n,)` that the particles carried in it [m^3].
         evening: passes that even out the triangles after the next step.
         momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
         momenta_change: of these in it, `(6,)`.
@@ -54,6 +66,7 @@ class GalerkinPast:
     """
 
     points: Floats
+    centre: Floats
     velocity: Floats
     gradient: Floats
     kinetic: float | None
@@ -73,14 +86,27 @@ class GalerkinPast:
         losses = losses or LostEnergy()
         still, unknown = np.zeros(6), np.zeros(len(body.points))
         at_rest = (body.pressure, unknown, 1.0, still, still)
-        return cls(body.points, body.velocity, slope, None, potential, *at_rest, start, losses)
+        return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
 
-    def carried_on(self, body: Body, physics: Physics) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, and none where an edge holds them."""
-        change = np.einsum("ncd,nd->nc", self.gradient, body.points - self.points)
-        velocity = physics.admit(body, self.velocity + change)
+    def carried_on(
+        self, body: Body, physics: Physics, projections: Floats, admitted: NDArray[np.bool_]
+    ) -> "GalerkinPast":
+        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it.
+
+        The body is put where its momentum took its centre, along axes that walls admit `(3,)`: evening out triangles
+        gives volume to one side and takes it from another, and would let a drop wander over its wall.
+        """
+        change = projected(self.gradient, body.points - self.points)
+        body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
+        velocity = projected(projections, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))
         return replace(self, points=body.points, velocity=velocity, history=history)
+
+
+def centre(body: Body) -> Floats:
+    """Centre of the liquid `(3,)` [m]."""
+    volume, first, _ = body_moments(body)
+    return first / volume
 
 
 def with_step(

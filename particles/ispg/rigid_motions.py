@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Pad, Plate
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
@@ -16,10 +17,10 @@ ROUNDING = 1e-9
 TURN = 5  # about the z axis, of the rigid motions
 
 
-def admitted_motions(body: Body, physics: Physics) -> NDArray[np.bool_]:
-    """Which rigid motions walls admit, `(6,)`."""
-    motions = rigid_motions(body.points)
-    changes = [np.abs(physics.admit(body, motion) - motion).max() for motion in motions]
+def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
+    """Which rigid motions of points `(n, 3)` [m] walls admit, `(6,)`, by the projections of velocities `(n, 3, 3)`."""
+    motions = rigid_motions(points)
+    changes = [np.abs(projected(projections, motion) - motion).max() for motion in motions]
     return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
 
 
@@ -29,7 +30,7 @@ def edges_turn(body: Body, physics: Physics) -> bool:
     A vertex that an edge holds does not slide along it, either. What momentum that gives the body about the axis is
     none that it has when the edges let it go.
     """
-    unheld = admitted_motions(body, replace(physics, lines=()))[TURN]
+    unheld = admitted_motions(body.points, replace(physics, lines=()).projections(body))[TURN]
     return bool(unheld and all(_about_axis(line.pads, body.plates[line.wall]) for line in physics.lines))
 
 
@@ -51,10 +52,11 @@ def rigid_motions(points: Floats) -> Floats:
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
-    return np.tensordot(motions, masses[:, None] * velocity, axes=2)
+    return motions.reshape(len(motions), velocity.size) @ (masses[:, None] * velocity).ravel()
 
 
 def orthonormal(motions: Floats, masses: Floats) -> Floats:
-    """A basis `(k, 3 n)` of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
+    """A basis of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
     flat = motions.reshape(len(motions), 3 * len(masses))
-    return np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
+    basis = np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
+    return basis.reshape(motions.shape)

@@ -50,7 +50,7 @@ def ispg_problems(solder: Solder, place: str) -> list[Problem]:
     """Find the scheme ispg at a place where it does not hold, or is not verified; empty for other schemes."""
     if solder.numerics.scheme != "ispg":
         return []
-    message = f'the scheme "ispg" is for one drop on a wall or one joint, with inertia; it is not verified for {place}'
+    message = f'the scheme "ispg" is for drops and one joint, with inertia; it is not verified for {place}'
     return [Problem("solder.numerics.scheme", message, "ispg", "energy")]
 
 

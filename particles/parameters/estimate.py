@@ -14,8 +14,8 @@ SECONDS_PER_INERTIAL_STEP_OF_THOUSAND = 0.15
 INERTIAL_COST_EXPONENT = 1.5
 
 # Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
-SECONDS_PER_ISPG_STEP = 0.003
-SECONDS_PER_ISPG_STEP_AND_PARTICLE = 2.7e-5
+SECONDS_PER_ISPG_STEP = 0.0018
+SECONDS_PER_ISPG_STEP_AND_PARTICLE = 1.35e-5
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:

@@ -19,9 +19,9 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-ISPG_EDGES = (5, 11)
-# Below this angle a cube of fewer particles along an edge becomes a film, in which particles lack neighbours.
-ISPG_FILM_ANGLE, ISPG_FILM_EDGE = radians(60.0), 6
+ISPG_EDGES = (5, 15)
+ISPG_PAD_EDGE = 11
+ISPG_PAIR = 2000
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -46,7 +46,7 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = checks.ispg_problems(solder, "two drops") or _flow_problems(pair, solder)
+    found = _flow_problems(pair, solder) or _ispg_pair_problems(pair, solder)
     found = found or free_problems(pair, solder) or _pair_resolution(pair)
     return found or _distance_problems(pair, solder)
 
@@ -60,8 +60,7 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what the scheme ispg is not verified for."""
     if solder.numerics.scheme != "ispg":
         return []
-    inertia = decide_drop(solder, drop.is_free)["inertia"]
-    angle, few = _angle_at_rest(drop), drop.count < ISPG_FILM_EDGE
+    inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
     places = {
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
@@ -70,11 +69,9 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         f"{drop.count} particles along an edge (for {ISPG_EDGES[0]} to {ISPG_EDGES[1]} it is)": not (
             ISPG_EDGES[0] <= drop.count <= ISPG_EDGES[1]
         ),
-        f"{drop.count} particles along an edge below {deg(ISPG_FILM_ANGLE)} (at least {ISPG_FILM_EDGE})": (
-            few and angle is not None and angle < ISPG_FILM_ANGLE - ROUNDING
+        f"{drop.count} particles along an edge on a pad (up to {ISPG_PAD_EDGE} it is)": (
+            drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
         ),
-        f"{drop.count} particles along an edge on a pad (at least {ISPG_FILM_EDGE})": few
-        and drop.pad_radius is not None,
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
 
@@ -86,6 +83,18 @@ def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
         "packages that float": joint.package is not None,
         "packages that are moved": joint.path is not None,
         f"joints without inertia ({inertia['why']})": not inertia["on"],
+    }
+    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+
+
+def _ispg_pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
+    """Find pairs of drops that the scheme ispg is not verified for."""
+    inertia = decide_drop(solder, pair.is_free)["inertia"]
+    places = {
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(pair.contact_angle),
+        "walls that hold the liquid": solder.wall != "free-slip",
+        f"drops without inertia ({inertia['why']})": not inertia["on"],
+        f"two drops of {pair.particles} particles (up to {ISPG_PAIR} it is)": pair.particles > ISPG_PAIR,
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
 

@@ -13,7 +13,13 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import area_vector, cotangent_laplacian, surface_area, wall_corners
+from reflowshock.particles.core.surface_measure import (
+    area_gradient,
+    area_vector,
+    cotangent_laplacian,
+    surface_area,
+    wall_corners,
+)
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.parameters.solder import Solder
@@ -41,17 +47,14 @@ class SurfaceTension:
         """Surface energy [J]."""
         return self.coefficient * surface_area(body.points, body.triangles)
 
-    def stiffness(self, body: Body) -> sparse.csr_matrix:
-        """Stiffness gamma K of the surface, `(n, n)` [N/m]."""
-        return self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
-
     def force(self, body: Body) -> Floats:
         """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
-        return -(self.stiffness(body) @ body.points)
+        return -self.coefficient * area_gradient(body.points, body.triangles)
 
     def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
         """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
-        return sparse.kron(sparse.identity(3), time_step * self.stiffness(body), format="csr")
+        stiffness = self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
+        return sparse.kron(sparse.identity(3), time_step * stiffness, format="csr")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,8 +166,11 @@ class Wetting:
 
     def update(self, body: Body) -> None:
         """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
+        lines = [line for line in self.lines if line.has_events]
+        if not lines:
+            return
         load = self._load(body)
-        for line in self.lines:
+        for line in lines:
             line.update(body, load, self.coefficient)
 
     def attempt(self, body: Body) -> bool:
@@ -172,8 +178,11 @@ class Wetting:
 
         Alone this dents the surface: it pays where the step that follows gains more than it takes.
         """
+        lines = [line for line in self.lines if line.has_edge]
+        if not lines:
+            return False
         load, found = self._load(body), False
-        for line in self.lines:
+        for line in lines:
             near = line.near_edges(body, load, self.coefficient)
             if near.any():
                 line.catch(body, near)

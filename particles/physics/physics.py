@@ -104,6 +104,11 @@ class Physics:
         along = fold(body.cloud, slide(body.plates, body.cloud.wall, field))
         return np.where(self.pinned(body)[:, None], 0.0, along)
 
+    def projections(self, body: Body) -> Floats:
+        """The matrices `(n, 3, 3)` of `admit`, one for each particle."""
+        units = (np.broadcast_to(unit, body.points.shape) for unit in np.eye(3))
+        return np.stack([self.admit(body, unit) for unit in units], axis=2)
+
 
 class Acting(Protocol):
     """The object of an effect, `place` in `parameters/effects.py`: a class that joins what acts."""

@@ -12,7 +12,7 @@ from typing import Any
 from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.scenes.rebuild import collapsing, overlap, rebuild, touch
+from reflowshock.particles.scenes.rebuild import collapsing, hand_over, overlap, rebuild, touch
 from reflowshock.particles.steps.flow import LiquidFlow, StepRecord
 from reflowshock.particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
 from reflowshock.particles.steps.shape import Snapshot
@@ -136,11 +136,11 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[MovingDrop]:
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: MovingDrop) -> LiquidFlow:
     """Flow of the body that drops become, from the time of the latest, with their momentum; steps are counted on."""
-    body = rebuild(*(drop.flow.body for drop in drops))
+    old = [drop.flow for drop in drops]
+    body = rebuild(*(flow.body for flow in old))
     flow = start(body)
     flow.body.velocity = body.velocity
-    flow.time = max(drop.flow.time for drop in drops)
-    flow.steps = max(drop.flow.steps for drop in drops)
+    hand_over(old, [flow])
     return flow
 
 

@@ -1,7 +1,7 @@
 """Numbers of a joint or drop at rest, and their comparison with the Young-Laplace reference."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +13,7 @@ from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
 from reflowshock.particles.discretisation.inner_tetrahedra import winding_numbers
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.past import total_losses
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import Force, plate_wrench
@@ -47,7 +48,7 @@ def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run
     reference = reference_meridian(geometry, solder, _weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
-    rest = _cost_and_rest(solder, flow, run) | _ledger(flow, run)
+    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -73,7 +74,7 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
         shape["max_width_error"] = (width / reference.max_width - 1.0, "")
     if flow.physics.lines:
         shape |= _contact(solder, flow, reference)
-    rest = _cost_and_rest(solder, flow, run) | _ledger(flow, run)
+    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -261,15 +262,17 @@ def particles_lost(body: Body) -> int:
     return int((winding_numbers(below, np.concatenate(corners)) < 0.5).sum())
 
 
-def _ledger(flow: LiquidFlow, run: Run) -> Metrics:
-    """What became of the energy that the scheme ispg started with; over that energy."""
-    if not isinstance(flow.solver, IspgStep) or flow.solver.past is None:
+def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
+    """What became of the energy that the scheme ispg started with, in all bodies; over that energy."""
+    moved = [(flow, flow.solver.past, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
+    known = [(flow, past, first) for flow, past, first in moved if past is not None]
+    if not known:
         return {}
-    past, first = flow.solver.past, flow.solver.first_energy
-    lost, kinetic, now = past.losses, past.kinetic or 0.0, run.records[-1].energy / flow.body.cloud.parts
-    names = ("viscous", "smoothing", "integration", "transfer", "evening")
-    metrics: Metrics = {f"{name}_loss": (getattr(lost, name) / first, "") for name in names}
-    return metrics | {"energy_imbalance": ((now + kinetic + lost.total) / first - 1.0, "")}
+    first = sum(energy for _, _, energy in known)
+    now = sum(flow.physics.energy(flow.body) + (past.kinetic or 0.0) for flow, past, _ in known)
+    lost = total_losses([past.losses for _, past, _ in known])
+    metrics: Metrics = {f"{entry.name}_loss": (getattr(lost, entry.name) / first, "") for entry in fields(lost)}
+    return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, "")}
 
 
 def width_change_bound(geometry: JointGeometry) -> float:

@@ -15,8 +15,11 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.core.surface_measure import centre_of_volume
-from reflowshock.particles.scenes.metrics import Metrics, particle_pressure
+from reflowshock.particles.ispg.adaptation import restore_moments
+from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.rebuilt import Moving, take_over
+from reflowshock.particles.scenes.metrics import Metrics, ledger, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
@@ -86,12 +89,49 @@ def rebuild(*bodies: Body) -> Body:
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
     result = Body.at_rest(cloud_from_level_set(union, volume, walls))
-    if not walls:
-        # A neck that is closed on one side shifts the centre; no force does.
-        centres = [body.volume()[0] * centre_of_volume(body.points, body.triangles) for body in bodies]
-        result.points += sum(centres) / volume - centre_of_volume(result.points, result.triangles)
+    moments = [body_moments(body) for body in bodies]
+    centre = np.sum([moment[1] for moment in moments], axis=0) / sum(moment[0] for moment in moments)
+    _put_centre(result, walls, centre)
     result.velocity = _common_velocity(result, bodies)
     return result
+
+
+def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
+    """Shift a body so that its centre of volume is where it was `(3,)` [m], as far as its walls let it slide.
+
+    A neck that is closed on one side shifts it; no force does.
+    """
+    if any(plate.pads for plate in walls):
+        return
+    volume, first, _ = body_moments(body)
+    body.points += (centre - first / volume) * (1.0 if not walls else np.array([1.0, 1.0, 0.0]))
+
+
+def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
+    """Give flows of bodies made anew the time and the steps of the old ones.
+
+    With the scheme ispg they get their motion, centre and ledger, too.
+    """
+    for flow in new:
+        flow.time, flow.steps = max(one.time for one in old), max(one.steps for one in old)
+    before, after = _moving(old), _moving(new)
+    if len(before) == len(old) and len(after) == len(new):
+        _keep_centre(before, after)
+        take_over(after, before)
+
+
+def _moving(flows: Sequence[LiquidFlow]) -> list[Moving]:
+    """Those that the scheme ispg moves."""
+    return [Moving(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
+
+
+def _keep_centre(old: Sequence[Moving], new: Sequence[Moving]) -> None:
+    """Give new bodies the centre of volume that the old ones had together; each moves by as much."""
+    before, after = ([body_moments(part.body) for part in parts] for parts in (old, new))
+    missing = np.sum([first for _, first, _ in before], axis=0) - np.sum([first for _, first, _ in after], axis=0)
+    total = sum(volume for volume, _, _ in after)
+    for part, (volume, first, _) in zip(new, after, strict=True):
+        restore_moments(part.body, part.physics, volume, first + volume / total * missing)
 
 
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
@@ -161,6 +201,8 @@ def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], Liqu
     if any(plate.normal[2] != 1.0 or abs(neck - plate.origin[2]) < room for plate in walls):
         return []
     drops = [start(part) for part in _cut(body, walls, neck, below)]
+    hand_over([flow], drops)
+    rule = replace(rule, max_steps=flow.steps + rule.max_steps)
     return [(drop, run_to_rest(drop, rule)) for drop in drops]
 
 
@@ -209,10 +251,13 @@ def parted_shape(joint: JointShape, drops: Sequence[Flowed]) -> JointShape:
 
 def _drop_metrics(drops: Sequence[Flowed]) -> Metrics:
     """Volume and height of each drop, and what an array is judged by."""
-    metrics: Metrics = {
+    metrics: Metrics = ledger([flow for flow, _ in drops]) | {
         "max_width": (max(run.profiles[-1].max_width for _, run in drops), "m"),
         "axial_force": (0.0, "N"),
         "particles": (float(sum(len(flow.body.points) for flow, _ in drops)), ""),
+        "particles_lost": (float(sum(particles_lost(flow.body) for flow, _ in drops)), ""),
+        "at_rest": (float(all(run.at_rest for _, run in drops)), ""),
+        "time_at_rest": (max(flow.time for flow, _ in drops), "s"),
     }
     for name, (flow, run) in zip(("board", "package"), drops, strict=True):
         metrics[f"volume_{name}"] = (flow.body.volume()[0], "m^3")

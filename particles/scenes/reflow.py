@@ -18,6 +18,7 @@ from reflowshock.particles.core.cloud import Cloud, TooLittleSolder, box_cloud, 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
+from reflowshock.particles.ispg.adaptation import Adaptation
 from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
@@ -79,7 +80,9 @@ def solve_joint(
 
 def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
     """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
-    effects = switched(decide_effects(geometry, solder)) | AT_REST
+    effects = switched(decide_effects(geometry, solder))
+    if solder.numerics.scheme != "ispg":
+        effects |= AT_REST
 
     def start(body: Body) -> LiquidFlow:
         return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
@@ -142,6 +145,8 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     largest, bound = largest_step(solder, cloud.spacing)
     time_step = TimeStep(largest, cloud.spacing, largest, bound, bound)
     physics, solver = build_physics(solder, effects, lines), step_solver(solder, effects)
+    if isinstance(solver, IspgStep):
+        physics = replace(physics, events=(*physics.events, Adaptation(solver, physics)))
     return LiquidFlow(Body.at_rest(cloud), physics, time_step, solver)
 
 

@@ -81,11 +81,13 @@ class Evening:
     Attributes:
         passes: of smoothing; of the last, the part that is left of a whole number is done.
         flips: whether edges are flipped, too.
+        flip_worth: angle [rad] for which a flip may even out the numbers of triangles (`flip_to_delaunay`).
         highest: energy that the body may have afterwards [J].
     """
 
     passes: float
     flips: bool
+    flip_worth: float
     highest: float
 
 
@@ -119,7 +121,7 @@ def even_out(body: Body, physics: Physics, volume: float, evening: Evening) -> i
     cloud, triangles, points, held = body.cloud, body.triangles, body.points, Held.of(physics.lines)
     if evening.flips:
         lines = (*cloud.rings, *(on for _, on in surface_planes(cloud)))
-        body.triangles, flips = flip_to_delaunay(points, triangles, lines)
+        body.triangles, flips = flip_to_delaunay(points, triangles, lines, evening.flip_worth)
         if _smooth(body, physics, volume, evening):
             return flips
         held.restore(physics.lines)
@@ -133,17 +135,20 @@ def _smooth(body: Body, physics: Physics, volume: float, evening: Evening) -> bo
     """Smooth as far as the energy permits, at a volume [m^3]; return whether it permits any."""
     start, offset, held = body.points, _offset(body, physics, evening.passes), Held.of(physics.lines)
 
-    def excess(share: float) -> float:
+    def smooth(share: float) -> None:
         held.restore(physics.lines)
         body.points = start + share * offset
         correct_volume(body, physics, volume)
         for line in physics.lines:
             line.stop_at_edges(body)
         correct_volume(body, physics, volume)  # of the vertices that were caught
+
+    def excess(share: float) -> float:
+        smooth(share)
         return physics.energy(body) - evening.highest
 
     if np.isinf(evening.highest):
-        excess(1.0)
+        smooth(1.0)
         return True
     above = excess(1.0)
     if above <= 0.0:

@@ -103,7 +103,6 @@ class LiquidFlow:
         for event in self.physics.events:
             event.update(body)
         correct_volume(body, self.physics, self.volume)  # events move the vertices that they catch
-        self.neighbours.update(body.points)
         before = body.points[: body.cloud.surface_count].copy()
         motion, flips = self._descend()
         self.neighbours.update(body.points)
@@ -120,7 +119,8 @@ class LiquidFlow:
         """Move so that the energy does not rise; return the motion and the number of flips."""
         body, start = self.body, Start.of(self.body, self.physics.lines)
         highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
-        evening = Evening(self.solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, highest)
+        solver = self.solver
+        evening = Evening(solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, solver.flip_worth, highest)
         attempted = [event.attempt(body) for event in self.physics.events]
         if any(attempted):
             correct_volume(body, self.physics, self.volume)

@@ -119,6 +119,11 @@ class InertialStep:
         return 1
 
     @property
+    def flip_worth(self) -> float:
+        """None: flips are Delaunay's."""
+        return 0.0
+
+    @property
     def descends(self) -> bool:
         """Always: viscosity and mass only slow down what the forces drive."""
         return True

@@ -67,6 +67,11 @@ class Relaxation:
         return SMOOTHING_PASSES
 
     @property
+    def flip_worth(self) -> float:
+        """None: flips are Delaunay's."""
+        return 0.0
+
+    @property
     def descends(self) -> bool:
         """Always: the step goes along the forces."""
         return True
@@ -87,6 +92,7 @@ class Relaxation:
             self.centre = centre_of_volume(body.points, body.triangles)
         surface = body.surface()
         equations = StepEquations(surface, physics, _volume_only(surface))
+        neighbours.update(body.points)
         return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
 
     def saved(self) -> dict[str, Any]:

@@ -61,6 +61,10 @@ class StepSolver(Protocol):
         """How often the triangles are evened out after a step; less than once where it is done in part."""
 
     @property
+    def flip_worth(self) -> float:
+        """Angle [rad] beyond Delaunay's for which a flip may even out the numbers of triangles around vertices."""
+
+    @property
     def descends(self) -> bool:
         """Whether a short enough step without momentum lowers the energy."""
 

@@ -15,7 +15,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import equal_area_radius
 from reflowshock.particles.core.plate import Pad
-from reflowshock.particles.core.surface_measure import ring_area_gradient
+from reflowshock.particles.core.surface_measure import ahead, behind, ring_area_gradient
 from reflowshock.particles.core.symmetry import share, unit, whole_points
 
 PINNED, ON_PAD, ON_MASK = 0, 1, 2
@@ -79,6 +79,12 @@ class ContactLine:
         for name in SAVED:
             setattr(self, name, saved[name])
 
+    def follow(self, before: Indices, after: Indices) -> None:
+        """Keep the states of the vertices of a line that has changed: `after (k,)` names those of `before` they are."""
+        place = {vertex: number for number, vertex in enumerate(before.tolist())}
+        index = [place[vertex] for vertex in after.tolist()]
+        self.pad, self.state, self.stopped = self.pad[index], self.state[index], self.stopped[index]
+
     @property
     def has_edge(self) -> bool:
         """Whether there is a mask to leave a pad for; a uniform wall has none."""
@@ -88,6 +94,11 @@ class ContactLine:
     def has_energy(self) -> bool:
         """Whether the force on the line is the gradient of an energy, `cosine_area`."""
         return True
+
+    @property
+    def has_events(self) -> bool:
+        """Whether vertices may change their states: none does on a uniform wall."""
+        return self.has_edge
 
     def held_pads(self) -> frozenset[int]:
         """The pads that the line is on or at the edge of."""
@@ -125,18 +136,20 @@ class ContactLine:
         """
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
-        turns = np.array([_turns(local - centre).sum() for centre in self._centres])
-        total = self._mask_cosine * (_sectors(local).sum() - 0.5 * self._square @ turns)
         own = local - self._centres[pad]
-        beyond = _sectors(own) - 0.5 * self._square[pad] * _turns(own)
-        return float(total + self._beyond_mask(index) @ beyond)
+        area, beyond = _sectors(local).sum(), _sectors(own)
+        if self.has_edge:
+            turns = np.array([_turns(local - centre).sum() for centre in self._centres])
+            area -= 0.5 * self._square @ turns
+            beyond -= 0.5 * self._square[pad] * _turns(own)
+        return float(self._mask_cosine * area + self._beyond_mask(index) @ beyond)
 
     def _beyond_mask(self, index: NDArray[np.int64]) -> Floats:
         """Mean cosine of the free ends of each segment, less that of the mask; 0 from one pad to another, `(k,)`."""
         cosine, free = self.cosine()[index], (self.state[index] != PINNED).astype(float)
-        mean = (cosine + np.roll(cosine, -1)) / np.maximum(1.0, free + np.roll(free, -1))
+        mean = (cosine + ahead(cosine)) / np.maximum(1.0, free + ahead(free))
         pad = self.pad[index]
-        return np.where(pad == np.roll(pad, -1), mean - self._mask_cosine, 0.0)
+        return np.where(pad == ahead(pad), mean - self._mask_cosine, 0.0)
 
     def pinned(self, body: Body) -> Indices:
         """The pinned vertices."""
@@ -145,10 +158,10 @@ class ContactLine:
     def outward(self, body: Body) -> tuple[Floats, Floats]:
         """Direction across the line out of the liquid `(k, 3)` and length of line of each vertex `(k,)` [m]."""
         points, ring = whole_points(body.cloud, body.points, self.wall)[0], body.cloud.rings[self.wall]
-        before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+        before, after = behind(points), ahead(points)
         across = unit(np.cross(after - before, body.plates[self.wall].normal))[: len(ring)]
         step = np.linalg.norm(after - points, axis=1)
-        return across, (0.5 * (step + np.roll(step, 1)))[: len(ring)] * share(body.cloud)[ring]
+        return across, (0.5 * (step + behind(step)))[: len(ring)] * share(body.cloud)[ring]
 
     def contact_cosine(self, body: Body, load: Floats, coefficient: float) -> Floats:
         """Cosine of the contact angle at each vertex `(k,)` from the balance of forces on it.
@@ -165,7 +178,7 @@ class ContactLine:
         outward, length = self.outward(body)
         cosine = -(load[body.cloud.rings[self.wall]] * outward).sum(axis=1) / (coefficient * length)
         around = cosine[whole_points(body.cloud, body.points, self.wall)[1]]
-        return (0.5 * around + 0.25 * (np.roll(around, 1) + np.roll(around, -1)))[: len(cosine)]
+        return (0.5 * around + 0.25 * (behind(around) + ahead(around)))[: len(cosine)]
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
         """Release the vertices that their edge no longer holds, catch those that crossed one or step onto a pad.
@@ -257,26 +270,26 @@ class ContactLine:
 def _sectors(local: Floats) -> Floats:
     """Areas of the triangles between the origin and each segment of a closed line, `(k,)` [m^2]; `local (k, 2)`."""
     x, y = local.T
-    return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1))
+    return 0.5 * (x * ahead(y) - y * ahead(x))
 
 
 def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
     """Gradient of the sum of `_sectors` times weights `(k,)`, `(k, 2)` [m]."""
-    ahead, behind = weight[:, None], np.roll(weight, 1)[:, None]
-    across = ahead * np.roll(local, -1, axis=0) - behind * np.roll(local, 1, axis=0)
+    own, before = weight[:, None], behind(weight)[:, None]
+    across = own * ahead(local) - before * behind(local)
     return 0.5 * np.column_stack((across[:, 1], -across[:, 0]))
 
 
 def _turns(local: Floats) -> Floats:
     """Angles about the origin under which each segment of a closed line is seen, `(k,)` [rad]; `local (k, 2)`."""
-    after = np.roll(local, -1, axis=0)
+    after = ahead(local)
     return np.arctan2(2.0 * _sectors(local), (local * after).sum(axis=1))
 
 
 def _turns_gradient(local: Floats, weight: Floats) -> Floats:
     """Gradient of the sum of `_turns` times weights `(k,)`, `(k, 2)` [1/m]."""
     around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
-    return (np.roll(weight, 1) - weight)[:, None] * around
+    return (behind(weight) - weight)[:, None] * around
 
 
 class HystereticLine(ContactLine):
@@ -304,6 +317,11 @@ class HystereticLine(ContactLine):
     def has_energy(self) -> bool:
         """None: what a line that stands and moves takes is friction."""
         return False
+
+    @property
+    def has_events(self) -> bool:
+        """Always: vertices stand and go."""
+        return True
 
     def cosine_area_gradient(self, body: Body) -> Floats:
         """Force over the surface tension: the angle that acts on each vertex times the gradient of the wetted area."""

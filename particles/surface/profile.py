@@ -7,11 +7,12 @@ keeps exactly, so the fit is free of the bias of single vertices (outside the sm
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.polynomial import Legendre
 
 from reflowshock.arrays import Floats, Indices
 
-SLICES = 64
+NODES = np.polynomial.legendre.leggauss(64)[0]
 DEGREE = 6
 SAMPLES = 401
 APEX_PASSES = 4
@@ -64,42 +65,34 @@ class Profile:
         return float(end)
 
 
-def section_areas(points: Floats, triangles: Indices, heights: Floats) -> Floats:
+@njit(cache=True)
+def section_areas(points, triangles, heights):
     """Areas of the cross-sections of a surface at heights between its walls.
 
     Args:
         points: `(n, 3)` [m].
         triangles: `(t, 3)` outward oriented.
-        heights: `(k,)` of the planes, at no vertex [m].
+        heights: `(k,)` of the planes, ascending, at no vertex [m].
 
     Returns:
-        `(k,)` [m^2], by the shoelace formula on the cut segments.
+        `(k,)` [m^2], by the shoelace formula on the cut segments, the liquid on their left seen from +z.
     """
-    corner = points[triangles]
-    areas = np.empty(len(heights))
-    for k, height in enumerate(heights):
-        above = corner[:, :, 2] > height
-        cut = corner[above.any(axis=1) & ~above.all(axis=1)]
-        ends = _segments(cut, height)
-        areas[k] = 0.5 * (ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]).sum()
+    areas, ends = np.zeros(heights.shape[0]), np.empty((2, 2))
+    for t in range(triangles.shape[0]):
+        z = points[triangles[t, 0], 2], points[triangles[t, 1], 2], points[triangles[t, 2], 2]
+        for k in range(np.searchsorted(heights, min(z)), np.searchsorted(heights, max(z))):
+            above = z[0] > heights[k], z[1] > heights[k], z[2] > heights[k]
+            is_single = above[0] + above[1] + above[2] == 1
+            lone = 0 if above[0] == is_single else 1 if above[1] == is_single else 2
+            apex = points[triangles[t, lone]]
+            for turn in range(2):
+                other = points[triangles[t, (lone + turn + 1) % 3]]
+                part = (heights[k] - apex[2]) / (other[2] - apex[2])
+                for d in range(2):
+                    ends[turn, d] = apex[d] + part * (other[d] - apex[d])
+            twice = ends[0, 0] * ends[1, 1] - ends[0, 1] * ends[1, 0]
+            areas[k] += 0.5 * twice if is_single else -0.5 * twice
     return areas
-
-
-def _segments(corner: Floats, height: float) -> Floats:
-    """Segments `(c, 2, 2)` in which a plane cuts triangles, the liquid on their left seen from +z."""
-    above = corner[:, :, 2] > height
-    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
-    row = np.arange(len(corner))
-    apex = corner[row, lone]
-    ends = []
-    for turn in (1, 2):
-        other = corner[row, (lone + turn) % 3]
-        part = (height - apex[:, 2]) / (other[:, 2] - apex[:, 2])
-        ends.append(apex[:, :2] + part[:, None] * (other - apex)[:, :2])
-    segment = np.stack(ends, axis=1)
-    single_above = above[row, lone]
-    segment[~single_above] = segment[~single_above][:, ::-1]
-    return segment
 
 
 def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | None = None, parts: int = 1) -> Profile:
@@ -113,7 +106,6 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
     """
     z = points[np.unique(triangles), 2]
     low, high = span or (float(z.min()), float(z.max()))
-    nodes, _ = np.polynomial.legendre.leggauss(SLICES)
-    heights = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+    heights = 0.5 * (low + high) + 0.5 * (high - low) * NODES
     areas = parts * section_areas(points, triangles, heights)
     return Profile.of(Legendre.fit(heights, areas, DEGREE, domain=[low, high]))

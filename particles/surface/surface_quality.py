@@ -111,11 +111,26 @@ def _half_edges(triangles, count):
 
 
 @njit(cache=True)
-def _flip_pass(points, triangles, on_ring, margin):
-    """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips."""
+def _excess_triangles(triangles, on_ring):
+    """Triangles around each vertex beyond six, on a contact line beyond three."""
+    result = np.where(on_ring, -3.0, -6.0)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            result[triangles[t, k]] += 1.0
+    return result
+
+
+@njit(cache=True)
+def _flip_pass(points, triangles, on_ring, margin, worth):
+    """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips.
+
+    To them adds an angle `worth` for each triangle by which the flip evens out the numbers around its four vertices:
+    minus half the change of the sum of the squares of their excess. A flip back has the opposite of both.
+    """
     keys, order = _half_edges(triangles, points.shape[0])
     touched = np.zeros(triangles.shape[0], np.bool_)
-    flips = 0
+    excess = _excess_triangles(triangles, on_ring)
+    made, flips = np.empty(triangles.shape[0], np.int64), 0
     for e in range(keys.shape[0] - 1):
         if keys[e] != keys[e + 1]:
             continue
@@ -124,25 +139,39 @@ def _flip_pass(points, triangles, on_ring, margin):
             continue
         p, q = triangles[s, order[e] % 3], triangles[t, order[e + 1] % 3]
         i, j = triangles[s, (order[e] % 3 + 1) % 3], triangles[s, (order[e] % 3 + 2) % 3]
-        if _angle(points, p, i, j) + _angle(points, q, i, j) < np.pi + margin or (on_ring[p] and on_ring[q]):
+        angles = _angle(points, p, i, j) + _angle(points, q, i, j)
+        angles += worth * (excess[i] + excess[j] - excess[p] - excess[q] - 2.0)
+        if angles < np.pi + margin or (on_ring[p] and on_ring[q]):
             continue
         new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
         found = np.searchsorted(keys, new_key)
-        if found < keys.shape[0] and keys[found] == new_key:
+        if (found < keys.shape[0] and keys[found] == new_key) or (made[:flips] == new_key).any():
             continue
         if _folds(points, (p, q, i, j)):
             continue
         triangles[s, 0], triangles[s, 1], triangles[s, 2] = p, i, q
         triangles[t, 0], triangles[t, 1], triangles[t, 2] = p, q, j
         touched[s] = touched[t] = True
+        for vertex, change in ((i, -1.0), (j, -1.0), (p, 1.0), (q, 1.0)):
+            excess[vertex] += change
+        made[flips] = new_key
         flips += 1
     return flips
 
 
-def flip_to_delaunay(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[Indices, int]:
+def flip_to_delaunay(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], worth: float = 0.0
+) -> tuple[Indices, int]:
     """Flip edges until the surface is intrinsically Delaunay up to a margin.
 
     An edge is kept where the flip would join two vertices of contact lines, double an edge or fold the surface.
+
+    Args:
+        points: `(n, 3)` [m].
+        triangles: `(t, 3)`.
+        rings: contact lines.
+        worth: angle [rad] beyond Delaunay's by which an edge may be flipped for each triangle that this evens out
+            between vertices with more than six and vertices with fewer.
 
     Returns:
         The new triangles `(t, 3)` and the number of flips.
@@ -153,7 +182,7 @@ def flip_to_delaunay(points: Floats, triangles: Indices, rings: Sequence[Indices
         on_ring[ring] = True
     total = 0
     for _ in range(FLIP_PASSES):
-        flips = _flip_pass(points, result, on_ring, FLIP_MARGIN)
+        flips = _flip_pass(points, result, on_ring, FLIP_MARGIN, worth)
         total += flips
         if flips == 0:
             break

@@ -44,6 +44,7 @@ from reflowshock.workflow.reflow.between import open_structure
 from reflowshock.workflow.reflow.forecast import load_steps
 from tests.support import effect_switches as scene
 from tests.support.drops import solve_drop
+from tests.support.effect_switches import ELSEWHERE_OFF, ELSEWHERE_ON
 from tests.support.fem_residual import cooled, layered
 from tests.support.thermal_models import small_structure
 
@@ -52,30 +53,6 @@ G, STEPS = scene.G, 40
 Check = Callable[..., None]
 OFF: dict[str, Check] = {}
 ON: dict[str, Check] = {}
-RHEOLOGY = "tests/unit/particles/test_rheology.py"
-# What needs a whole run is tested where there is one.
-ELSEWHERE_OFF = {
-    "identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path",
-    "flow_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
-    "artificial_viscosity": "tests/verification/test_particles_flows.py::test_a_term_that_is_off_is_not_computed",
-    "shear_dependent_viscosity": f"{RHEOLOGY}::test_shear_dependence_acts_where_it_is_given_and_viscosity_acts",
-    "droplet_tension": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
-    "droplet_gravity": "tests/verification/test_particles_droplets.py::test_effects_that_are_off_do_nothing",
-}
-ELSEWHERE_ON = {
-    "flow_viscosity": "tests/verification/test_particles_flows.py::test_viscosity_that_is_left_out_changes_nothing",
-    "artificial_viscosity": "tests/verification/test_particles_flows.py::test_little_artificial_viscosity_does_little",
-    "shear_dependent_viscosity": f"{RHEOLOGY}::test_an_exponent_of_one_computes_what_constant_viscosity_does",
-    "droplet_tension": "tests/verification/test_particles_droplets.py::test_little_tension_does_little",
-    "droplet_gravity": "tests/verification/test_particles_droplets.py::test_little_weight_does_little",
-    "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
-    "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
-    "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",
-    "coarse_joints": "tests/pipeline/test_fine_joints.py::test_the_fine_joint_agrees_with_the_dns",
-    "identical_joints": "tests/pipeline/test_identical_joints.py::test_what_the_shapes_change_is_told",
-    "large_mass": "tests/mpi/test_fem_shock_methods.py::test_large_mass_at_the_holes_is_direct_acceleration",
-    "symmetry": "tests/verification/test_fem_thermal_symmetry.py::test_a_quarter_stands_for_the_whole",
-}
 
 
 def off(*names: str) -> Callable[[Check], Check]:

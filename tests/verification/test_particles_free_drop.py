@@ -104,9 +104,9 @@ def test_second_mode_of_solder_at_a_tenth_of_the_radius():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("shells", "excess"), [(5, 0.3), (7, 0.2)])
+@pytest.mark.parametrize(("shells", "excess"), [(3, 0.25), (4, 0.2), (5, 0.15), (7, 0.12)])
 def test_the_scheme_ispg_swings_with_its_period_and_decay(shells, excess):
-    """The decay is 1.26 times the exact one with 561 particles, 1.18 with 1415: smoothing takes the rest."""
+    """Of the excess, 0.21, 0.18, 0.10 and 0.08, half is the smoothing's, half that of the time integration."""
     scene = Oscillation(volume=1e-9, particles_per_radius=shells, scheme="ispg")
     metrics = solve_oscillation(scene, scene.resolve(Liquid())).metrics
     assert abs(metrics["period_error"][0]) < 0.01

@@ -1,5 +1,7 @@
 """The scheme ispg: example 4.1 of Hu et al. with inertia, to rest, and the ledger of its energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,15 +16,16 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
-from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
 from reflowshock.particles.scenes.free_drop import SECOND_MOMENT, fit_oscillation
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
+from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.time_step import TimeStep
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
-STEPS_PER_PERIOD = 60
+STEPS_PER_PERIOD = 100
 
 
 LONG = [
@@ -31,16 +34,21 @@ LONG = [
 ]
 
 
-def at_rest(count, degrees, bond=0.0, symmetry="none", **wall):
-    """Metrics of a drop at rest, and its history; gravity by the Bond number."""
+def cube(count, degrees, bond=0.0, symmetry="none", **wall):
+    """A drop and its solder; gravity by the Bond number."""
     angle = float(np.radians(degrees))
     numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (count - 1), time_step_limit=100.0)
     effects = SolderEffects(gravity="on" if bond else "off", inertia="on", viscosity="on")
     gravity = bond * PAPER["surface_tension"] / (8930.0 * 1e-6)
     fluid = {"effects": effects, "numerics": numerics, "gravity": gravity, **PAPER, **wall}
     solder = Solder(volume=1e-9, pad_contact_angle=angle, **fluid)
-    cube = Drop(volume=1e-9, contact_angle=angle, particles_per_edge=count, symmetry=symmetry)
-    drop = drop_to_rest(cube, solder)
+    scene = Drop(volume=1e-9, contact_angle=angle, particles_per_edge=count, symmetry=symmetry)
+    return scene, solder
+
+
+def at_rest(*asked, **wall):
+    """Metrics of a drop at rest, and its history."""
+    drop = drop_to_rest(*cube(*asked, **wall))
     metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0
     return metrics, drop.shape.history
@@ -211,10 +219,35 @@ def test_a_free_drop_swings_with_its_period():
     exact_decay, exact = viscous_oscillation(2, omega, viscosity)
     decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
     assert abs(exact / found - 1.0) < 0.015
-    assert 1.0 < decay / exact_decay < 2.2
+    assert 1.0 < decay / exact_decay < 1.2
     past, first = flow.solver.past, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
     assert past.losses.viscous / start == pytest.approx(1.0 - np.exp(-2.0 * exact_decay * flow.time), rel=0.1)
-    assert past.losses.smoothing < 0.25 * past.losses.viscous
+    assert past.losses.smoothing < 0.15 * past.losses.viscous
     gained = swing.energy(ball) - first + past.kinetic - start
     assert abs(gained + past.losses.total) < 0.01 * start
+
+
+@pytest.mark.long
+def test_a_cap_of_90_degrees_swings_as_half_a_free_drop():
+    """Of twice its volume: a wall without friction is a plane of symmetry. Ohnesorge number of real solder.
+
+    The decay is 1.36 times the exact one with 343 particles.
+    """
+    drop, solder = cube(7, 90.0)
+    body, physics = (settled := flow_to_rest(drop, solder)[0]).body, settled.physics
+    volume, viscosity = body.volume()[0], 7.2e-3
+    thin = [Viscosity(viscosity) if isinstance(part, Viscosity) else part for part in physics.operators]
+    radius = np.cbrt(1.5 * volume / np.pi)
+    omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
+    body.velocity = 0.05 * omega * SECOND_MOMENT * body.points
+    flow = InertialFlow(body, replace(physics, operators=tuple(thin)), IspgStep())
+    size = 2.0 * np.pi / omega / STEPS_PER_PERIOD
+    amplitudes = []
+    for _ in range(2 * STEPS_PER_PERIOD):
+        flow.step(size)
+        amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(body)[2])) / volume / radius**2)
+    exact_decay, exact = viscous_oscillation(2, omega, viscosity / (solder.density * radius**2))
+    decay, found = fit_oscillation(size * np.arange(1, len(amplitudes) + 1), np.array(amplitudes), exact)
+    assert abs(exact / found - 1.0) < 0.01
+    assert 1.0 < decay / exact_decay < 1.5

@@ -54,7 +54,7 @@ def lowered(body, physics, steps):
 def evened(body, physics, highest, flips):
     """Energy, volume and flips of a copy of the body that was evened out."""
     copy, volume = replace(body), body.volume()[0]
-    done = even_out(copy, physics, volume, Evening(12, flips, highest))
+    done = even_out(copy, physics, volume, Evening(12, flips, 0.0, highest))
     return physics.energy(copy), copy.volume()[0] / volume, done
 
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from reflowshock.particles.core import neighbours
 from reflowshock.particles.core.neighbours import NeighbourList, find_beside, find_neighbours, have_moved
 
 
@@ -16,6 +17,17 @@ def test_rows_equal_all_pairs(shape):
     offsets, indices = find_neighbours(points, 0.2)
     found = [set(indices[offsets[i] : offsets[i + 1]]) for i in range(len(points))]
     assert found == brute_force(points, 0.2)
+
+
+def test_rows_made_in_blocks_are_the_same(monkeypatch):
+    points = np.random.default_rng(2).uniform(size=(300, 3))
+    whole = [find_neighbours(points, 0.2), find_beside(points[:90], points, 0.2, movers=50)]
+    monkeypatch.setattr(neighbours, "BLOCK", 40)
+    blocks = [find_neighbours(points, 0.2), find_beside(points[:90], points, 0.2, movers=50)]
+    assert all(
+        np.array_equal(*pair) for one, other in zip(whole, blocks, strict=True) for pair in zip(one, other, strict=True)
+    )
+    assert find_beside(points[:0], points, 0.2)[0].tolist() == [0]
 
 
 def test_points_beside_places_are_those_of_all_pairs_and_the_fixed_see_the_moving_alone():
@@ -48,10 +60,11 @@ def test_list_is_rebuilt_only_past_half_the_skin():
     points = np.random.default_rng(2).uniform(size=(50, 3))
     neighbours = NeighbourList(radius=0.3, skin=0.1)
     neighbours.update(points)
-    neighbours.update(points + [0.04, 0.0, 0.0])
+    neighbours.update(points + [0.4, 0.0, 0.0])
     assert neighbours.builds == 1
     moved = points.copy()
     moved[7] += [0.06, 0.0, 0.0]
+    moved[8] -= [0.06, 0.0, 0.0]
     neighbours.update(moved)
     assert neighbours.builds == 2
 

@@ -11,11 +11,12 @@ from scipy import sparse
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.scenes import Drop, Drops
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.physics.plate_motion import LIFT, Floating
 from reflowshock.particles.scenes.carried_joint import carried_shape, carry_joint
 from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
+from reflowshock.particles.scenes.drop_pair import pair_to_rest
 from reflowshock.particles.scenes.drops import run_drops
 from reflowshock.particles.scenes.free_drop import solve_free_drop
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
@@ -123,7 +124,20 @@ def merge(checkpoint):
     return [drop.flow.body.points for drop in drops]
 
 
-@pytest.mark.parametrize("run", [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, swing, merge])
+def merge_with_inertia(checkpoint):
+    """Two balls that are one from the start, whose surface is split and collapses on the way."""
+    scene = Drops(volume_left=1e-10, volume_right=2e-10, distance=6.6e-4, spacing=1e-4)
+    solder = flow_of("ispg", 20.0)[1].model_copy(update={"volume": scene.volume, "process_time": 8e-4})
+    shape = pair_to_rest(scene, solder, checkpoint=checkpoint).shape
+    assert shape.verdict == "merged" and len(shape.history["time"]) > 8
+    assert shape.metrics["rebuilding_loss"][0] > 0.01
+    return [shape.points, shape.velocity, shape.pressure, shape.history["energy"]]
+
+
+RUNS = [settle, follow, carry, stand, flow_as_printed, flow_in_galerkin_form, swing, merge, merge_with_inertia]
+
+
+@pytest.mark.parametrize("run", RUNS)
 def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):

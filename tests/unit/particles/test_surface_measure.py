@@ -7,7 +7,9 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import (
     area_gradient,
     cotangent_laplacian,
+    cotangents,
     enclosed_volume,
+    laplacian_product,
     ring_area,
     ring_area_gradient,
     surface_area,
@@ -116,3 +118,11 @@ def test_the_gradient_of_the_area_is_that_of_the_stiffness():
     assert area_gradient(points, triangles) == pytest.approx(expected, abs=1e-12)
     points[7] = points[6]
     assert np.isfinite(area_gradient(points, triangles)).all()
+
+
+def test_the_stiffness_times_a_field_needs_no_matrix():
+    cloud = box_cloud(1.0, 6)
+    field = np.random.default_rng(6).normal(size=cloud.points.shape)
+    matrix = cotangent_laplacian(cloud.points, cloud.triangles, len(cloud.points))
+    weights = 0.5 * cotangents(cloud.points, cloud.triangles)
+    assert laplacian_product(cloud.triangles, weights, field) == pytest.approx(matrix @ field, abs=1e-12)

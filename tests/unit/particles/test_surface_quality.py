@@ -38,6 +38,28 @@ def test_a_delaunay_surface_is_left_alone():
     assert (triangles == cloud.triangles).all()
 
 
+def test_flips_even_out_the_triangles_around_the_vertices_of_squares():
+    """They have eight and four by turns, all Delaunay; another time none are flipped, nor back."""
+    cloud = box_cloud(1.0, 8)
+    count = cloud.surface_count
+    top = np.flatnonzero((cloud.points[:, 2] == 1.0) & (np.abs(cloud.points[:, :2]) < 0.3).all(axis=1))
+    assert set(np.bincount(cloud.triangles.ravel(), minlength=count)[top]) == {4, 8}
+    triangles, flips = flip_to_delaunay(cloud.points, cloud.triangles, cloud.rings, worth=0.1)
+    assert flips > 0
+    assert np.abs(np.bincount(triangles.ravel(), minlength=count)[top] - 6).max() <= 1
+    assert max(opposite_angle_sums(cloud.points, triangles)) < np.pi + 0.3
+    assert flip_to_delaunay(cloud.points, triangles, cloud.rings, worth=0.1)[1] == 0
+
+
+def test_flips_of_one_pass_do_not_double_an_edge():
+    """Both edges along a narrow finger ask for the same edge across: with it twice the tip would be a flat flap."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0.1], [0.3, 0.1, 0], [1, 0, -0.1], [0.3, -0.1, 0], [2, 0, 0]])
+    sides = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [5, 2, 1], [5, 3, 2], [5, 4, 3], [5, 1, 4]]
+    triangles, flips = flip_to_delaunay(points, np.array(sides, np.int32), ())
+    assert flips > 0
+    assert np.bincount(triangles.ravel()).min() >= 3
+
+
 def test_smoothing_is_tangential_and_vanishes_on_an_even_grid():
     cloud = box_cloud(1.0, 8)
     offset = smoothing_offsets(cloud.points, cloud.triangles, cloud.surface_count, cloud.rings)

@@ -55,7 +55,7 @@ BAD_VALUES = {
     "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
     "ispg without inertia": (DROP, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "without inertia", "energy"]),
     "ispg of a joint at rest": (JOINT, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "joints without inertia"]),
-    "ispg of two drops": (PAIR, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "not verified for two drops"]),
+    "ispg of two drops at rest": (PAIR, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "drops without inertia"]),
     "no surface tension": (JOINT, "solder.effects.surface_tension=off", ["effects.surface_tension", "to rest"]),
     "two kinds": (DROP, "package.rows=3", ["[package] and [drop]", "exactly one of [package], [drop], [joint], "]),
     "pad that repels": (BALL, "drop.contact_angle=150 deg", ["drop.contact_angle", "< 148 deg", "better"]),
@@ -204,11 +204,8 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
         ("drop={volume='1 mm^3'}", "free drops"),
-        ("drop.particles_per_edge=13", "13 particles along an edge (for 5 to 11 it is)"),
-        (
-            "drop={volume='1 mm^3',contact_angle='50 deg',particles_per_edge=5}",
-            "5 particles along an edge below 60 deg",
-        ),
+        ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
         ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
     ],
 )
@@ -249,10 +246,30 @@ def test_the_scheme_ispg_takes_joints_with_tilted_plates_and_walls_with_friction
     read_case(JOINT, ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", setting])
 
 
-def test_the_scheme_ispg_takes_a_pad_that_holds_the_drop():
+@pytest.mark.parametrize(
+    ("setting", "place"),
+    [
+        ("solder.wall=no-slip", "walls that hold the liquid"),
+        ("drops.contact_angle=20 deg", "contact angles outside 30 deg to 148 deg"),
+        ("drops.spacing=0.07 mm", "particles (up to 2000 it is)"),
+    ],
+)
+def test_the_scheme_ispg_is_refused_for_two_drops_that_it_is_not_verified_for(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
-    assert read_case(BALL, asked).molten.numerics.scheme == "ispg"
-    assert "on a pad (at least 6)" in problems_of(BALL, *asked, "drop.pad_radius=0.3 mm", "drop.particles_per_edge=5")
+    assert read_case(PAIR, asked).molten.numerics.scheme == "ispg"
+    assert place in problems_of(PAIR, *asked, setting)
+
+
+@pytest.mark.parametrize("setting", ["drop.contact_angle=30 deg", "drop.pad_radius=0.3 mm"])
+def test_the_scheme_ispg_takes_few_particles_that_become_a_film_or_rest_on_a_pad(setting):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", "drop.particles_per_edge=5"]
+    case = BALL if "pad" in setting else DROP
+    assert read_case(case, [*asked, setting]).molten.numerics.scheme == "ispg"
+
+
+def test_the_scheme_ispg_is_refused_for_finer_particles_on_a_pad():
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", "drop.pad_radius=0.3 mm"]
+    assert "on a pad (up to 11 it is)" in problems_of(BALL, *asked, "drop.particles_per_edge=12")
 
 
 def test_motion_that_matters_costs_all_steps_allowed():

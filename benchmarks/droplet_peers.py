@@ -1,0 +1,223 @@
+"""Droplets and the dam break beside other codes: OpenFOAM's interFoam (volume of fluid) and PySPH (delta-SPH's kin).
+
+    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py            (both, ten minutes; results/droplet_peers.json)
+    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py dam_break  (one of them)
+
+`impact`: drops that strike a wall that holds the liquid, 90 degrees, at Weber and Reynolds numbers: width over time,
+its largest, seconds of one core. interFoam solves a wedge of a body of revolution with air, 40 cells a diameter: one
+layer of cells against particles in three dimensions, which is to its advantage. It is the Debian package openfoam.
+`dam_break`: the front of a column twice as high as wide against Martin & Moyce (1952), seconds a particle-step; both
+with as many particles in the height, the same kernel and length of it, and the speed of sound. PySPH's example has a
+stiffer equation of state, an artificial viscosity of 0.1 in place of 0.02, and no diffusion of density; with 80
+particles in the height its values become nan at 1.9 sqrt(a / 2 g), so that it is compared with fewer. It comes from
+PyPI into an environment of its own under ``build/``, and is built there in two minutes.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import venv
+from math import sqrt
+from pathlib import Path
+from time import process_time
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import pyplot as plt
+
+from benchmarks.support import interfoam
+from benchmarks.support.interfoam import Wedge
+from benchmarks.support.tables import write_tables
+from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
+from reflowshock.particles.scenes.dam_break import solve_dam_break
+from reflowshock.particles.scenes.droplet import solve_droplet
+from reflowshock.particles.sph.liquid_surface import SurfaceLost
+from reflowshock.particles.steps.time_step import capillary_limit
+
+mpl.use("Agg")
+RESULTS = Path(__file__).parent / "results" / "droplet_peers.json"
+FOLDER = Path(__file__).parents[1] / "build" / "peers"
+PYTHON = FOLDER / "pysph" / "bin" / "python"
+INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072}
+SOLDER = {"diameter": 78e-6, "density": 8150.0, "surface_tension": 0.55}
+# Liquid, Weber and Reynolds number, time to follow [D / U], particles a diameter.
+IMPACTS = {
+    "ink, We 8, Re 7.7": (INK, 8.0, 7.7, 1.8, 14),
+    "solder, We 2.4, Re 280": (SOLDER, 2.4, 280.0, 1.5, 14),
+    "solder, We 30, Re 500": (SOLDER, 30.0, 500.0, 2.5, 14),
+    "solder, We 100, Re 1000": (SOLDER, 100.0, 1000.0, 2.5, 20),
+}
+CELLS, SAMPLES = 40, 100
+# Column of PySPH's example [m]; heights of columns in particles.
+WIDTH, HEIGHT, TANK = 1.0, 2.0, 4.0
+IN_HEIGHT, FOLLOWED = (40, 60), 0.47
+# Time over sqrt(a / 2 g), place of the front over the width a: Martin & Moyce's figure 3 (a = 1.125, 2.25 inches), as
+# digitised for PySPH (BSD-3), `pysph/examples/db_exp_data.py`.
+MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
+
+
+def impact() -> dict:
+    """Every impact by both, and their widths over time as a picture."""
+    found = {name: one_impact(*given) for name, given in IMPACTS.items()}
+    draw(found)
+    return found
+
+
+def draw(found: dict) -> None:
+    """Draw widths over time, a panel an impact."""
+    figure, panels = plt.subplots(1, len(found), figsize=(4.0 * len(found), 3.2), sharey=True, layout="constrained")
+    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+        for side, label, line in (("delta_sph", "delta-SPH, 3D", "-"), ("interfoam", "interFoam, wedge", "--")):
+            row = sides[side]
+            if row is not None and "time" in row:
+                panel.plot(row["time"], row["spread"], line, label=label)
+        panel.set(title=name, xlabel="time (D / U)")
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("largest width over D")
+    panels[-1].legend()
+    RESULTS.parent.mkdir(exist_ok=True)
+    figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
+
+
+def one_impact(liquid: dict, weber: float, reynolds: float, units: float, across: int) -> dict:
+    """Width over time by both, in diameters and D / U, and its largest."""
+    numerics = DropletNumerics(particles_per_diameter=across)
+    scene = Droplet(weber=weber, reynolds=reynolds, duration=1.0, **liquid, numerics=numerics)
+    scene = scene.model_copy(update={"duration": units * scene.unit_of_time})
+    start = process_time()
+    try:
+        history = solve_droplet(scene).history
+        time, spread = history["time"] / scene.unit_of_time, history["spread"]
+        particles = {"particles": scene.particles} | row(time, spread, process_time() - start)
+    except SurfaceLost as error:
+        particles = {"particles": scene.particles, "seconds": process_time() - start, "broke": str(error)}
+    return {"delta_sph": particles, "interfoam": impact_by_interfoam(scene)}
+
+
+def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
+    """What is kept of a width over time."""
+    widest = int(np.argmax(spread))
+    kept = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
+    return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | kept
+
+
+def impact_by_interfoam(scene: Droplet) -> dict | None:
+    """The same drop by interFoam; None where it is not installed."""
+    if shutil.which("interFoam") is None:
+        print("interFoam is not installed (Debian package openfoam): nothing to compare with")
+        return None
+    cell = scene.diameter / CELLS
+    wedge = Wedge(cell, columns=2 * CELLS, rows=int(1.5 * CELLS))
+    given = {
+        "contactAngle": np.degrees(scene.angle),
+        "onWall": "noSlip",
+        "solderViscosity": scene.liquid_viscosity / scene.density,
+        "solderDensity": scene.density,
+        "surfaceTension": scene.surface_tension,
+        "endTime": scene.duration,
+        "writeInterval": scene.duration / SAMPLES,
+        "firstStep": 1e-4 * scene.unit_of_time / CELLS,
+        "largestStep": capillary_limit(scene.density, cell, scene.surface_tension),
+    }
+    start = (
+        f"sphereToCell {{ centre (0 0 {0.5 * scene.diameter}); radius {0.5 * scene.diameter};\n"
+        f"fieldValues ( volScalarFieldValue alpha.solder 1 volVectorFieldValue U (0 0 {-scene.impact_speed}) ); }}"
+    )
+    with tempfile.TemporaryDirectory() as name:
+        log = interfoam.run(Path(name), wedge, given, start)
+        found = list(interfoam.states(Path(name), log, wedge))
+    time = np.array([state.time for state in found]) / scene.unit_of_time
+    spread = np.array([2.0 * reach(state.alpha, wedge) for state in found]) / scene.diameter
+    return {"version": interfoam.version(log), "cells": wedge.rows * wedge.columns} | row(
+        time, spread, found[-1].seconds
+    )
+
+
+def reach(alpha: np.ndarray, wedge: Wedge) -> float:
+    """Largest radius [m] at which the cells of a row are half full, from one cell to the next linear."""
+    middles, largest = 0.5 * (wedge.edges[1:] + wedge.edges[:-1]), 0.0
+    for fractions in alpha:
+        full = np.flatnonzero(fractions >= 0.5)
+        if len(full) and full[-1] + 1 < len(fractions):
+            last = full[-1]
+            inner, outer = fractions[last], fractions[last + 1]
+            share = (inner - 0.5) / (inner - outer)
+            largest = max(largest, float(middles[last] + share * (middles[last + 1] - middles[last])))
+    return largest
+
+
+def dam_break() -> dict:
+    """The front by both, with so many particles in the height."""
+    there = install()
+    return {
+        str(count): {"delta_sph": dam(count)} | ({"pysph": dam_by_pysph(count)} if there else {}) for count in IN_HEIGHT
+    }
+
+
+def dam(count: int) -> dict:
+    """The column by this program."""
+    scene = DamBreak(
+        height=HEIGHT, width=WIDTH, tank_length=TANK, sensor_height=0.4, duration=FOLLOWED, density=1000.0,
+        viscosity=1e-3, numerics=SphNumerics(particles_across=count),
+    )  # fmt: skip
+    start = process_time()
+    result = solve_dam_break(scene)
+    seconds, steps = process_time() - start, int(result.metrics["steps"][0])
+    front = front_errors(result.history["time"], result.history["front"] + 0.5 * scene.spacing)
+    spent = {"particles": scene.particles, "steps": steps, "seconds": seconds}
+    return spent | rate(scene.particles, steps, seconds) | front
+
+
+def dam_by_pysph(count: int) -> dict:
+    """The same column by PySPH, whose particles start half a spacing off the wall, too."""
+    spacing = HEIGHT / count
+    with tempfile.TemporaryDirectory() as name:
+        command = [str(PYTHON), str(Path(__file__).parent / "support" / "peer_pysph.py")]
+        done = subprocess.run(
+            [*command, str(spacing), str(FOLLOWED), name], capture_output=True, text=True, check=True,
+            env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
+        )  # fmt: skip
+    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
+    place = np.array(found.pop("front"))
+    front = front_errors(np.array(found.pop("time")), place + WIDTH - place[0])
+    return found | rate(found["particles"], found["steps"], found["seconds"]) | front
+
+
+def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
+    """The front's place over what was measured, less one, at each time measured."""
+    place = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
+    return {"front_error": [float(one / measured - 1.0) for one, (_, measured) in zip(place, MEASURED, strict=True)]}
+
+
+def rate(particles: int, steps: int, seconds: float) -> dict:
+    """Particle-steps of the liquid per second of one core."""
+    return {"particle_steps_per_second": particles * steps / seconds}
+
+
+def install() -> bool:
+    """Build PySPH in its own environment; whether it is there."""
+    if not PYTHON.exists():
+        venv.create(PYTHON.parents[1], with_pip=True)
+    command = [
+        str(PYTHON),
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        "pysph==1.0b2",
+        "setuptools",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(f"PySPH is left out, pip cannot install it: {done.stderr.strip().splitlines()[-1]}")
+    return done.returncode == 0
+
+
+if __name__ == "__main__":
+    write_tables(__doc__.splitlines()[0], {"impact": impact, "dam_break": dam_break}, RESULTS)

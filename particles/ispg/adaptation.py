@@ -1,0 +1,232 @@
+"""Particles that come and go with the room: on the surface by its edges, below it by distance.
+
+An event before a step. Edges of the surface longer than 1.6 spacings are split, those shorter than 0.4 collapse. Below
+the surface a particle is put midway between two that are more than 1.5 spacings apart with nothing in between, and one
+of two nearer than 0.2 goes. Each new particle is the mean of two old ones, in place, velocity and pressure.
+
+The surface keeps its volume and centre: vertices move along it where a collapse has changed them. Momenta are kept by
+the step, which gives particles new masses and makes up for what is missing. What this takes of the energy is counted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.past import GalerkinPast
+from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.backward_difference import BackwardDifference
+from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
+
+# The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
+LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
+GAP, NEAREST = 1.5, 0.2
+# In a cubic lattice the middle of a cell is 0.87 spacings from the corners, which are 1.7 apart: no gap.
+EMPTY = 0.95
+# What is nearer to the surface than this would be pushed back at once.
+DEPTH = 0.6
+MOMENT_PASSES, ROUNDING = 16, 1e-15
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """New particles made of old ones.
+
+    Attributes:
+        first, second: `(n,)` old particles whose mean each one is.
+        surface_count: how many of them are vertices of the surface.
+        triangles: `(t, 3)` of the surface.
+        rings: contact lines.
+    """
+
+    first: Indices
+    second: Indices
+    surface_count: int
+    triangles: Indices
+    rings: tuple[Indices, ...]
+
+    def mean(self, field: Floats) -> Floats:
+        """A field `(n, ...)` of the old particles at the new ones."""
+        return 0.5 * (field[self.first] + field[self.second])
+
+
+@dataclass(frozen=True, slots=True)
+class Adaptation:
+    """The event.
+
+    Attributes:
+        solver: whose memory of the last step follows.
+        physics: what acts on the body.
+    """
+
+    solver: IspgStep
+    physics: Physics
+
+    def update(self, body: Body) -> None:
+        """Change the particles where they are too far apart or too near."""
+        if self.solver.past is None:
+            return
+        for find in (_longer, _shorter):
+            surface = find(body, not any(line.has_edge for line in self.physics.lines))
+            if surface is not None:
+                self._apply(body, _with_inner(body, surface))
+        inner = _inner_change(body)
+        if inner is not None:
+            self._apply(body, inner)
+
+    def attempt(self, _body: Body) -> bool:
+        """Nothing."""
+        return False
+
+    def _apply(self, body: Body, change: Change) -> None:
+        past = self.solver.past
+        if past is None:
+            raise ValueError("only a body that has moved changes its particles")
+        volume, first, _ = body_moments(body)
+        before = self.physics.energy(body)
+        for line in self.physics.lines:
+            line.follow(body.cloud.rings[line.wall], change.first[change.rings[line.wall]])
+        changed = not np.array_equal(change.triangles, body.triangles)
+        _take(body, change)
+        if changed:
+            restore_moments(body, self.physics, volume, first)
+        after = self.physics.energy(body)
+        losses = replace(past.losses, rebuilding=past.losses.rebuilding + before - after)
+        past = replace(_taken(past, change), potential=past.potential + after - before, losses=losses)
+        self.solver.past = past
+
+
+def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) -> None:
+    """Move a surface, as walls and edges admit, to a volume [m^3] and its integral of x `(3,)` [m^4].
+
+    Along its normal, by amounts that are linear in space: the least motions that change one of the four.
+    """
+    length = np.cbrt(volume)
+    for _ in range(MOMENT_PASSES):
+        found, moments, _ = body_moments(body)
+        centre = first / volume
+        missing = np.append(volume - found, (first - moments - (volume - found) * centre) / length)
+        if np.abs(missing).max() <= ROUNDING * volume:
+            return
+        slope = body.volume()[1]
+        normal = physics.admit(body, slope)
+        powers = np.column_stack((np.ones(len(slope)), (body.points - centre) / length))
+        flux = (slope * normal).sum(axis=1)
+        matrix = (powers * flux[:, None]).T @ powers
+        amount = np.linalg.lstsq(matrix, missing, rcond=1e-9)[0]
+        body.points = body.points + (powers @ amount)[:, None] * normal
+
+
+def _longer(body: Body, on_rings: bool) -> NewSurface | None:
+    return _if_changed(body, split_long(*_surface(body), LONGEST_EDGE * body.cloud.spacing, on_rings))
+
+
+def _shorter(body: Body, on_rings: bool) -> NewSurface | None:
+    return _if_changed(body, collapse_short(*_surface(body), SHORTEST_EDGE * body.cloud.spacing, on_rings))
+
+
+def _surface(body: Body) -> tuple[Floats, Indices, Sequence[Indices]]:
+    return body.points[: body.cloud.surface_count], body.triangles, body.cloud.rings
+
+
+def _if_changed(body: Body, surface: NewSurface) -> NewSurface | None:
+    kept = np.arange(body.cloud.surface_count)
+    return None if np.array_equal(surface.first, kept) and np.array_equal(surface.second, kept) else surface
+
+
+def _with_inner(body: Body, surface: NewSurface) -> Change:
+    """A new surface around the old particles below it."""
+    inner = body.interior
+    first, second = np.concatenate((surface.first, inner)), np.concatenate((surface.second, inner))
+    return Change(first, second, len(surface.first), surface.triangles, surface.rings)
+
+
+def _inner_change(body: Body) -> Change | None:
+    """What comes and goes below the surface, None where nothing does."""
+    gone, pairs = _too_near(body), _gaps(body)
+    if not len(gone) and not len(pairs):
+        return None
+    kept = np.setdiff1d(np.arange(len(body.points), dtype=np.int32), gone)
+    first, second = np.concatenate((kept, pairs[:, 0])), np.concatenate((kept, pairs[:, 1]))
+    return Change(first, second, body.cloud.surface_count, body.triangles, body.cloud.rings)
+
+
+def _too_near(body: Body) -> Indices:
+    """Particles below the surface to leave out: one of two that are too near."""
+    pairs = cKDTree(body.points).query_pairs(NEAREST * body.cloud.spacing, output_type="ndarray")
+    last = np.unique(pairs.max(axis=1)) if len(pairs) else np.empty(0, np.int64)
+    return last[last >= body.cloud.surface_count].astype(np.int32)
+
+
+def _gaps(body: Body) -> Indices:
+    """Pairs of particles `(m, 2)` in the middle of which there is room for another one."""
+    spacing, points = body.cloud.spacing, body.points
+    tree = cKDTree(points)
+    pairs = tree.query_pairs(2.0 * EMPTY * spacing * 1.2, output_type="ndarray").astype(np.int32)
+    apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    pairs, apart = pairs[apart > GAP * spacing], apart[apart > GAP * spacing]
+    middle = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])
+    room = tree.query(middle, distance_upper_bound=EMPTY * spacing)[0]  # infinite where there is nothing
+    wide = np.isinf(room)
+    pairs, middle, room = pairs[wide], middle[wide], apart[wide]
+    inside = _depth(body, middle) > DEPTH * spacing
+    wall = body.cloud.wall[pairs]
+    inside &= (wall[:, 0] == wall[:, 1]) | (_height(body, middle) > DEPTH * spacing)
+    chosen: list[int] = []
+    for candidate in np.argsort(-room, kind="stable"):
+        near = [np.linalg.norm(middle[candidate] - middle[one]) for one in chosen]
+        if inside[candidate] and min(near, default=np.inf) > EMPTY * spacing:
+            chosen.append(int(candidate))
+    return pairs[chosen].reshape(-1, 2)
+
+
+def _depth(body: Body, points: Floats) -> Floats:
+    """Depth of points `(m, 3)` below the tangent plane of the nearest vertex of the surface [m]."""
+    surface, slope = body.points[: body.cloud.surface_count], body.volume()[1][: body.cloud.surface_count]
+    nearest = cKDTree(surface).query(points)[1]
+    normal = slope[nearest] / np.linalg.norm(slope[nearest], axis=1)[:, None]
+    return ((surface[nearest] - points) * normal).sum(axis=1)
+
+
+def _height(body: Body, points: Floats) -> Floats:
+    """Distance of points `(m, 3)` from the nearest wall [m]."""
+    heights = [-plate.side * plate.local(points)[:, 2] for plate in body.plates]
+    return np.min([np.full(len(points), np.inf), *heights], axis=0)
+
+
+def _take(body: Body, change: Change) -> None:
+    """Give a body its new particles."""
+    wall: NDArray[np.int8] = body.cloud.wall
+    walls = np.where(wall[change.first] == wall[change.second], wall[change.first], -1).astype(np.int8)
+    body.points = change.mean(body.points)
+    body.velocity, body.pressure = change.mean(body.velocity), change.mean(body.pressure)
+    body.triangles, body.volumes = change.triangles, change.mean(body.volumes)
+    body.cloud = replace(
+        body.cloud,
+        points=body.points.copy(),
+        surface_count=change.surface_count,
+        triangles=change.triangles,
+        rings=change.rings,
+        wall=walls,
+    )
+
+
+def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
+    """What the last step left, at the new particles."""
+    last = past.history
+    displacement, change_of_velocity = change.mean(last.displacement), change.mean(last.velocity_change)
+    return replace(
+        past,
+        points=change.mean(past.points),
+        velocity=change.mean(past.velocity),
+        gradient=change.mean(past.gradient),
+        pressure=change.mean(past.pressure),
+        volumes=change.mean(past.volumes),
+        history=BackwardDifference(displacement, change_of_velocity, last.time_step),
+    )

@@ -1,0 +1,124 @@
+"""Bodies made anew of others in the scheme ispg: they have their momenta, and what is lost of the energy is counted.
+
+Where liquids meet or part, new surfaces and new particles replace the old ones, all at once; who makes them keeps the
+volume and its centre. Here each new particle gets the velocities of the old ones around it, each continued to its place
+with its gradient, so that motions that are linear in space come over as they are. The least motion that does so, a
+rigid one, makes up for what is missing of the momenta. The time integration starts anew.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
+from reflowshock.particles.ispg.past import GalerkinPast, total_losses
+from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
+from reflowshock.particles.physics.physics import Physics
+
+NEIGHBOURS = 8
+NEAREST = 1e-3  # spacings
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """A body, what acts on it, and the solver that moves it."""
+
+    body: Body
+    physics: Physics
+    solver: IspgStep
+
+    @property
+    def past(self) -> GalerkinPast:
+        """What its last step left; before the first, its velocity and what that makes."""
+        if self.solver.past is not None:
+            return self.solver.past
+        equations, body = self.equations(), self.body
+        past = GalerkinPast.start(body, self.physics.energy(body))
+        momenta = rigid_momenta(rigid_motions(body.points), equations.masses, body.velocity)
+        gradient = equations.space.gradient(body.velocity)
+        return replace(past, gradient=gradient, momenta=momenta, kinetic=equations.kinetic(body.velocity))
+
+    @property
+    def first_energy(self) -> float:
+        """Energy of the forces before its first step [J]."""
+        return self.physics.energy(self.body) if self.solver.past is None else self.solver.first_energy
+
+    def equations(self) -> GalerkinEquations:
+        """Its masses and shape functions where it is."""
+        past = self.solver.past or GalerkinPast.start(self.body, 0.0)
+        body, projections = self.body, self.physics.projections(self.body)
+        admitted = admitted_motions(body.points, projections)
+        step = PreparedIspgStep(self.solver, body, self.physics, past, 0.0, projections, admitted)
+        return step.equations(body, 1.0)
+
+
+def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
+    """Give bodies, and their solvers, the motion and the ledger of those that they were made of.
+
+    The first of the new ones gets the whole ledger: together they have that of the old ones.
+
+    Args:
+        new: not moved yet.
+        old: what they were made of, as a whole.
+    """
+    pasts, equations = [part.past for part in old], [part.equations() for part in new]
+    velocities = [part.physics.admit(part.body, carried(part.body.points, old, pasts)) for part in new]
+    momenta = sum((past.momenta for past in pasts), np.zeros(6))
+    velocities = _with_momenta(new, equations, velocities, momenta)
+    energy = 0.0
+    for part, here, velocity in zip(new, equations, velocities, strict=True):
+        part.body.velocity = velocity
+        own, motions = part.physics.energy(part.body), rigid_motions(part.body.points)
+        part.solver.past = replace(
+            GalerkinPast.start(part.body, own),
+            gradient=here.space.gradient(velocity),
+            kinetic=here.kinetic(velocity),
+            momenta=rigid_momenta(motions, here.masses, velocity),
+            volumes=here.space.carried,
+        )
+        part.solver.first_energy = 0.0
+        energy += own + here.kinetic(velocity)
+    now = [part.physics.energy(part.body) for part in old]
+    evened = sum(past.potential - left for past, left in zip(pasts, now, strict=True))
+    before = sum(now) + sum(past.kinetic or 0.0 for past in pasts)
+    first, losses = new[0].solver, total_losses([past.losses for past in pasts])
+    losses = replace(losses, evening=losses.evening + evened, rebuilding=losses.rebuilding + before - energy)
+    first.first_energy = sum(part.first_energy for part in old)
+    first.past = replace(first.past, losses=losses) if first.past else None
+
+
+def carried(points: Floats, old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:
+    """Velocities at points `(n, 3)` [m/s]: of the old particles around, weighed by the inverse distance."""
+    places, velocities, gradients = (
+        np.concatenate([getattr(past, name) for past in pasts]) for name in ("points", "velocity", "gradient")
+    )
+    nearness = NEAREST * min(part.body.cloud.spacing for part in old)
+    distance, nearest = cKDTree(places).query(points, NEIGHBOURS)
+    weight = 1.0 / np.maximum(distance, nearness)
+    offset = points[:, None] - places[nearest]
+    continued = velocities[nearest] + np.einsum("nkcd,nkd->nkc", gradients[nearest], offset)
+    return (weight[..., None] * continued).sum(axis=1) / weight.sum(axis=1)[:, None]
+
+
+def _with_momenta(
+    new: Sequence[Moving], equations: Sequence[GalerkinEquations], velocities: Sequence[Floats], momenta: Floats
+) -> list[Floats]:
+    """Velocities with the momenta `(6,)` in all, as far as walls and edges admit a motion of all bodies."""
+    kept = np.logical_and.reduce(
+        [admitted_motions(part.body.points, part.physics.projections(part.body)) for part in new]
+    )
+    if not kept.any():
+        return list(velocities)
+    motions = [rigid_motions(part.body.points)[kept] for part in new]
+    masses = [here.masses for here in equations]
+    missing, inertia = momenta[kept].copy(), np.zeros((kept.sum(),) * 2)
+    for motion, mass, velocity in zip(motions, masses, velocities, strict=True):
+        missing -= rigid_momenta(motion, mass, velocity)
+        inertia += np.array([rigid_momenta(motion, mass, one) for one in motion])
+    amount = np.linalg.solve(inertia, missing)
+    return [velocity + np.tensordot(amount, motion, 1) for velocity, motion in zip(velocities, motions, strict=True)]

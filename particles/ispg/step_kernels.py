@@ -1,0 +1,168 @@
+"""Loops of a step's equations: operators that touch each pair once, and the matrix of the pressure equation.
+
+Arguments that several take: rows of the shape functions (starts, columns, weights), images (source, reflection), both
+as in `galerkin_kernels`.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from reflowshock.particles.core.surface_measure import laplacian_product
+from reflowshock.particles.ispg.galerkin_kernels import (
+    divergence,
+    divergence_transposed,
+    folded,
+    reflected,
+    resistance,
+)
+
+
+@njit(cache=True)
+def projected(frames, field):
+    """Vectors `(n, 3)` times a matrix of each particle `(n, 3, 3)`."""
+    result = np.empty_like(field)
+    for i in range(field.shape[0]):
+        x, y, z = field[i, 0], field[i, 1], field[i, 2]
+        for c in range(3):
+            result[i, c] = frames[i, c, 0] * x + frames[i, c, 1] * y + frames[i, c, 2] * z
+    return result
+
+
+@njit(cache=True)
+def rates_of_volume(rows, images, parts, field):
+    """Rates of volume `(n,)` [m^3/s] of velocities `(n, 3)`, those of `parts`: volumes `(n,)`, unbalanced `(n, 3)`."""
+    volumes, unbalanced = parts
+    missed, total = 0.0, 0.0
+    for i in range(volumes.shape[0]):
+        total += volumes[i]
+        for c in range(3):
+            missed += unbalanced[i, c] * field[i, c]
+    return volumes * (divergence(*rows, reflected(field, *images)) + missed / total)
+
+
+@njit(cache=True)
+def pressure_forces(rows, images, parts, pressure):
+    """The transposed: forces `(n, 3)` [N] of pressures `(n,)`."""
+    volumes, unbalanced = parts
+    forces = np.zeros((volumes.shape[0] + images[0].shape[0], 3))
+    divergence_transposed(*rows, volumes * pressure, forces)
+    return folded(forces, *images) + (volumes * pressure).sum() / volumes.sum() * unbalanced
+
+
+@njit(cache=True)
+def pressure_operator(rows, images, parts, mobility, pressure):
+    """Rates of volume `(n,)` that pressures `(n,)` make with a mobility of each particle `(n, 3, 3)`."""
+    return rates_of_volume(rows, images, parts, projected(mobility, pressure_forces(rows, images, parts, pressure)))
+
+
+@njit(cache=True)
+def pull_back(surface, rigid, masses, field):
+    """Force `(n, 3)` that a surface `(triangles, weights)` resists velocities with, but for rigid motions `(k, n, 3)`.
+
+    These, orthonormal by the masses `(n,)`, meet none, and the force moves nothing along them.
+    """
+    moving = field.copy()
+    for motion in rigid:
+        share = 0.0
+        for i in range(masses.shape[0]):
+            for c in range(3):
+                share += motion[i, c] * masses[i] * field[i, c]
+        moving -= share * motion
+    force = laplacian_product(*surface, moving)
+    result = force.copy()
+    for motion in rigid:
+        share = (motion * force).sum()
+        for i in range(masses.shape[0]):
+            for c in range(3):
+                result[i, c] -= share * masses[i] * motion[i, c]
+    return result
+
+
+@njit(cache=True)
+def momentum_operator(rows, images, resisted, implicit, field):
+    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia, resistance and implicit surface tension.
+
+    ``resisted``: masses over the time step `(n,)` [kg/s], factors of
+    `resistance`, projections of the particles `(n, 3, 3)`; ``implicit``: what `pull_back` takes, and the time step [s].
+    """
+    (inertia, factors, admitted), (surface, rigid, masses, time_step) = resisted, implicit
+    force = folded(resistance(*rows, reflected(field, *images), factors), *images)
+    pull = pull_back(surface, rigid, masses, field)
+    for i in range(field.shape[0]):
+        for c in range(3):
+            force[i, c] += inertia[i] * field[i, c] + time_step * pull[i, c]
+    return projected(admitted, force)
+
+
+@njit(cache=True, parallel=True)
+def _divergences(rows, images, roots):
+    """Entries of the divergence by row: particle of each, its weights times a root `(k, 3)`, over the row's length.
+
+    The lengths, too, `(n,)`.
+    """
+    (starts, columns, weights), (source, reflection) = rows, images
+    count = starts.shape[0] - 1
+    particle, entries = np.empty(columns.shape[0], np.int32), np.empty((columns.shape[0], 3), np.float32)
+    lengths, pieces = np.zeros(count), np.empty((columns.shape[0], 3))
+    for i in prange(count):
+        for k in range(starts[i], starts[i + 1]):
+            j, x, y, z = columns[k], weights[k, 1], weights[k, 2], weights[k, 3]
+            if j >= count:
+                r = reflection[j - count]
+                j, x, y, z = (
+                    source[j - count],
+                    r[0, 0] * x + r[1, 0] * y + r[2, 0] * z,
+                    r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
+                    r[0, 2] * x + r[1, 2] * y + r[2, 2] * z,
+                )
+            particle[k] = j
+            for c in range(3):
+                pieces[k, c] = roots[j, c, 0] * x + roots[j, c, 1] * y + roots[j, c, 2] * z
+                lengths[i] += pieces[k, c] * pieces[k, c]
+        lengths[i] = np.sqrt(lengths[i])
+        for k in range(starts[i], starts[i + 1]):
+            for c in range(3):
+                entries[k, c] = pieces[k, c] / lengths[i]
+    return particle, entries, lengths
+
+
+@njit(cache=True)
+def _by_particle(starts, particle, entries):
+    """Entries sorted by the particle of their column: firsts `(n + 1,)`, rows, entries."""
+    firsts = np.zeros(starts.shape[0], np.int64)
+    for j in particle:
+        firsts[j + 1] += 1
+    firsts = np.cumsum(firsts)
+    fill, row, result = firsts.copy(), np.empty(particle.shape[0], np.int32), np.empty_like(entries)
+    for i in range(starts.shape[0] - 1):
+        for k in range(starts[i], starts[i + 1]):
+            at = fill[particle[k]]
+            fill[particle[k]] += 1
+            row[at] = i
+            result[at] = entries[k]
+    return firsts, row, result
+
+
+@njit(cache=True, parallel=True)
+def pressure_matrix(rows, images, volumes, roots):
+    """Lower triangle of the matrix A of `pressure_operator` in single precision, but for what is unbalanced.
+
+    ``roots``: of the mobilities, `(n, 3, 3)`. Returns S A S `(n, n)`, whose diagonal is about one, zero above it, and S
+    `(n,)`.
+    """
+    starts = rows[0]
+    count = starts.shape[0] - 1
+    particle, entries, lengths = _divergences(rows, images, roots)
+    firsts, row, others = _by_particle(starts, particle, entries)
+    matrix = np.empty((count, count), np.float32)
+    for i in prange(count):
+        line = matrix[i]
+        line[:] = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j = particle[k]
+            x, y, z = entries[k, 0], entries[k, 1], entries[k, 2]
+            for a in range(firsts[j], firsts[j + 1]):
+                if row[a] > i:
+                    break
+                line[row[a]] += x * others[a, 0] + y * others[a, 1] + z * others[a, 2]
+    return matrix, 1.0 / (volumes * lengths)
