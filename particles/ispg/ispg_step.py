@@ -26,8 +26,16 @@ from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
+from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
-from reflowshock.particles.ispg.rigid_motions import admitted_motions, orthonormal, rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.rigid_motions import (
+    TURN,
+    admitted_motions,
+    edges_turn,
+    orthonormal,
+    rigid_momenta,
+    rigid_motions,
+)
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
@@ -170,7 +178,7 @@ class PreparedIspgStep:
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
-        force = self.physics.force(predicted) + base.time_step * equations.tension(guess)
+        force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
         start = equations.predict(base.velocity, force, past.pressure)
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
@@ -179,6 +187,8 @@ class PreparedIspgStep:
         history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
+        if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
+            momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(replace(body, points=points))
@@ -230,6 +240,13 @@ class PreparedIspgStep:
             return past, base
         start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
         return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+
+    def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
+        """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
+        if has_friction(self.physics):
+            kept = kept_share(self.past.gradient, equations.fluid.smoothing / SMOOTHING)
+            return normal_pull(body, self.physics, equations.masses, kept)
+        return self.physics.force(body)
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""

@@ -1,13 +1,20 @@
 """Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.ispg.step_kernels import projected
+from reflowshock.particles.physics.physics import Physics
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
+TURN = 5  # about the z axis, of the rigid motions
 
 
 def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
@@ -15,6 +22,23 @@ def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
     motions = rigid_motions(points)
     changes = [np.abs(projected(projections, motion) - motion).max() for motion in motions]
     return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
+
+
+def edges_turn(body: Body, physics: Physics) -> bool:
+    """Whether edges hold vertices that are circles about the z axis, about which they have no moment.
+
+    A vertex that an edge holds does not slide along it, either. What momentum that gives the body about the axis is
+    none that it has when the edges let it go.
+    """
+    unheld = admitted_motions(body.points, replace(physics, lines=()).projections(body))[TURN]
+    return bool(unheld and all(_about_axis(line.pads, body.plates[line.wall]) for line in physics.lines))
+
+
+def _about_axis(pads: Sequence[Pad], plate: Plate) -> bool:
+    """Whether a plate has one pad with an edge, a circle about the z axis."""
+    centres = plate.place(np.array([[*pad.centre, 0.0] for pad in pads]))[:, :2]
+    reach = max(pad.radius for pad in pads)
+    return len(pads) == 1 and bool(np.isfinite(reach)) and np.abs(centres).max() <= ROUNDING * reach
 
 
 def rigid_motions(points: Floats) -> Floats:

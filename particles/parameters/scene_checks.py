@@ -82,8 +82,6 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
         "free drops": drop.is_free,
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
         "hysteresis": drop.hysteresis is not None,
-        "walls that hold the liquid": solder.wall != "free-slip",
-        "planes of symmetry": drop.symmetry != "none",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {fewest} to {most} it is)": not fewest <= drop.count <= most,
         f"{drop.count} particles along an edge on a pad (up to {ISPG_PAD_EDGE} it is)": (
@@ -97,10 +95,8 @@ def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find joints that the scheme ispg is not verified for."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     places = {
-        "plates that are not parallel": joint.tilt != 0.0,
         "packages that float": joint.package is not None,
         "packages that are moved": joint.path is not None,
-        "walls that hold the liquid": solder.wall != "free-slip",
         f"joints without inertia ({inertia['why']})": not inertia["on"],
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
@@ -291,8 +287,11 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
     if drop.count % 2 == 0:
         message = f"with {drop.count} particles along an edge none lie in the plane of symmetry"
         return [Problem(key, message, drop.symmetry, "an odd number of particles along an edge")]
-    if solder.numerics.scheme == "gripc" or effects["inertia"]["on"] or effects["viscosity"]["on"]:
-        message = "symmetry needs a drop that relaxes to rest, without inertia or viscosity, and not the scheme gripc"
+    flows = effects["inertia"]["on"] or effects["viscosity"]["on"]
+    if solder.numerics.scheme == "gripc" or (flows and solder.numerics.scheme != "ispg"):
+        message = (
+            "symmetry needs a drop that relaxes to rest, without inertia or viscosity, or the scheme ispg; not gripc"
+        )
         return [Problem(key, message, drop.symmetry, "none")]
     return []
 

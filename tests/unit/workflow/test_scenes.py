@@ -202,9 +202,7 @@ ISPG = ("drop.particles_per_edge=11",)
     ("setting", "place"),
     [
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
-        ("drop.symmetry=half", "planes of symmetry"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
-        ("solder.wall=no-slip", "walls that hold the liquid"),
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
@@ -215,6 +213,12 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG]
     assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(DROP, *asked, setting)
+
+
+@pytest.mark.parametrize("wall", [("wall=no-slip",), ("wall=slip", "slip_length=0.05 mm")])
+def test_the_scheme_ispg_takes_walls_with_friction(wall):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
+    assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
 
 
 @pytest.mark.parametrize(
@@ -240,16 +244,26 @@ def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, messag
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
-        ("joint.tilt=3 deg", "plates that are not parallel"),
         ("joint.package.load=0.1 mN", "packages that float"),
         ("joint.path.standoff=0.4 mm", "packages that are moved"),
-        ("solder.wall=no-slip", "walls that hold the liquid"),
     ],
 )
 def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setting, place):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
     assert read_case(JOINT, asked).molten.numerics.scheme == "ispg"
     assert place in problems_of(JOINT, *asked, setting)
+
+
+def test_the_scheme_ispg_takes_planes_of_symmetry():
+    """The default does with a drop that relaxes, not with one that flows."""
+    asked = ["solder.effects.inertia=on", *ISPG, "drop.symmetry=half"]
+    assert "or the scheme ispg" in problems_of(DROP, *asked)
+    assert read_case(DROP, ["solder.numerics.scheme=ispg", *asked]).molten.numerics.scheme == "ispg"
+
+
+@pytest.mark.parametrize("setting", ["joint.tilt=3 deg", "solder.wall=no-slip"])
+def test_the_scheme_ispg_takes_joints_with_tilted_plates_and_walls_with_friction(setting):
+    read_case(JOINT, ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", setting])
 
 
 @pytest.mark.parametrize(
