@@ -219,6 +219,7 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
 def test_the_scheme_ispg_takes_walls_with_friction(wall):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
     assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
+    assert "on a wall with friction (at least 7)" in problems_of(DROP, *asked, "drop.particles_per_edge=5")
 
 
 @pytest.mark.parametrize(
