@@ -219,6 +219,9 @@ def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
 def test_the_scheme_ispg_takes_walls_with_friction(wall):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
     assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
+    for setting in ("drop.particles_per_edge=5", "drop.particles_per_edge=13"):
+        assert "on a wall with friction (for 7 to 11 it is)" in problems_of(DROP, *asked, setting)
+    assert "pads with friction" in problems_of(BALL, *asked)
 
 
 @pytest.mark.parametrize(
@@ -228,11 +231,11 @@ def test_the_scheme_ispg_takes_walls_with_friction(wall):
         ("drop.section=plane", "one of none, axisymmetric"),
         ("drop.pad_radius=0.4 mm", "not of a pad; allowed: none"),
         ("drop={volume='1 mm^3',section='axisymmetric'}", "not of a free drop; allowed: none"),
-        ("drop.symmetry=half", "planes of symmetry"),
+        ("drop.symmetry=half", "not of half of one; allowed: none"),
         ("drop.particles_per_edge=45", "45 particles along an edge (for 8 to 21 it is)"),
         ("drop.particles_per_edge=7", "7 particles along an edge (for 8 to 21 it is)"),
         ("solder.effects.inertia=off", "drops without inertia"),
-        ("solder.wall=no-slip", "walls that hold the liquid"),
+        ("solder.wall=no-slip", "not of one that rubs on it; allowed: none"),
     ],
 )
 def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, message):
