@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
@@ -17,7 +18,7 @@ from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Loops, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
-from reflowshock.particles.sph.threads import ThreadLoops, threads_for
+from reflowshock.particles.sph.threads import ThreadLoops
 
 PICTURES = 24
 SAMPLES = 2000

@@ -3,29 +3,12 @@
 Results are written into arguments: Numba drops a parallel loop that writes into arrays of a tuple alone.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import njit, prange
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_values
 from reflowshock.particles.sph.shear_viscosity import viscosity_of
-
-# With fewer particles a thread more costs more than it brings.
-PARTICLES_PER_THREAD = 4000
-
-
-@contextmanager
-def threads_for(particles: int) -> Iterator[None]:
-    """Let loops run on as many threads as pay for so many particles, and afterwards on as many as before."""
-    before = get_num_threads()
-    set_num_threads(max(1, min(before, particles // PARTICLES_PER_THREAD)))
-    try:
-        yield
-    finally:
-        set_num_threads(before)
 
 
 class ThreadLoops:

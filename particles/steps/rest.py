@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from reflowshock.particles.steps.shape import Snapshot
@@ -196,7 +197,8 @@ def _step(flow: LiquidFlow) -> StepRecord:
     """Advance one step; an error of the solver tells where it happened and what may help."""
     where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
     try:
-        return flow.step()
+        with threads_for(len(flow.body.points)):
+            return flow.step()
     except (ArithmeticError, SolveFailed, StepCollapsed) as error:
         if flow.solver.flaw is not None:
             raise SchemeBroke(f"{where}: {flow.solver.flaw} ({type(error).__name__}: {error})") from error
