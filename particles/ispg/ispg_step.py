@@ -22,9 +22,9 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import cotangents
+from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
-from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step

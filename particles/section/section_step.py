@@ -17,6 +17,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
+from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
@@ -25,7 +26,6 @@ from reflowshock.particles.ispg.galerkin_equations import (
     GalerkinEquations,
 )
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg.rigid_motions import orthonormal, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.chain import Chain

@@ -42,7 +42,7 @@ CAPTIONS = {
 
 def add_flow(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
     """Add the section on the flow."""
-    from reflowshock.particles.scenes.flow_products import read_flow
+    from reflowshock.particles.scenes.products import read_flow
 
     result = read_flow(run_folder / "particles")
     metrics, text = summary["metrics"], _ink_text if isinstance(case, PrintingCase) else _text

@@ -80,7 +80,7 @@ def flow_taylor_green(run: Run[TaylorGreenCase], folder: Path) -> Findings:
 def _flow(run: Run[Any], folder: Path, solve: Callable, limits: Mapping[str, float]) -> Findings:
     """Let a scene flow, write what it became, judge it."""
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.scenes.flow_products import write_flow
+    from reflowshock.particles.scenes.products import write_flow
 
     case: FlowCase = run.case
     checkpoint = Checkpoint(run.checkpoints("particles") / case.kind, (case.scene,))

@@ -8,7 +8,7 @@ from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.scenes.droplet import base_width, droplet, outcome, solve_droplet, width
-from reflowshock.particles.scenes.flow_products import read_flow, write_flow
+from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation

@@ -10,11 +10,11 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
+from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.gripc_step import force_pressure
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.lagged_cholesky import LaggedCholesky, Tolerance
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import centre

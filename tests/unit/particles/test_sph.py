@@ -12,7 +12,7 @@ from reflowshock.particles.parameters.flow_effects import artificial_viscosity, 
 from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
 from reflowshock.particles.reference.dam_break import MEASURED, measured_pressure
 from reflowshock.particles.scenes.dam_break import dam, second_rise, solve_dam_break
-from reflowshock.particles.scenes.flow_products import read_flow, write_flow
+from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.flow import liquid_and_walls
 from reflowshock.particles.sph.fluid_state import REPRODUCING
