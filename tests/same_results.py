@@ -76,7 +76,7 @@ EVERY_CASE = CASES | {
     **{flow: (f"cases/{flow}/case.toml", ()) for flow in ("poiseuille", "taylor_green")},
     **{
         flow: (f"cases/{flow}/case.toml", QUICK)
-        for flow in ("dam_break", "drop_impact", "printing", "static_caps", "young_laplace")
+        for flow in ("dam_break", "drop_impact", "frozen_drop", "printing", "static_caps", "young_laplace")
     },
 }
 

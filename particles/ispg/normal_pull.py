@@ -37,6 +37,8 @@ def kept_share(gradient: Floats, frequency: float) -> float:
         gradient: of the velocity, `(n, 3, 3)` [1/s].
         frequency: of the grid's capillary waves [1/s].
     """
+    if not frequency:  # without tension there is no such part
+        return 1.0
     strain = 0.5 * (gradient + gradient.transpose(0, 2, 1)) / frequency
     return min(1.0, float(np.sqrt((strain**2).sum(axis=(1, 2)).mean())) / FAST)
 
