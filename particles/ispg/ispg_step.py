@@ -260,24 +260,26 @@ class PreparedIspgStep:
         parts = self.physics.operators
         density = sum(part.density for part in parts if isinstance(part, Mass))
         viscosity = sum(part.coefficient for part in parts if isinstance(part, Viscosity))
-        tension = sum(part.coefficient for part in parts if isinstance(part, SurfaceTension))
-        return Flow(density, viscosity, SMOOTHING * float(np.sqrt(tension / (density * spacing**3))))
+        return Flow(density, viscosity, SMOOTHING * float(np.sqrt(self.tension / (density * spacing**3))))
+
+    @property
+    def tension(self) -> float:
+        """Surface tension of the liquid [N/m]."""
+        return sum(part.coefficient for part in self.physics.operators if isinstance(part, SurfaceTension))
 
     def equations(self, body: Body, time_step: float) -> GalerkinEquations:
         """The equations of a body at other positions, for a time step [s]."""
-        tensions = [part for part in self.physics.operators if isinstance(part, SurfaceTension)]
         fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
         held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
-        coefficient = sum(part.coefficient for part in tensions)
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             admitted=self.projections,
-            surface=(body.triangles, 0.5 * coefficient * cotangents(body.points, body.triangles)),
+            surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
             spacing=spacing,
             rigid=orthonormal(rigid, fluid.density * space.carried),
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
