@@ -1,25 +1,33 @@
-"""Particle-steps per second of delta-SPH: a dam break in a plane, droplets in space without and with a surface.
+"""Particle-steps per second of delta-SPH: a dam break in a plane, droplets in space without and with a surface; a GPU.
 
 Run: .venv/bin/python benchmarks/bench_sph.py   (two minutes; results/sph.json)
-Whole steps, on one thread and on two in turns. The bars are those of one core in space with all terms, and of two
-threads over one. There is no figure of a GPU: none was at hand.
+Whole steps, on one thread and on two in turns. The bars are those of one core in space with all terms, of two threads
+over one, and of a GPU, where there is one: liquid in space without a tracked surface, up to 4e6 particles, beside one,
+two and all threads of the same machine.
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter, process_time
+from typing import Any
 
+import numpy as np
 from numba import get_num_threads, set_num_threads
 
 from reflowshock.particles.parameters.droplets import Droplet, DropletEffects, DropletNumerics
 from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
 from reflowshock.particles.scenes.dam_break import dam
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.scenes.droplet import droplet, liquid_of
+from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.threads import ThreadParticles
 
 RESULTS = Path(__file__).parent / "results" / "sph.json"
-RATE, SPEEDUP = 5e5, 1.7  # bars
+RATE, SPEEDUP, GPU_RATE = 5e5, 1.7, 1e8  # bars
 STEPS, TURNS = 20, 5
+# Across the diameter: sizes on a GPU with steps to measure, and the size that threads compute, too.
+SIZES, SHARED = {38: 200, 60: 200, 124: 100, 197: 50}, 60
 
 
 def dam_break() -> Simulation:
@@ -28,21 +36,51 @@ def dam_break() -> Simulation:
     return dam(DamBreak(height=0.6, width=1.2, tank_length=3.22, sensor_height=0.12, duration=1.0, numerics=numerics))
 
 
-def drop(tension: str) -> Simulation:
-    """In space: 28 000 particles of ink that strike a wall, with or without tension."""
+def ink(tension: str, across: int, device: str = "cpu") -> Droplet:
+    """A drop of ink that strikes a wall, with or without tension."""
     effects = DropletEffects(surface_tension=tension, viscosity="on")
-    ink = {"density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "contact_angle": 1.57, "speed": 5.0}
-    numerics = DropletNumerics(particles_per_diameter=38)
-    return droplet(Droplet(diameter=23e-6, duration=1e-5, **ink, effects=effects, numerics=numerics))
+    liquid = {"density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "contact_angle": 1.57, "speed": 5.0}
+    numerics = DropletNumerics(particles_per_diameter=across, device=device)
+    return Droplet(diameter=23e-6, duration=1e-5, **liquid, effects=effects, numerics=numerics)
+
+
+def drop(tension: str) -> Simulation:
+    """In space: 28 000 particles that carry a surface."""
+    return droplet(ink(tension, 38))
+
+
+def stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
+    """In space: a free drop without a tracked surface, whose particles are not shifted; it is drawn out along z.
+
+    Its viscosity is a tenth of the ink's, so that sound and not viscosity bounds the time step of all sizes.
+    """
+    scene = ink("off", across)
+    places = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
+    lattice = np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1)
+    points = lattice[:, (lattice**2).sum(axis=0) < (0.5 * scene.diameter) ** 2]
+    law = liquid_of(scene, scene.spacing)[0]._replace(
+        tracked=0, shifting=0.0, mirror=0, viscosity=0.1 * scene.viscosity
+    )
+    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
+    for speed, share, place in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
+        speed[:] = share * scene.impact_speed * place / (0.5 * scene.diameter)
+    return Simulation(fields, points.shape[1], law, device=device)
+
+
+def go_on(simulation: Simulation, steps: int) -> float:
+    """Wall time of some steps [s]; what a GPU does is waited for."""
+    start = perf_counter()
+    for _ in range(steps):
+        simulation.step(simulation.time_step())
+    assert np.isfinite(simulation.fastest)
+    return perf_counter() - start
 
 
 def seconds(simulation: Simulation, threads: int) -> tuple[float, float]:
     """Wall and processor time of some steps on so many threads [s]."""
     set_num_threads(threads)
-    wall, processor = perf_counter(), process_time()
-    for _ in range(STEPS):
-        simulation.step(simulation.time_step())
-    return perf_counter() - wall, process_time() - processor
+    processor = process_time()
+    return go_on(simulation, STEPS), process_time() - processor
 
 
 def measure(simulation: Simulation) -> dict[str, float]:
@@ -50,28 +88,65 @@ def measure(simulation: Simulation) -> dict[str, float]:
     most = get_num_threads()
     seconds(simulation, most)
     turns = [(seconds(simulation, 1), seconds(simulation, min(2, most))) for _ in range(TURNS)]
+    set_num_threads(most)
     one = min(processor for (_, processor), _ in turns)
-    listed = len(simulation.rows.lists[1]) / simulation.fluids
     speedup = min(one[0] for one, _ in turns) / min(two[0] for _, two in turns)
     return {
-        "particles": simulation.fluids, "neighbours_listed": listed,
+        "particles": simulation.fluids, "neighbours_listed": simulation.particles.neighbours,
         "particle_steps_per_second": simulation.fluids * STEPS / one, "two_threads_over_one": speedup,
     }  # fmt: skip
 
 
+def measure_gpu() -> dict[str, Any] | None:
+    """Rates of a GPU by wall time, and of threads beside it; None where there is none."""
+    from numba import cuda
+
+    from reflowshock.particles.sph.cuda_particles import CudaParticles
+
+    if not cuda.is_available():
+        return None
+    found: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
+    for across, steps in SIZES.items():
+        free = cuda.current_context().get_memory_info()[0]
+        simulation = stretched_drop(across, CudaParticles)
+        go_on(simulation, 5)
+        lists = simulation.particles.builds
+        rate = simulation.fluids * steps / go_on(simulation, steps)
+        lists = simulation.particles.builds - lists
+        used = (free - cuda.current_context().get_memory_info()[0]) / simulation.fluids
+        found["sizes"][simulation.fluids] = {
+            "particle_steps_per_second": rate, "steps_of_a_list": steps / max(1, lists), "bytes_of_particle": used,
+        }  # fmt: skip
+        if across == SHARED:
+            found["gpu"] = rate
+        del simulation
+    shared, most = stretched_drop(SHARED, ThreadParticles), get_num_threads()
+    go_on(shared, 5)
+    for threads in (most, 2, 1):
+        set_num_threads(threads)
+        found[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
+    set_num_threads(most)
+    return found
+
+
 def main() -> None:
-    scenes = {"dam_break": dam_break(), "drop_without_surface": drop("off"), "drop": drop("on")}
-    rows = {name: measure(scene) for name, scene in scenes.items()}
+    scenes = {"dam_break": dam_break(), "drop_without_tension": drop("off"), "drop": drop("on")}
+    rows: dict[str, Any] = {name: measure(scene) for name, scene in scenes.items()}
     figures = {
-        "particle_steps_per_second": (rows["drop_without_surface"]["particle_steps_per_second"], RATE),
+        "particle_steps_per_second": (rows["drop_without_tension"]["particle_steps_per_second"], RATE),
         "particle_steps_per_second_with_surface": (rows["drop"]["particle_steps_per_second"], RATE),
-        "two_threads_over_one": (rows["drop_without_surface"]["two_threads_over_one"], SPEEDUP),
+        "two_threads_over_one": (rows["drop_without_tension"]["two_threads_over_one"], SPEEDUP),
     }
+    gpu = measure_gpu()
+    if gpu is not None:
+        best = max(size["particle_steps_per_second"] for size in gpu["sizes"].values())
+        figures["particle_steps_per_second_of_a_gpu"] = (best, GPU_RATE)
     judged = {name: {"value": value, "limit": limit, "ok": value >= limit} for name, (value, limit) in figures.items()}
     RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps({"scenes": rows, "figures": judged}, indent=1))
+    RESULTS.write_text(json.dumps({"scenes": rows, "gpu": gpu, "figures": judged}, indent=1))
     for name, row in (rows | judged).items():
         print(name, "  ".join(f"{key} {value:.4g}" for key, value in row.items()))
+    print("gpu", json.dumps(gpu) if gpu else "no CUDA device")
 
 
 if __name__ == "__main__":

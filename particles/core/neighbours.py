@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Indices
@@ -16,36 +17,45 @@ Points = NDArray[np.float64]
 REACH = 2
 # Rows that are made at once.
 BLOCK = 8192
+# Rows of equal length have at least so many places, and the so manieth part more than they need.
+FEWEST, SPARE = 32, 8
 
 
-@njit(cache=True)
-def _sort_into_cells(points, origin, size, shape):
+@njit(cache=True, parallel=True)
+def _sort_into_cells(points, origin, size, shape, parts):
     """Counting sort of the points into cells: first index of each cell, which point is where, and their places there.
 
-    Cells that follow each other along z follow each other in memory.
+    Cells that follow each other along z follow each other in memory, points of a cell in their order: that does not
+    depend on the number of parts, which threads sort.
     """
-    count = points.shape[0]
-    cell = np.empty(count, np.int64)
-    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
-    for i in range(count):
-        x, y, z = _cell_of(points[i], origin, size, shape)
-        cell[i] = (x * shape[1] + y) * shape[2] + z
-        start[cell[i] + 1] += 1
-    for c in range(1, start.shape[0]):
-        start[c] += start[c - 1]
+    count, cells = points.shape[0], shape[0] * shape[1] * shape[2]
+    cell, fill = np.empty(count, np.int64), np.zeros((parts, cells), np.int32)
+    for p in prange(parts):
+        for i in range(p * count // parts, (p + 1) * count // parts):
+            x, y, z = cell_of(points[i], origin, size, shape)
+            cell[i] = (x * shape[1] + y) * shape[2] + z
+            fill[p, cell[i]] += 1
+    start, first = np.empty(cells + 1, np.int64), 0
+    for c in range(cells):
+        start[c] = first
+        for p in range(parts):
+            here = fill[p, c]
+            fill[p, c] = first
+            first += here
+    start[cells] = first
     order, places = np.empty(count, np.int32), np.empty((3, count))
-    fill = start.copy()
-    for i in range(count):
-        k = fill[cell[i]]
-        order[k] = i
-        for d in range(3):
-            places[d, k] = points[i, d]
-        fill[cell[i]] += 1
+    for p in prange(parts):
+        for i in range(p * count // parts, (p + 1) * count // parts):
+            k = fill[p, cell[i]]
+            order[k] = i
+            for d in range(3):
+                places[d, k] = points[i, d]
+            fill[p, cell[i]] += 1
     return start, order, places
 
 
 @njit(cache=True)
-def _cell_of(place, origin, size, shape):
+def cell_of(place, origin, size, shape):
     """Cell of a place, the nearest one where it is outside the grid."""
     x = min(max(int((place[0] - origin[0]) / size), 0), shape[0] - 1)
     y = min(max(int((place[1] - origin[1]) / size), 0), shape[1] - 1)
@@ -57,7 +67,7 @@ def _cell_of(place, origin, size, shape):
 def _columns(place, grid):
     """Cells around a place: first and last along x, y and z, the last one excluded."""
     _, _, _, origin, size, shape = grid
-    x, y, z = _cell_of(place, origin, size, shape)
+    x, y, z = cell_of(place, origin, size, shape)
     along_x = max(x - REACH, 0), min(x + REACH + 1, shape[0])
     along_y = max(y - REACH, 0), min(y + REACH + 1, shape[1])
     return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
@@ -77,23 +87,25 @@ def _candidates(place, grid):
 
 
 @njit(cache=True)
-def _visit(place, left_out, radius, grid, found):
-    """Write the points near a place into found, which has room for all candidates, and return their number.
+def visit(place, left_out, radius, grid, found):
+    """Write the points near a place into found and return their number; where there are more than room, not the rest.
 
-    ``left_out``: a point that is not listed, and the first of those that are not.
+    ``left_out``: a point that is not listed, and the first of those that are not. ``grid``: as `_sort_into_cells`
+    returns it, with the grid's origin, the size and numbers of its cells.
     """
     start, order, places, shape = grid[0], grid[1], grid[2], grid[5]
     x, y, z = place[0], place[1], place[2]
     own, end = left_out
     along_x, along_y, (low, high) = _columns(place, grid)
-    count, limit = 0, radius * radius
+    count, last, limit = 0, found.shape[0] - 1, radius * radius
     for ix in range(*along_x):
         for iy in range(*along_y):
             column = (ix * shape[1] + iy) * shape[2]
             for k in range(start[column + low], start[column + high]):
                 dx, dy, dz = x - places[0, k], y - places[1, k], z - places[2, k]
                 j = order[k]
-                found[count] = j  # without a branch: the next one takes the place where this one is too far away
+                # Without a branch: the next one takes the place where this one is too far away.
+                found[count if count < last else last] = j
                 count += (dx * dx + dy * dy + dz * dz < limit) & (j != own) & (j < end)
     return count
 
@@ -114,7 +126,7 @@ def _rows(rows, places, radius, grid, listed):
     for r in prange(count):
         i = first + r
         left_out = (-1 if own else i, points if i < movers else movers)
-        offsets[r + 1] = _visit(places[i], left_out, radius, grid, found[room[r] : room[r + 1]])
+        offsets[r + 1] = visit(places[i], left_out, radius, grid, found[room[r] : room[r + 1]])
     for r in range(count):
         offsets[r + 1] += offsets[r]
     indices = np.empty(offsets[count], np.int32)
@@ -133,6 +145,19 @@ def _in_blocks(
         return parts[0]
     lengths = np.concatenate([[0], *(np.diff(offsets) for offsets, _ in parts)])
     return np.cumsum(lengths, dtype=np.int32), np.concatenate([indices for _, indices in parts])
+
+
+@njit(cache=True, parallel=True)
+def _fill_rows(places, within, grid, rows, counts):
+    """Write who is near each place into rows of equal length, how many into counts; return the largest of these.
+
+    ``within``: the radius, and how many points see and are seen by all.
+    """
+    (radius, movers), points, most = within, grid[1].shape[0], 0
+    for i in prange(places.shape[0]):
+        counts[i] = visit(places[i], (-1, points if i < movers else movers), radius, grid, rows[i])
+        most = max(most, counts[i])
+    return most
 
 
 def find_neighbours(points: Points, radius: float, rows: int | None = None) -> tuple[Indices, Indices]:
@@ -172,33 +197,72 @@ def find_beside(places: Points, points: Points, radius: float, movers: int | Non
     return _in_blocks(places, radius, _grid(places, points, radius), (True, moving))
 
 
+def list_beside(places: Points, points: Points, radius: float, movers: int, rows: Indices) -> tuple[Indices, Indices]:
+    """Find what `find_beside` finds, in rows of equal length.
+
+    Args:
+        places: `(m, 3)` [m], finite.
+        points: `(n, 3)` [m], finite.
+        radius: search radius [m].
+        movers: as for `find_beside`.
+        rows: `(m, k)` those of the last time, which are taken again where they are long enough.
+
+    Returns:
+        rows `(m, k)` and how many points each begins with `(m,)`.
+
+    Raises:
+        FloatingPointError: a coordinate is not finite.
+    """
+    grid, counts = _grid(places, points, radius), np.empty(len(places), np.int32)
+    most = rows.shape[1]
+    if len(rows) == len(places) and most:
+        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+    while len(rows) != len(places) or most >= rows.shape[1]:  # the last place of a row is there for what does not fit
+        rows = np.empty((len(places), max(most + most // SPARE + 1, FEWEST)), np.int32)
+        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+    return rows, counts
+
+
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
     """Points in cells of which `REACH` are a radius wide."""
-    if not (np.isfinite(points).all() and np.isfinite(places).all()):
+    low, high, astray = _extent(points)
+    if astray or _extent(places)[2]:
         raise FloatingPointError("find_neighbours: a particle position is not finite")
-    origin, size = points.min(axis=0), radius / REACH
-    shape = (np.ptp(points, axis=0) / size).astype(np.int64) + 1
-    return (*_sort_into_cells(points, origin, size, shape), origin, size, shape)
+    origin, size = np.array(low), radius / REACH
+    shape = ((np.array(high) - origin) / size).astype(np.int64) + 1
+    return (*_sort_into_cells(points, origin, size, shape, get_num_threads()), origin, size, shape)
 
 
-@njit(cache=True)
+@njit(cache=True, parallel=True)
+def _extent(points):
+    """Least and largest coordinates of points `(n, 3)`, and how many are not finite."""
+    (low_x, low_y, low_z), (high_x, high_y, high_z), astray = (inf, inf, inf), (-inf, -inf, -inf), 0
+    for i in prange(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        astray += not isfinite(x + y + z)
+        low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
+        high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
+    return (low_x, low_y, low_z), (high_x, high_y, high_z), astray
+
+
+@njit(cache=True, parallel=True)
 def have_moved(points, built_at, skin):
-    """Whether a list made of other places `(n, 3)` may lack pairs: one has moved by half a skin or more from all.
+    """Whether a list made of other places may lack pairs: one has moved by half a skin or more from all.
 
-    What moves all of them alike changes no distance.
+    What moves all of them alike changes no distance. ``points`` and ``built_at`` have x, y and z of all, `(3, n)`.
     """
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(points.shape[0]):
-        for d in range(3):
-            moved = points[i, d] - built_at[i, d]
-            low[d], high[d] = min(low[d], moved), max(high[d], moved)
-    for i in range(points.shape[0]):
-        square = 0.0
-        for d in range(3):
-            square += (points[i, d] - built_at[i, d] - 0.5 * (low[d] + high[d])) ** 2
-        if not square <= (0.5 * skin) ** 2:  # what is no number has moved, too
-            return True
-    return False
+    count, (low_x, low_y, low_z), (high_x, high_y, high_z) = len(points[0]), (inf, inf, inf), (-inf, -inf, -inf)
+    for i in prange(count):
+        x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
+        low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
+        high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
+    mean_x, mean_y, mean_z = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z)
+    far = 0
+    for i in prange(count):
+        x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
+        square = (x - mean_x) ** 2 + (y - mean_y) ** 2 + (z - mean_z) ** 2
+        far += not square <= (0.5 * skin) ** 2  # what is no number has moved, too
+    return far > 0
 
 
 class NeighbourList:
@@ -228,7 +292,7 @@ class NeighbourList:
 
     def update(self, points: Points) -> None:
         """Make the list valid for these points `(n, 3)` [m]."""
-        if len(points) == len(self._built_at) and not have_moved(points, self._built_at, self.skin):
+        if len(points) == len(self._built_at) and not have_moved(points.T, self._built_at.T, self.skin):
             return
         self.offsets, self.indices = find_neighbours(points, self.radius + self.skin)
         self._built_at = points.copy()

@@ -111,7 +111,7 @@ class Deposit:
             self._begin()
             assert self.simulation is not None
             self.simulation.restore(saved["simulation"])
-            if self.heat and len(saved["heat_listed_at"]):
+            if self.heat and saved["heat_listed_at"].size:
                 self.heat.rows.update(saved["heat_listed_at"])
 
     @property

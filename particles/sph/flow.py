@@ -16,9 +16,9 @@ from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
 from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
-from reflowshock.particles.sph.simulation import Loops, Simulation
+from reflowshock.particles.sph.simulation import Particles, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
-from reflowshock.particles.sph.threads import ThreadLoops
+from reflowshock.particles.sph.threads import ThreadParticles
 
 PICTURES = 24
 SAMPLES = 2000
@@ -147,17 +147,17 @@ def _flow_until(
             progress(min(1.0, simulation.time / until))
 
 
-def device_of(scene: SphFlow) -> Callable[[Law], Loops]:
-    """Return what runs the loops of a flow; a GPU is looked for only where one is asked for.
+def device_of(scene: SphFlow) -> Callable[[Fields, int, Law], Particles]:
+    """Return what the particles of a flow are on; a GPU is looked for only where one is asked for.
 
     Raises:
         NoDeviceError: there is none.
     """
     if scene.numerics.device == "cpu":
-        return ThreadLoops
-    from reflowshock.particles.sph.cuda_loops import CudaLoops
+        return ThreadParticles
+    from reflowshock.particles.sph.cuda_particles import CudaParticles
 
-    return CudaLoops
+    return CudaParticles
 
 
 def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:

@@ -18,8 +18,8 @@ from reflowshock.particles.parameters.flows import DIFFUSIVE
 from reflowshock.particles.parameters.freezing import Freezing
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.neighbour_rows import Rows
 from reflowshock.particles.sph.particle_rates import apart, constants_of, periods_of, summed
-from reflowshock.particles.sph.simulation import Rows
 from reflowshock.particles.sph.smoothing import slope
 
 # Of the latent heat: with less of it a particle is solid, so that the front is in its middle.
@@ -49,15 +49,15 @@ def warming_of(i, neighbours, fields, temperatures, law):
             steep = scale * slope(law.kernel, line, sqrt(distance2) * inverse)
             volume = fields.mass[j] / fields.density[j]
             drop = own - temperatures[image, j]
-            result += pair_terms.shear_viscosity(distance2, distance2 + softening, steep, volume, 2.0) * drop
+            result += pair_terms.shear_viscosity(distance2, 1.0 / (distance2 + softening), steep, volume, 2.0) * drop
     return result / fields.density[i]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _find_warming(lists, fields, temperatures, law, found):
-    offsets, indices = lists
+    rows, counts = lists
     for i in prange(found.shape[0]):
-        found[i] = warming_of(i, indices[offsets[i] : offsets[i + 1]], fields, temperatures, law)
+        found[i] = warming_of(i, rows[i, : counts[i]], fields, temperatures, law)
 
 
 @dataclass(slots=True)
@@ -98,7 +98,7 @@ class Heat:
 
     def conduct(self, fields: Fields, time_step: float) -> None:
         """Let heat flow among particles and to the plate over a time step [s]."""
-        self.rows.update(np.stack(fields[:3], axis=1))
+        self.rows.update(fields[:3])
         found, own = np.empty(len(self.enthalpy)), self.temperature
         temperatures = np.stack((own, 2.0 * self.freezing.substrate_temperature - own))
         _find_warming(self.rows.lists, fields, temperatures, self.law, found)

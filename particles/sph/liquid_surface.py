@@ -103,7 +103,7 @@ class LiquidSurface:
     wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
     meetings: list[Meeting] = field(default_factory=list)
     pressure: float = 0.0
-    _built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    _built_at: Floats = field(default_factory=lambda: np.empty((3, 0)))
     _lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     _shares: Floats = field(default_factory=lambda: np.empty((2, 0)))
 
@@ -127,6 +127,11 @@ class LiquidSurface:
         self._find_wetness()
         if len(self.points):
             self._list(self._built_at)
+
+    @property
+    def needs_volume(self) -> bool:
+        """Whether it will be evened out in its next move."""
+        return (self.moves + 1) % CARE == 0
 
     @property
     def volume(self) -> float:
@@ -190,24 +195,22 @@ class LiquidSurface:
         Raises:
             SurfaceLost: there are no particles beside a vertex.
         """
-        self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
-        weights, offsets = np.empty((2, len(self._lists[1]))), self._lists[0]
-        surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
-        level = np.add.reduceat(np.append(weights[0], 0.0), offsets[:-1])
-        if (np.diff(offsets) == 0).any() or not level.all():
+        self._update_lists([place[:carriers] for place in fields[:3]])
+        weights = np.empty((2, 2, len(self._lists[1])))
+        if not surface_loops.find_weights(self.points, self._lists, fields, self.law, weights).all():
             raise SurfaceLost("the liquid has left its surface")
-        self._shares = weights / np.repeat(level, np.diff(offsets))
-        pushes, crowd = np.zeros((3, carriers)), np.zeros((3, carriers))
-        surface_loops.share_out(self._lists, self._shares, self.forces(), pushes)
+        self._shares = weights[0]
         outward = self._outward()
-        surface_loops.share_out(self._lists, weights, outward, crowd)
+        found = np.zeros((2, 3, carriers))
+        surface_loops.share_out(self._lists, weights, np.array((self.forces(), outward)), found)
         if self.ground is not None:
             images, outward = grounds.reflected(self.ground, self.points, outward, SUPPORT * self.law.length)
+            weights = np.empty_like(weights)
             surface_loops.find_weights(images, self._lists, fields, self.law, weights)
-            surface_loops.share_out(self._lists, weights, outward, crowd)
+            surface_loops.share_out(self._lists, weights[1:], outward[None], found[1:])
         fluids = rates.shape[1]
-        rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
-        rates[7:10] += crowd[:, :fluids]
+        rates[1:4] += found[0, :, :fluids] / fields.mass[:fluids]
+        rates[7:10] += found[1, :, :fluids]
 
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
@@ -266,7 +269,7 @@ class LiquidSurface:
         Args:
             velocity: of the particles.
             time_step: over which.
-            volume: of the liquid [m^3], which the surface encloses after its triangles were evened out.
+            volume: of the liquid before [m^3], which the surface encloses after its triangles were evened out.
         """
         surface_loops.carry(self._lists, self._shares, velocity, time_step, self.points)
         self.moves += 1
@@ -283,17 +286,16 @@ class LiquidSurface:
             self.enclose(volume)
         self._find_wetness()
 
-    def _update_lists(self, liquid: Floats) -> None:
-        """Find the particles `(n, 3)` beside each vertex again when some have moved by the skin."""
-        together = np.concatenate((self.points, liquid))
-        skin = SKIN * self.law.spacing
-        if len(together) != len(self._built_at) or have_moved(together, self._built_at, skin):
+    def _update_lists(self, liquid: Sequence[Floats]) -> None:
+        """Find the particles, at x, y and z `(3, n)` [m], beside each vertex again when some have moved by the skin."""
+        together = np.concatenate((self.points.T, liquid), axis=1)
+        if together.shape != self._built_at.shape or have_moved(together, self._built_at, SKIN * self.law.spacing):
             self._list(together)
 
     def _list(self, together: Floats) -> None:
         self._built_at, vertices = together, len(self.points)
-        reach = SUPPORT * self.law.length + SKIN * self.law.spacing
-        self._lists = find_beside(together[:vertices], together[vertices:], reach)
+        reach, places = SUPPORT * self.law.length + SKIN * self.law.spacing, np.ascontiguousarray(together.T)
+        self._lists = find_beside(places[:vertices], places[vertices:], reach)
 
     def _wet(self) -> None:
         """Keep vertices above the wall, contact lines on it; triangles that have come down on it are wet."""
@@ -316,7 +318,7 @@ class LiquidSurface:
         self.points, self.triangles, self.rings = points[used], triangles, rings
         for ring in self.rings:
             self.points[ring, 2] = 0.0
-        self._built_at = np.empty((0, 3))
+        self._built_at = np.empty((3, 0))
         self._lists = np.zeros(len(self.points) + 1, np.int32), np.empty(0, np.int32)
         self._find_wetness()
         return True

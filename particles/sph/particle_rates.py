@@ -30,10 +30,10 @@ def periods_of(law):
 
 @compiled
 def constants_of(law):
-    """Return what all pairs have: a line, 1 / h, of the kernel's gradient, of viscosity, W at a spacing over sigma."""
+    """Return what all pairs have: a line, 1 / h, of the kernel's gradient, of viscosity, sigma over W at a spacing."""
     line, inverse = law.dimension == 1, 1.0 / law.length
     scale, softening = law.norm * inverse * inverse, pair_terms.SOFTENING * law.length * law.length
-    return line, inverse, scale, softening, shape(law.kernel, line, law.spacing * inverse)
+    return line, inverse, scale, softening, 1.0 / shape(law.kernel, line, law.spacing * inverse)
 
 
 @compiled
@@ -56,13 +56,17 @@ def positive(value):
     return value if value > 0.0 else 0.0
 
 
-@summed
+@compiled
 def liquid_among(neighbours, fluids):
-    """Number of particles of the liquid in a row; they are its first ones."""
-    count = 0
-    for n in range(len(neighbours)):
-        count += neighbours[n] < fluids
-    return count
+    """Number of particles of the liquid in a row, whose first ones they are: halved until it is found."""
+    first, last = 0, len(neighbours)
+    while first < last:
+        middle = (first + last) // 2
+        if neighbours[middle] < fluids:
+            first = middle + 1
+        else:
+            last = middle
+    return first
 
 
 @compiled
@@ -115,7 +119,7 @@ def rates_of(i, fluids, neighbours, fields, law):
         bx, by, bz = solved((xx, yy, zz, xy, yz, xz), (bx, by, bz), law.dimension)
     else:
         bx = by = bz = 0.0
-    return rate, ax, ay, az, bx, by, bz, cx, cy, cz
+    return rate, ax + law.gravity_x, ay + law.gravity_y, az + law.gravity_z, bx, by, bz, cx, cy, cz
 
 
 @summed
@@ -125,12 +129,12 @@ def _by_liquid(i, neighbours, fields, law):
     Nothing branches at a pair, so that several are computed at a time.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
-    density, pressure = fields.density[i], fields.pressure[i]
+    density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     gx, gy, gz = fields.slope_x[i], fields.slope_y[i], fields.slope_z[i]
-    periods, (line, inverse, scale, softening, level) = periods_of(law), constants_of(law)
+    periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     diffusion, artificial, viscosity = positive(law.diffusion), positive(law.artificial), own_viscosity(i, fields, law)
-    along = 2.0 * (law.dimension + 2) / density if law.has_surface else 0.0  # over the viscosity of a pair
-    aside = 0.0 if law.has_surface else 2.0 / density
+    along = 2.0 * (law.dimension + 2) * lightness if law.has_surface else 0.0  # over the viscosity of a pair
+    aside = 0.0 if law.has_surface else 2.0 * lightness
     rate = ax = ay = az = cx = cy = cz = 0.0
     bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
@@ -151,18 +155,18 @@ def _by_liquid(i, neighbours, fields, law):
             closing = approach + (hold - 1.0) * (uj * dx + vj * dy)
             rate += pair_terms.continuity(closing, steep, volume, density)
             other = fields.pressure[j] + weight_below * fields.z[j] * beside
-            push = pair_terms.pressure(pressure, other, steep, volume, density)
-            push += artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
+            push = pair_terms.pressure(pressure, other, steep, volume, lightness)
+            push += artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, lightness)
             shared = pair_terms.shared_viscosity(viscosity, fields.viscosity[j]) if law.rheology else viscosity
-            softened2 = distance2 + softening
-            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along * shared)
-            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside * shared)
+            nearness = 1.0 / (distance2 + softening)
+            push += pair_terms.central_viscosity(approach, nearness, steep, volume, along * shared)
+            drag = pair_terms.shear_viscosity(distance2, nearness, steep, volume, aside * shared)
             jump = beside - density
             ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + side * fields.slope_z[j]
             rise = -0.5 * (ex * dx + ey * dy + ez * dz)
             rate += diffusion * pair_terms.density_diffusion(jump, rise, steep, volume)
             weight = steep * volume
-            crowd = weight * pair_terms.crowding(shape(law.kernel, line, q), level)
+            crowd = weight * pair_terms.crowding(peak * shape(law.kernel, line, q))
             ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
             cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
             bx, by, bz = bx + jump * weight * dx, by + jump * weight * dy, bz + jump * weight * dz
@@ -175,10 +179,10 @@ def _by_liquid(i, neighbours, fields, law):
 def _by_walls(i, fluids, neighbours, fields, law):
     """Sums over particles of walls, and their images: rate of density, acceleration, concentration of particles."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
-    density, pressure = fields.density[i], fields.pressure[i]
-    periods, (line, inverse, scale, softening, level) = periods_of(law), constants_of(law)
+    density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
+    periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
-    viscosity = own_viscosity(i, fields, law) / density if law.no_slip else 0.0
+    viscosity = own_viscosity(i, fields, law) * lightness if law.no_slip else 0.0
     along = 2.0 * (law.dimension + 2) * viscosity if law.has_surface else 0.0
     aside = 0.0 if law.has_surface else 2.0 * viscosity
     rate = ax = ay = az = cx = cy = cz = 0.0
@@ -198,11 +202,11 @@ def _by_walls(i, fluids, neighbours, fields, law):
             closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
             rate += pair_terms.continuity(closing, steep, volume, density)
             other = fields.pressure[j] + weight_below * fields.z[j] * beside
-            push = pair_terms.pressure(own, other, steep, volume, density)
-            softened2, approach = distance2 + softening, du * dx + dv * dy + dw * dz
-            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along)
-            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside)
-            crowd = steep * volume * pair_terms.crowding(shape(law.kernel, line, q), level)
+            push = pair_terms.pressure(own, other, steep, volume, lightness)
+            nearness, approach = 1.0 / (distance2 + softening), du * dx + dv * dy + dw * dz
+            push += pair_terms.central_viscosity(approach, nearness, steep, volume, along)
+            drag = pair_terms.shear_viscosity(distance2, nearness, steep, volume, aside)
+            crowd = steep * volume * pair_terms.crowding(peak * shape(law.kernel, line, q))
             ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
             cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
     return rate, ax, ay, az, cx, cy, cz

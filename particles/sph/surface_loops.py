@@ -7,20 +7,31 @@ is kept. Above a wall in z = 0 the images of particles count too: they move and 
 
 from math import sqrt
 
+import numpy as np
 from numba import njit, prange
 
 from reflowshock.particles.sph.smoothing import shape
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def find_weights(points, lists, fields, law, weights):
-    """Write the kernel W between each vertex and the particles beside it into ``weights`` `(2, pairs)` [1/m^3].
+    """Find the kernel W between each vertex and the particles beside it.
 
-    The first row is for components along a wall, the second for those across it, in which images are reversed.
+    Args:
+        points: of the vertices `(m, 3)` [m].
+        lists: offsets and indices of the particles beside each.
+        fields: `Fields`.
+        law: `Law`.
+        weights: `(2, 2, pairs)`, written: second W [1/m^3], for components along a wall and for those across it, in
+            which images are reversed; first these over the sum of those along the wall at a vertex.
+
+    Returns:
+        That sum at each vertex `(m,)` [1/m^3].
     """
     offsets, indices = lists
-    inverse = 1.0 / law.length
+    inverse, levels = 1.0 / law.length, np.empty(points.shape[0])
     for v in prange(points.shape[0]):
+        level = 0.0
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
             dx, dy, dz = points[v, 0] - fields.x[j], points[v, 1] - fields.y[j], points[v, 2] - fields.z[j]
@@ -28,7 +39,12 @@ def find_weights(points, lists, fields, law, weights):
             if law.mirror:
                 dz = points[v, 2] + fields.z[j]
                 image = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-            weights[0, k], weights[1, k] = law.norm * (own + image), law.norm * (own - image)
+            weights[1, 0, k], weights[1, 1, k] = law.norm * (own + image), law.norm * (own - image)
+            level += weights[1, 0, k]
+        levels[v] = level
+        for k in range(offsets[v], offsets[v + 1]):
+            weights[0, 0, k], weights[0, 1, k] = weights[1, 0, k] / level, weights[1, 1, k] / level
+    return levels
 
 
 @njit(cache=True, parallel=True)
@@ -43,13 +59,16 @@ def carry(lists, shares, velocity, time_step, points):
             points[v, 2] += time_step * shares[1, k] * velocity[2, j]
 
 
-@njit(cache=True)
-def share_out(lists, shares, vectors, found):
-    """Add what each particle has of the vectors of vertices `(m, 3)` to ``found`` `(3, n)`."""
+@njit(cache=True, parallel=True)
+def share_out(lists, weights, vectors, found):
+    """Add what each particle has of kinds of vectors of vertices `(k, m, 3)` to ``found`` `(k, 3, n)`.
+
+    ``weights`` `(k, 2, pairs)`. Components are shared out side by side, so that a sum has one order.
+    """
     offsets, indices = lists
-    for v in range(vectors.shape[0]):
-        for k in range(offsets[v], offsets[v + 1]):
-            j = indices[k]
-            found[0, j] += shares[0, k] * vectors[v, 0]
-            found[1, j] += shares[0, k] * vectors[v, 1]
-            found[2, j] += shares[1, k] * vectors[v, 2]
+    for component in prange(3 * vectors.shape[0]):
+        kind, d = component // 3, component % 3
+        given, own, result = weights[kind, 1 if d == 2 else 0], vectors[kind], found[kind, d]
+        for v in range(own.shape[0]):
+            for k in range(offsets[v], offsets[v + 1]):
+                result[indices[k]] += given[k] * own[v, d]

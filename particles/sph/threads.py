@@ -1,68 +1,179 @@
-"""The loops over particles, on threads.
+"""The particles of a simulation on threads: their arrays, and the loops over them.
 
-Results are written into arguments: Numba drops a parallel loop that writes into arrays of a tuple alone.
+Each loop runs a function of one particle, which `cuda_loops.py` runs on a GPU. An array that a loop writes is an
+argument of its own, not only one of a tuple: Numba may drop the loop then.
 """
 
+from collections.abc import Callable
+from math import sqrt
+
+import numpy as np
 from numba import njit, prange
 
-from reflowshock.arrays import Floats, Indices
+from reflowshock.arrays import Floats
 from reflowshock.particles.sph.fluid_state import Fields, Law
+from reflowshock.particles.sph.neighbour_rows import Rows
+from reflowshock.particles.sph.particle_motion import correct, cover, predict, settle, shift, speed2_of, take_slope
 from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_values
 from reflowshock.particles.sph.shear_viscosity import viscosity_of
 
-
-class ThreadLoops:
-    """The loops over particles of a law, on threads."""
-
-    def __init__(self, law: Law) -> None:
-        self._law = law
-
-    def find_rates(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, rates: Floats) -> None:
-        """Write what `rates_of` returns of each particle of the liquid into rows of ``rates`` `(10, n)`."""
-        _find_rates(fluids, lists, fields, self._law, rates)
-
-    def find_wall_values(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
-        """Write what `wall_values` returns of each particle of walls into rows of ``found`` `(5, m)`."""
-        _find_wall_values(fluids, lists, fields, self._law, found)
-
-    def find_viscosities(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
-        """Write the viscosity of each particle of the liquid into the row of ``found`` `(1, n)`."""
-        _find_viscosities(fluids, lists, fields, self._law, found)
-
-    def find_drifts(self, fluids: int, lists: tuple[Indices, Indices], fields: Fields, found: Floats) -> None:
-        """Write what `drift_of` returns of each particle of the liquid into rows of ``found`` `(3, n)`."""
-        _find_drifts(fluids, lists, fields, self._law, found)
+# What is found of a particle of the liquid.
+RATES = 10
+threaded = njit(cache=True, parallel=True, error_model="numpy")
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _find_rates(fluids, lists, fields, law, rates):
-    offsets, indices = lists
+class ThreadParticles:
+    """A liquid between walls, on threads.
+
+    Attributes:
+        fields: its quantities.
+        rates: `(10, n)` of the liquid, as `rates_of` returns them.
+        rows: neighbours.
+    """
+
+    def __init__(self, fields: Fields, fluids: int, law: Law) -> None:
+        self.fields, self.rates, self.rows = fields, np.zeros((RATES, fluids)), Rows(law, fluids)
+        self._law, self._fluids = law, fluids
+        self._middle = np.zeros((7, fluids))
+
+    def restore(self, fields: Fields, rates: Floats, built_at: Floats, builds: int) -> None:
+        """Go on from these arrays, and from neighbours found at these places `(3, n)` [m]."""
+        self.fields, self.rates, self.rows = fields, rates, Rows(self._law, self._fluids)
+        self.rows.update(tuple(built_at))
+        self.rows.builds = builds
+
+    @property
+    def built_at(self) -> Floats:
+        """Positions when neighbours were found `(3, n)` [m]."""
+        return self.rows.built_at
+
+    @property
+    def builds(self) -> int:
+        """How often they were found."""
+        return self.rows.builds
+
+    @property
+    def neighbours(self) -> float:
+        """How many a particle of the liquid has in its row, on average."""
+        return float(self.rows.lists[1][: self._fluids].mean())
+
+    @property
+    def fastest(self) -> float:
+        """The largest speed of the liquid [m/s]."""
+        return sqrt(_fastest2(self._fluids, self.fields))
+
+    @property
+    def largest_viscosity(self) -> float:
+        """Of the liquid [Pa s], where it depends on the rate of shear."""
+        return float(self.fields.viscosity[: self._fluids].max())
+
+    def predict(self, time_step: float) -> None:
+        """Move the liquid over a time step [s]."""
+        if self._law.xsph:
+            _find_drifts(self._fluids, self.rows.lists, self.fields, self._law, self._middle)
+        _predict(self.fields, self.rates, self._middle, time_step)
+
+    @property
+    def velocity(self) -> Floats:
+        """What the liquid was moved with `(3, n)` [m/s], until it has settled."""
+        return self._middle[:3] + self._middle[4:] if self._law.xsph else self._middle[:3]
+
+    def settle(self) -> None:
+        """Reflect what has passed through the mirror, and find pressures and neighbours."""
+        _settle(self.fields, self._middle, self._law)
+        self.rows.update(self.fields[:3])
+
+    def find_rates(self) -> None:
+        """Find the rates of the liquid, and before them what walls and its viscosity are."""
+        fluids, lists, fields, law = self._fluids, self.rows.lists, self.fields, self._law
+        _cover_walls(fluids, lists, fields, law, fields.wall_share)
+        if law.rheology:
+            _find_viscosities(fluids, lists, fields, law, fields.viscosity)
+        _find_rates(fluids, lists, fields, law, self.rates)
+
+    def add(self, act: Callable[[Floats, Fields], None]) -> None:
+        """Let what is not a loop over particles add to the rates `(10, n)`, as the fields say."""
+        act(self.rates, self.fields)
+
+    def take_slopes(self) -> None:
+        """Keep the gradients of density."""
+        _take_slopes(self.fields, self.rates, self.fields.slope_x)
+
+    def correct(self, time_step: float) -> None:
+        """End a time step [s]."""
+        _correct(self.fields, self.rates, self._middle, time_step)
+
+    def shift(self, factor: float) -> None:
+        """Move particles down the gradient of their concentration times a factor [m^2]."""
+        _shift(self.fields, self.rates, factor, self._law)
+
+
+@threaded
+def _predict(fields, rates, middle, time_step):
+    for i in prange(rates.shape[1]):
+        predict(i, fields, rates, middle, time_step)
+
+
+@threaded
+def _settle(fields, middle, law):
+    for i in prange(middle.shape[1]):
+        settle(i, fields, middle, law)
+
+
+@threaded
+def _correct(fields, rates, middle, time_step):
+    for i in prange(rates.shape[1]):
+        correct(i, fields, rates, middle, time_step)
+
+
+@threaded
+def _take_slopes(fields, rates, slope):
+    for i in prange(rates.shape[1]):
+        take_slope(i, fields, rates)
+
+
+@threaded
+def _shift(fields, rates, factor, law):
+    for i in prange(rates.shape[1]):
+        shift(i, fields, rates, factor, law)
+
+
+@threaded
+def _fastest2(fluids, fields):
+    largest = 0.0
     for i in prange(fluids):
-        found = rates_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        largest = max(largest, speed2_of(i, fields))
+    return largest
+
+
+@threaded
+def _find_rates(fluids, lists, fields, law, rates):
+    rows, counts = lists
+    for i in prange(fluids):
+        found = rates_of(i, fluids, rows[i, : counts[i]], fields, law)
         for k in range(10):
             rates[k, i] = found[k]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@threaded
 def _find_viscosities(fluids, lists, fields, law, found):
-    offsets, indices = lists
+    rows, counts = lists
     for i in prange(fluids):
-        found[0, i] = viscosity_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        found[i] = viscosity_of(i, fluids, rows[i, : counts[i]], fields, law)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _find_drifts(fluids, lists, fields, law, found):
-    offsets, indices = lists
+@threaded
+def _find_drifts(fluids, lists, fields, law, middle):
+    rows, counts = lists
     for i in prange(fluids):
-        drift = drift_of(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
-        for k in range(found.shape[0]):
-            found[k, i] = drift[k]
+        drift = drift_of(i, fluids, rows[i, : counts[i]], fields, law)
+        for k in range(3):
+            middle[4 + k, i] = drift[k]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _find_wall_values(fluids, lists, fields, law, found):
-    offsets, indices = lists
-    for i in prange(fluids, fields.x.shape[0]):
-        values = wall_values(i, fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
-        for k in range(found.shape[0]):
-            found[k, i - fluids] = values[k]
+@threaded
+def _cover_walls(fluids, lists, fields, law, shares):
+    rows, counts = lists
+    for k in prange(shares.shape[0]):
+        i = fluids + k
+        cover(k, i, fields, wall_values(i, fluids, rows[i, : counts[i]], fields, law), law)

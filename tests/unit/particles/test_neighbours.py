@@ -47,13 +47,13 @@ def test_points_beside_places_are_those_of_all_pairs_and_the_fixed_see_the_movin
 def test_what_moves_all_alike_changes_no_list():
     points = np.random.default_rng(6).uniform(size=(50, 3))
     moved = points + [5.0, -1.0, 2.0]
-    assert not have_moved(moved, points, 0.1)
+    assert not have_moved(moved.T, points.T, 0.1)
     moved[3, 0] += 0.099
-    assert not have_moved(moved, points, 0.1)
+    assert not have_moved(moved.T, points.T, 0.1)
     moved[3, 0] += 0.003
-    assert have_moved(moved, points, 0.1)
+    assert have_moved(moved.T, points.T, 0.1)
     moved[3, 0] = np.nan
-    assert have_moved(moved, points, 0.1)
+    assert have_moved(moved.T, points.T, 0.1)
 
 
 def test_list_is_rebuilt_only_past_half_the_skin():

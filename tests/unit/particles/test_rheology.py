@@ -40,17 +40,17 @@ def test_limits_of_the_laws():
 def test_the_rate_at_a_particle_is_that_of_the_flow():
     """A linear flow, of which the gradient is exact everywhere, at the surface too."""
     simulation = droplet(ink(CARREAU))
-    fields, (offsets, indices) = simulation.fields, simulation.rows.lists
+    fields, rows = simulation.fields, simulation.particles.rows
     gradient = np.random.default_rng(2).normal(size=(3, 3)) * 1e5
     fields.u[:], fields.v[:], fields.w[:] = gradient @ np.array(fields[:3])
     strain = 0.5 * (gradient + gradient.T)
     expected = CARREAU.viscosity(float(np.sqrt(2.0 * (strain**2).sum())), 0.0149)
     for i in range(0, simulation.fluids, 17):
-        found = viscosity_of(i, simulation.fluids, indices[offsets[i] : offsets[i + 1]], fields, simulation.law)
+        found = viscosity_of(i, simulation.fluids, rows.of(i), fields, simulation.law)
         assert found == pytest.approx(expected, rel=1e-10)
     turning = np.array([[0.0, -1e6, 0.0], [1e6, 0.0, 0.0], [0.0, 0.0, 0.0]])
     fields.u[:], fields.v[:], fields.w[:] = turning @ np.array(fields[:3])
-    found = viscosity_of(0, simulation.fluids, indices[: offsets[1]], fields, simulation.law)
+    found = viscosity_of(0, simulation.fluids, rows.of(0), fields, simulation.law)
     assert found == pytest.approx(0.0149, rel=1e-9)  # a body that turns as a whole is not sheared
 
 

@@ -16,8 +16,9 @@ from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.flow import liquid_and_walls
 from reflowshock.particles.sph.fluid_state import REPRODUCING
+from reflowshock.particles.sph.neighbour_rows import Rows
 from reflowshock.particles.sph.particle_rates import condition_of, rates_of, solved
-from reflowshock.particles.sph.simulation import Rows, Simulation
+from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
 
 AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.pi * q * q}
@@ -60,10 +61,10 @@ def test_walls_list_the_liquid_alone_and_the_liquid_all():
     law = dam(small_dam()).law
     points, fluids = np.random.default_rng(5).uniform(0.0, 6.0 * law.length, (300, 3)), 100
     one, all_ = Rows(law, fluids), Rows(law, 300)
-    one.update(points)
-    all_.update(points)
+    one.update(points.T)
+    all_.update(points.T)
     for i in range(300):
-        mine, every = (rows.lists[1][rows.lists[0][i] : rows.lists[0][i + 1]] for rows in (one, all_))
+        mine, every = one.of(i), all_.of(i)
         assert sorted(mine) == sorted(every if i < fluids else every[every < fluids])
         assert not np.diff((mine < fluids).astype(int)).max(initial=-1) > 0  # the liquid comes first
 
@@ -72,13 +73,12 @@ def test_periodic_neighbours_are_those_of_a_tree_of_the_torus():
     law = vortices(TaylorGreen(side=1.0, speed=1.0, viscosity=10.0, numerics=SphNumerics(particles_across=12))).law
     points = np.random.default_rng(3).uniform(-1.0, 2.0, (400, 3)) * np.array([1.0, 0.0, 1.0])
     rows = Rows(law, 400)
-    rows.update(points)
-    offsets, indices = rows.lists
+    rows.update(points.T)
     reach = 2.3 * law.length
     wrapped = points[:, [0, 2]] % 1.0
     pairs = cKDTree(wrapped, boxsize=1.0).query_ball_point(wrapped, reach)
     for i, near in enumerate(pairs):
-        assert sorted(near) == sorted(indices[offsets[i] : offsets[i + 1]].tolist())
+        assert sorted(near) == sorted(rows.of(i).tolist())
 
 
 def disturbed(simulation: Simulation) -> Simulation:
@@ -117,11 +117,10 @@ def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
     fields.density[:] = 1.0 + 0.01 * fields.x - 0.02 * fields.z
     fields.slope_x[:], fields.slope_z[:] = 0.01, -0.02
     rows = Rows(law, simulation.fluids)
-    rows.update(np.stack(fields[:3], axis=1))
-    offsets, indices = rows.lists
+    rows.update(fields[:3])
     inner = np.flatnonzero((np.abs(fields.x - 0.5) < 0.3) & (np.abs(fields.z - 0.5) < 0.3))
     for i in inner[::7]:
-        found = rates_of(i, simulation.fluids, indices[offsets[i] : offsets[i + 1]], fields, law)
+        found = rates_of(i, simulation.fluids, rows.of(i), fields, law)
         assert found[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
         assert abs(found[0]) < 1e-12 * law.sound / law.length
     assert solved((1e-3, 0.0, 1e-3, 0.0, 0.0, 0.0), (1.0, 0.0, 1.0), 2) == (0.0, 0.0, 0.0)
@@ -141,12 +140,11 @@ def test_the_reproducing_gradient_is_exact_for_linear_densities_at_surfaces_and_
     fields = liquid_and_walls(law.spacing * (lattice + moved), np.empty((3, 0)), np.zeros(lattice.shape[1]), law)
     fields.density[:] += slopes @ np.array(fields[:3])
     rows = Rows(law, lattice.shape[1])
-    rows.update(np.stack(fields[:3], axis=1))
-    offsets, indices = rows.lists
+    rows.update(fields[:3])
     for i in range(lattice.shape[1]):
-        found = rates_of(i, lattice.shape[1], indices[offsets[i] : offsets[i + 1]], fields, law)
+        found = rates_of(i, lattice.shape[1], rows.of(i), fields, law)
         assert found[4:7] == pytest.approx(tuple(slopes), abs=1e-9)
-    alone = rates_of(0, lattice.shape[1], indices[offsets[0] : offsets[0] + 3], fields, law)
+    alone = rates_of(0, lattice.shape[1], rows.of(0)[:3], fields, law)
     assert alone[4:7] == (0.0, 0.0, 0.0)  # too few neighbours
 
 

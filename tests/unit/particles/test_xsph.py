@@ -5,6 +5,8 @@ import pytest
 
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.sph import threads
+from reflowshock.particles.sph.particle_rates import drift_of
 
 INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "duration": 1e-5}
 
@@ -14,8 +16,9 @@ def ink(xsph, **changes):
 
 
 def drifts(simulation):
-    found = np.zeros((3, simulation.fluids))
-    simulation.loops.find_drifts(simulation.fluids, simulation.rows.lists, simulation.fields, found)
+    found, rows = np.empty((3, simulation.fluids)), simulation.particles.rows
+    for i in range(simulation.fluids):
+        found[:, i] = drift_of(i, simulation.fluids, rows.of(i), simulation.fields, simulation.law)
     return found
 
 
@@ -62,5 +65,5 @@ def test_a_drop_rests_with_it_as_without_it():
 
 def test_where_it_is_off_no_loop_runs(monkeypatch):
     simulation = ink(0.0)
-    monkeypatch.setattr(simulation.loops, "find_drifts", None)
+    monkeypatch.setattr(threads, "_find_drifts", None)
     simulation.step(1e-9)
