@@ -14,7 +14,7 @@ from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGree
 from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
-from reflowshock.workflow.case.text import short
+from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.fluid.case import FlowCase, micrometres
 from reflowshock.workflow.process.terminal import new_table
 
@@ -26,8 +26,36 @@ SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 3.0e-4, 1.2e-6
 SOLID_SHARE = 0.65
 # A step with a viscosity that depends on the rate of shear, over one without: an impact, 24 particles across.
 SHEAR_COST = 1.53
+# On a GPU, an NVIDIA H200, in space: of a step and of each of its particles, benchmarks/bench_sph.py; of a particle of
+# a droplet, whose surface stays with the processor, there of 16 cores.
+SECONDS_PER_GPU_STEP, SECONDS_PER_GPU_PARTICLE, SECONDS_PER_GPU_PARTICLE_WITH_SURFACE = 1.0e-3, 3.1e-9, 2.4e-7
+DAY = 86400.0  # [s]: what takes longer needs a GPU or a coarser spacing
 SECONDS_TO_START = 3.0  # until a stage has loaded its libraries and kernels
-BYTES_OF_PARTICLE = 500.0  # a third of it is the list of neighbours
+BYTES_OF_PARTICLE = 900.0  # half of it is the list of neighbours; on a GPU 970, measured
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a flow costs on a device.
+
+    Attributes:
+        steps: of time.
+        fixed: wall time of a step whatever its particles [s].
+        moving: that of its particles [s].
+    """
+
+    steps: float
+    fixed: float
+    moving: float
+
+    @property
+    def seconds(self) -> float:
+        """Wall time [s]."""
+        return SECONDS_TO_START + self.steps * (self.fixed + self.moving)
+
+    def finer(self, times: float, dimension: int) -> "Cost":
+        """Return the cost of so many times the particles: steps shrink with the spacing."""
+        return Cost(self.steps * times ** (1.0 / dimension), self.fixed, self.moving * times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +68,8 @@ class FlowForecast:
         spacing: theirs [m].
         time_step: expected [s].
         steps: expected number.
-        seconds: stage -> predicted wall time [s].
+        seconds: stage -> predicted wall time [s], on the device that the case names.
+        by_device: "cpu", of which it is one core, and where it can be had "cuda" -> cost.
     """
 
     effects: Mapping[str, Any]
@@ -49,6 +78,7 @@ class FlowForecast:
     time_step: float
     steps: int
     seconds: dict[str, float]
+    by_device: dict[str, Cost]
 
 
 def forecast_flow(case: FlowCase) -> FlowForecast:
@@ -62,8 +92,12 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     if effects["shear_dependent_viscosity"]["on"]:
         each *= SHEAR_COST
     moving = _in_the_loops(scene) if isinstance(scene, Printing) else scene.particles
-    seconds = SECONDS_TO_START + steps * ((SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP) + each * moving)
-    return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": seconds})
+    by_device = {"cpu": Cost(steps, SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP, each * moving)}
+    if not isinstance(scene, Printing):
+        share = SECONDS_PER_GPU_PARTICLE_WITH_SURFACE if in_space else SECONDS_PER_GPU_PARTICLE
+        by_device["cuda"] = Cost(steps, SECONDS_PER_GPU_STEP, share * scene.particles)
+    chosen = by_device.get(scene.numerics.device, by_device["cpu"])
+    return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": chosen.seconds}, by_device)
 
 
 def _in_the_loops(scene: Printing) -> float:
@@ -101,6 +135,7 @@ def flow_tables(case: FlowCase, outlook: FlowForecast) -> Iterator[RenderableTyp
     ratio = f"{scene.numerics.sound_speed:g} times the largest speed expected"
     table.add_row("speed of sound", from_si(scene.sound, "m/s", digits=3), ratio)
     table.add_row("time step", short(outlook.time_step), f"{outlook.steps} steps for {short(scene.until)}")
+    _add_devices(table, outlook, 3 if isinstance(scene, Droplet | Printing) else 2)
     if isinstance(scene, Droplet):
         _add_droplet(table, scene)
     if isinstance(scene, Printing):
@@ -111,6 +146,20 @@ def flow_tables(case: FlowCase, outlook: FlowForecast) -> Iterator[RenderableTyp
     if isinstance(scene, TaylorGreen):
         table.add_row("exact solution", "Taylor & Green", "the largest speed dies out by exp(-8 pi² nu t / L²)")
     yield table
+
+
+def _add_devices(table: Table, outlook: FlowForecast, dimension: int) -> None:
+    """Add the cost on each device, and how many particles take a day there: steps grow as spacings shrink."""
+    names = {"cpu": "on one core", "cuda": "on a GPU"}
+    for device, cost in outlook.by_device.items():
+        low, high = -9.0, 9.0  # powers of ten: how many times the particles take a day
+        while high - low > 0.01:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if cost.finer(10.0**middle, dimension).seconds < DAY else (low, middle)
+        limit = f"a day for about {outlook.particles * 10.0**low:.1g} particles"
+        if cost.seconds > DAY:
+            limit += ": a GPU or a coarser spacing is needed" if device == "cpu" else ": a coarser spacing is needed"
+        table.add_row(names[device], f"about {duration(cost.seconds)}", limit)
 
 
 def _add_droplet(table: Table, scene: Droplet) -> None:

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.fluid.forecast import forecast_flow, time_step
+from reflowshock.workflow.fluid.forecast import flow_tables, forecast_flow, time_step
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 
@@ -127,6 +128,23 @@ def test_plans_tell_particles_steps_and_cost(path):
     assert kind_of(case).size(case).memory > 0.0
     study = kind_of(case).study(case)
     assert {run.parameter for run in study.runs} == {"particle spacing", "smoothing length"}
+
+
+def test_plans_say_what_takes_a_day_and_what_a_gpu_would_take():
+    told = []
+    for device in ("cpu", "cuda"):
+        case = read_case(DAM, ["dam_break.numerics.particles_across=1000", f"dam_break.numerics.device={device}"], True)
+        outlook = forecast_flow(case)
+        assert outlook.by_device["cuda"].seconds < 0.05 * outlook.by_device["cpu"].seconds
+        assert outlook.seconds["particles"] == outlook.by_device[device].seconds
+        console = Console(width=200)
+        with console.capture() as text:
+            console.print(*flow_tables(case, outlook))
+        told.append(text.get())
+    assert told[0] == told[1]
+    assert "on a GPU" in told[0] and "a GPU or a coarser spacing is needed" in told[0]
+    small = read_case(IMPACT, [], True)
+    assert forecast_flow(small).by_device["cpu"].seconds < 3600.0
 
 
 def test_viscosity_by_shear_costs_what_its_forecast_says():
