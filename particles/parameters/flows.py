@@ -26,7 +26,7 @@ class MethodNumerics(Parameters):
     The density diffuses along its gradient: "renormalised" by a 3 x 3 matrix, or "reproducing", the slope of the linear
     function next to the neighbours, from a 4 x 4 matrix (Belytschko et al. 1998).
     XSPH lets particles move with a velocity that is smoothed by so much: 0.5 is usual, none is needed with viscosity.
-    Sums over pairs run on threads of the processor, or on a GPU (cuda).
+    Particles are on threads of the processor, or on a GPU (cuda); a surface that is tracked stays with the processor.
     """
 
     device: Literal["cpu", "cuda"] = "cpu"

@@ -102,6 +102,8 @@ class CudaParticles:
     @property
     def velocity(self) -> Floats:
         """What the liquid was moved with `(3, n)` [m/s], until it has settled."""
+        if not self._law.xsph:
+            return self._on_host(self._middle[:3])
         found = self._on_host(self._middle)
         return np.ascontiguousarray(found[:3] + found[4:])
 
