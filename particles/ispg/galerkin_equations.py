@@ -18,16 +18,22 @@ They add up to the rate of the enclosed volume: what nodal integration misses of
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces of an
 energy of the particles, no mode of the linearised scheme grows. The gradient that is collocated, as printed, has modes
 that do.
+
+Where walls move, velocities are v = q + w: w what walls prescribe, the velocity of a wall across it and of what it
+holds, q what they admit. Images move with their walls (`Ghosts.drift`), friction acts on what slides on them.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.body import Body
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.rigid_motions import wall_velocities
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
@@ -68,6 +74,7 @@ class GalerkinEquations:
         surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
+        walls: `(n, 3)` velocities of the walls at the particles on them [m/s], zero elsewhere.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -79,6 +86,7 @@ class GalerkinEquations:
     surface: tuple[Indices, Floats]
     rigid: Floats
     drag: Floats
+    walls: Floats
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -113,7 +121,7 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force - self._carried_along()
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
@@ -122,7 +130,7 @@ class GalerkinEquations:
         solution, _ = conjugate_gradients(
             lambda field: kernels.momentum_operator(*parts, field),
             kernels.projected(self.admitted, load),
-            kernels.projected(self.admitted, velocity),
+            kernels.projected(self.admitted, velocity) + self.given,
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
@@ -159,6 +167,16 @@ class GalerkinEquations:
         return start
 
     @property
+    def given(self) -> Floats:
+        """Velocities `(n, 3)` that walls prescribe [m/s]."""
+        return self.walls - kernels.projected(self.admitted, self.walls)
+
+    def _carried_along(self) -> Floats:
+        """What resists particles at rest next to walls that move `(n, 3)` [N]."""
+        still = np.zeros_like(self.walls)
+        return self.space.resistance(still, self.factors) - self.space.shown(self.drag[:, None] * self.walls)
+
+    @property
     def _parts(self) -> tuple[Floats, Floats]:
         """Of the constraint: volumes of the particles, and what their gradients miss."""
         return self.space.volumes, self.unbalanced
@@ -171,8 +189,13 @@ class GalerkinEquations:
         return kernels.pull_back(self.surface, self.rigid, self.masses, field)
 
     def constraint(self, field: Floats) -> Floats:
-        """B v: rates of volume `(n,)` [m^3/s]."""
-        return kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
+        rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        return rates + self._balanced(self.space.volumes * self.space.divergence(np.zeros_like(field)))
+
+    def _balanced(self, rates: Floats) -> Floats:
+        """Rates `(n,)` less their sum, which is shared out by the volumes."""
+        return rates - rates.sum() / self.space.volumes.sum() * self.space.volumes
 
     def push(self, pressure: Floats) -> Floats:
         """B^T p, [N]."""
@@ -183,8 +206,39 @@ class GalerkinEquations:
         space = self.space
         before, after = space.rough(start), space.rough(field)
         inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
-        on_walls = float((self.drag[:, None] * (start - before) * (field - after)).sum())
+        sliding = (start - before - self.walls) * (field - after - self.walls)
+        on_walls = float((self.drag[:, None] * sliding).sum())
         return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
+
+    def reaction(
+        self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
+    ) -> tuple[Floats, Floats]:
+        """Forces of the walls that hold or rub the liquid: at particles `(n, 3)` and, by stress, at images `(g, 3)` [N].
+
+        Their power in the velocity of a wall there, `Ghosts.drift` at the images, is what it gives the liquid.
+
+        Args:
+            velocities: that the step started with, the predicted and the projected one, `(n, 3)` [m/s].
+            force: as `predict` had it.
+            pressure: that has acted, `(n,)` [Pa].
+        """
+        (before, start, now), space, count = velocities, self.space, len(force)
+        rows, volumes = space.rows, space.volumes
+        rub = self.drag[:, None] * (start - space.rough(start) - self.walls)
+        stress = kernels.resistance(*rows, space.with_images(start), self.factors)
+        stress -= space.shape.T @ (self.drag[:, None] * self.walls)
+        inertia = self.momentum(now - before) / self.time_step
+        pull = force - self.time_step * self.tension(self.pulled(start, now)) + self.push(pressure)
+        missing = inertia + kernels.folded(stress, *space.images) - pull
+        thrust = np.zeros_like(stress)
+        kernels.divergence_transposed(*rows, self._balanced(volumes * pressure), thrust)
+        return missing - kernels.projected(self.admitted, missing) - rub, (stress - thrust)[count:]
+
+    def power(self, body: Body, twists: Mapping[int, Floats], forces: tuple[Floats, Floats]) -> float:
+        """Power [W] of the forces of `reaction` where the plates of the body have some twists `(6,)`."""
+        on_walls, on_images = forces
+        at_walls, at_images = wall_velocities(body, twists), self.space.drift_of(body, twists)
+        return float((on_walls * at_walls).sum() + (on_images * at_images).sum())
 
     def _stress(self, gradient: Floats) -> Floats:
         """Viscous stress times volume `(n, 3, 3)` [N m]."""

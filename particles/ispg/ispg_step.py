@@ -23,7 +23,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import cotangents
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
@@ -32,10 +32,13 @@ from reflowshock.particles.ispg.rigid_motions import (
     TURN,
     admitted_motions,
     edges_turn,
+    held,
     orthonormal,
     rigid_momenta,
     rigid_motions,
+    wall_velocities,
 )
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
@@ -126,7 +129,11 @@ class IspgStep:
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
         past = self.past
-        kept = past and fields_of(past) | {"history": fields_of(past.history), "losses": fields_of(past.losses)}
+        kept = past and fields_of(past) | {
+            "history": fields_of(past.history),
+            "losses": fields_of(past.losses),
+            "plates": {str(wall): moved for wall, moved in past.plates.items()},
+        }
         return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -134,7 +141,8 @@ class IspgStep:
         past = saved["past"]
         if past:
             history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
-            past = GalerkinPast(**{**past, "history": history, "losses": losses})
+            plates = {int(wall): moved for wall, moved in past["plates"].items()}
+            past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
@@ -171,10 +179,13 @@ class PreparedIspgStep:
         """
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
-        guess = self._guess(base)
-        predicted = replace(body, points=base.points + base.time_step * guess)
+        plates = self._plates(base, time_step)
+        twists = {wall: moved[1] for wall, moved in plates.items()}
+        ways = {wall: moved[0] for wall, moved in plates.items()}
+        guess = self._guess(base, twists)
+        predicted = body.placed(base.points + base.time_step * guess, ways)
         enclosed, slope = predicted.volume()
-        equations = self.equations(predicted, base.time_step)
+        equations = self.equations(predicted, base.time_step, twists)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
@@ -183,21 +194,28 @@ class PreparedIspgStep:
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
-        points = base.points + base.time_step * velocity
-        history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
-        mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
+        moved = body.placed(base.points + base.time_step * velocity, ways)
+        history = BackwardDifference(moved.points - body.points, velocity - past.velocity, time_step)
+        volumes = equations.space.volumes
+        mean_pressure = float(pressure @ volumes / volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
-        potential = self.physics.energy(replace(body, points=points))
+        potential = self.physics.energy(moved)
         pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
         work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
+        if plates:
+            acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
+            forces = equations.reaction((base.velocity, start, velocity), force, acting)
+            given = time_step * equations.power(predicted, {wall: way / time_step for wall, way in ways.items()}, forces)
+            losses = replace(losses, plates=losses.plates - given)
+            work += time_step * equations.power(predicted, twists, forces) - given
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
-            points=points,
+            points=moved.points,
             centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
             velocity=velocity,
             gradient=gradient,
@@ -210,13 +228,14 @@ class PreparedIspgStep:
             momenta_change=gain,
             history=history,
             losses=replace(losses, integration=losses.integration + self.energy - potential - work),
+            plates=plates,
         )
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
-            twists={},
+            twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
         )
 
@@ -248,12 +267,27 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
+    def _plates(self, base: Base, time_step: float) -> dict[int, Floats]:
+        """Ways of plates that move in a step [s], and their twists at the end of its equivalent, `(2, 6)`.
+
+        After the whole step a plate is where it should be: what the last step carries it on is no part of the twist.
+        """
+        body, moved = self.body, {}
+        for motion in self.physics.motions:
+            way = time_step * motion.given(body.plates[motion.wall], time_step)
+            carried = base.weight * self.past.ways.get(motion.wall, np.zeros(6))
+            moved[motion.wall] = np.stack((way, (way - carried) / base.time_step))
+        return moved
+
+    def _guess(self, base: Base, twists: Mapping[int, Floats]) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go, and that of plates."""
         velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
         way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        return velocity if way <= bound else bound / way * velocity
+        velocity = velocity if way <= bound else bound / way * velocity
+        if not twists:
+            return velocity
+        return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
 
     def fluid(self, spacing: float) -> Flow:
         """What the liquid is made of, of particles at a spacing [m]."""
@@ -267,13 +301,13 @@ class PreparedIspgStep:
         """Surface tension of the liquid [N/m]."""
         return sum(part.coefficient for part in self.physics.operators if isinstance(part, SurfaceTension))
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a body at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a body at other positions, for a time step [s]; its plates move with twists `(6,)`."""
         fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
-        held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
+        clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
-        space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
+        space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -282,6 +316,7 @@ class PreparedIspgStep:
             surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
             spacing=spacing,
             rigid=orthonormal(rigid, fluid.density * space.carried),
+            walls=wall_velocities(body, twists),
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,

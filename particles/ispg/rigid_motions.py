@@ -1,6 +1,6 @@
 """Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +48,20 @@ def rigid_motions(points: Floats) -> Floats:
         motions[axis, :, axis] = 1.0
         motions[3 + axis, :, axis - 2], motions[3 + axis, :, axis - 1] = -points[:, axis - 1], points[:, axis - 2]
     return motions
+
+
+def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
+    """Velocities of plates at the particles on them `(n, 3)` [m/s], zero elsewhere; twists `(6,)` by the plate."""
+    field = np.zeros_like(body.points)
+    for wall, twist in twists.items():
+        on_plate = body.cloud.wall == wall
+        field[on_plate] = body.plates[wall].rigid_velocity(twist, body.points[on_plate])
+    return field
+
+
+def held(projections: Floats, field: Floats) -> Floats:
+    """The part of a field `(n, 3)` that walls do not admit, by their projections `(n, 3, 3)`."""
+    return field - projected(projections, field)
 
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:

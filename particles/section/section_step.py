@@ -194,6 +194,7 @@ class PreparedSectionStep(PreparedIspgStep):
             stiffness=stiffness,
             rigid=rigid,
             drag=np.zeros(len(masses)),
+            walls=np.zeros_like(body.points),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             spacing=body.cloud.spacing,
             time_step=time_step,
