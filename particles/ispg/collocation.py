@@ -116,9 +116,15 @@ def mirror(
         parents.append(near)
         walls.append(np.full(len(near), wall))
         flips.append(flip)
-    made = (np.concatenate(parts) for parts in (parents, walls, flips))
     count = len(points)
-    return Ghosts(all_points[count:], source[count:], reflection[count:], *made)
+    return Ghosts(
+        points=all_points[count:],
+        source=source[count:],
+        reflection=reflection[count:],
+        parent=np.concatenate(parents),
+        wall=np.concatenate(walls),
+        flip=np.concatenate(flips),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -213,7 +213,7 @@ class GalerkinEquations:
     def reaction(
         self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
     ) -> tuple[Floats, Floats]:
-        """Forces of the walls that hold or rub the liquid: at particles `(n, 3)` and, by stress, at images `(g, 3)` [N].
+        """Forces of walls that hold or rub the liquid: at particles `(n, 3)` and, by stress, at images `(g, 3)` [N].
 
         Their power in the velocity of a wall there, `Ghosts.drift` at the images, is what it gives the liquid.
 

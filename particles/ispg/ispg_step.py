@@ -209,7 +209,9 @@ class PreparedIspgStep:
         if plates:
             acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
             forces = equations.reaction((base.velocity, start, velocity), force, acting)
-            given = time_step * equations.power(predicted, {wall: way / time_step for wall, way in ways.items()}, forces)
+            given = time_step * equations.power(
+                predicted, {wall: way / time_step for wall, way in ways.items()}, forces
+            )
             losses = replace(losses, plates=losses.plates - given)
             work += time_step * equations.power(predicted, twists, forces) - given
         gradient = equations.space.gradient(velocity)

@@ -14,6 +14,7 @@ from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
+from reflowshock.particles.steps.descent import is_driven
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.time_step import StepCollapsed
@@ -188,7 +189,8 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     run.records.append(record)
     run.profiles.append(flow.profile())
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
-    run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
+    calm = is_calm(run.records, rule) and not is_driven(flow.body, flow.physics, record.time_step)
+    run.calm = run.calm + 1 if calm else 0
     run.moved += record.displacement
     run.seconds += perf_counter() - start
 

@@ -79,7 +79,7 @@ def of_drop(case: DropCase) -> list[Problem]:
 
 def of_joint(case: JointCase) -> list[Problem]:
     """Find parameters that make no possible joint together."""
-    from reflowshock.particles.parameters.scene_checks import joint_problems
+    from reflowshock.particles.parameters.joint_checks import joint_problems
 
     return joint_problems(case.joint, case.molten)
 

@@ -84,13 +84,15 @@ def path_curve(places: Sequence[Mapping]) -> list[Chart]:
     label, scale = axis_of[name]
     ordered = sorted(places, key=lambda place: place[name])
     way = [place[name] / scale for place in ordered]
-    force = [Series("particles", way, [place["axial_force"] / MILLI for place in ordered], line="none", marks=True)]
-    exact = [place["axial_force_exact"] for place in ordered]
-    if any(value is not None for value in exact):
-        values = [np.nan if value is None else value / MILLI for value in exact]
-        force.append(Series("Young-Laplace", way, values, RED, marks=True))
+
+    def values(key: str) -> list[float]:
+        return [np.nan if place[key] is None else place[key] / MILLI for place in ordered]
+
+    force = [Series("particles", way, values("axial_force"), line="none", marks=True)]
+    if not np.isnan(exact := values("axial_force_exact")).all():
+        force.append(Series("Young-Laplace", way, exact, RED, marks=True))
     widths = [
-        Series(shown, way, [place[key] / MILLI for place in ordered], colour, marks=True)
+        Series(shown, way, values(key), colour, marks=True)
         for key, shown, colour in (("waist", "waist", BLUE), ("max_width", "width", ORANGE))
     ]
     return [
