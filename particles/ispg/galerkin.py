@@ -38,7 +38,9 @@ class Galerkin:
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
-        drift: `(g, 3)` velocities of these where walls move and particles do not [m/s].
+        drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
+        riding: momenta `(k, n, 3)` of motions of plates that float, and the velocities `(k, g, 3)` that these give
+            images.
     """
 
     volumes: Floats
@@ -49,6 +51,7 @@ class Galerkin:
     shape: sparse.csr_matrix
     ghosts: Ghosts
     drift: Floats
+    riding: tuple[Floats, Floats] | None = None
 
     @classmethod
     def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "Galerkin":
@@ -139,8 +142,15 @@ class Galerkin:
     def with_images(self, field: Floats) -> Floats:
         """A velocity `(n, 3)` with that of the images, `(n + g, 3)` [m/s]."""
         images = kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
-        images[len(field) :] += self.drift
+        images[len(field) :] += self.driven(field)
         return images
+
+    def driven(self, field: Floats) -> Floats:
+        """Velocities that plates which move give the images `(g, 3)` [m/s]: as prescribed, or with a field `(n, 3)`."""
+        if self.riding is None:
+            return self.drift
+        momenta, drifts = self.riding
+        return self.drift + np.tensordot(np.tensordot(momenta, field, 2), drifts, 1)
 
     def shown(self, force: Floats) -> Floats:
         """Forces on particles `(n, 3)` [N] of those on N v."""

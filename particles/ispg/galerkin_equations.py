@@ -23,17 +23,19 @@ Where walls move, velocities are v = q + w: w what walls prescribe, the velocity
 holds, q what they admit. Images move with their walls (`Ghosts.drift`), friction acts on what slides on them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.rigid_motions import wall_velocities
+from reflowshock.particles.ispg.rigid_motions import Riders, wall_velocities
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
@@ -74,7 +76,8 @@ class GalerkinEquations:
         surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
-        walls: `(n, 3)` velocities of the walls at the particles on them [m/s], zero elsewhere.
+        walls: `(n, 3)` velocities that walls prescribe at the particles on them [m/s], zero elsewhere.
+        riders: motions of plates that float.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -87,6 +90,7 @@ class GalerkinEquations:
     rigid: Floats
     drag: Floats
     walls: Floats
+    riders: Riders | None
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -127,10 +131,18 @@ class GalerkinEquations:
         inverse = 1.0 / inertia[:, None]
         implicit = (self.surface, self.rigid, self.masses, self.time_step)
         parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
+        operator: Apply = partial(kernels.momentum_operator, *parts)
+        right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given
+        if self.riders is not None:
+            unheld = np.broadcast_to(np.eye(3), self.admitted.shape).copy()
+            parts = (self.space.rows, self.space.images, (inertia, self.factors, unheld), implicit)
+            operator = self._ridden(partial(kernels.momentum_operator, *parts))
+            on_images = self.riders.loads + self._image_rates() @ pressure
+            right, begun = self._admitted_load(load, on_images), begun + self.riders.along(velocity)
         solution, _ = conjugate_gradients(
-            lambda field: kernels.momentum_operator(*parts, field),
-            kernels.projected(self.admitted, load),
-            kernels.projected(self.admitted, velocity) + self.given,
+            operator,
+            right,
+            begun,
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
@@ -153,14 +165,64 @@ class GalerkinEquations:
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
         parts = (space.rows, space.images, self._parts, mobility)
+        ridden = np.zeros((0, len(missing)))
+        if self.riders is not None:
+            carried = [kernels.rates_of_volume(*parts[:3], field) for field in self.riders.fields]
+            ridden = np.array(carried) + self._image_rates()
         potential = factors.solve(
-            lambda pressure: kernels.pressure_operator(*parts, pressure),
+            lambda pressure: (
+                kernels.pressure_operator(*parts, pressure) + self.time_step * (ridden @ pressure) @ ridden
+            ),
             lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
-        change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + kernels.projected(mobility, self.push(potential)), change
+        velocity = start + kernels.projected(mobility, self.push(potential))
+        if self.riders is not None:
+            velocity += self.time_step * np.tensordot(ridden @ potential, self.riders.fields, 1)
+        return velocity, potential - self.fluid.viscosity * divergence / space.volumes
+
+    def _ridden(self, operator: Apply) -> Apply:
+        """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
+
+        The forces on images that a motion of a plate makes have a power in the others, and on the particles.
+        """
+        riders, drifts = cast(Riders, self.riders), cast(tuple, self.space.riding)[1]
+        still = np.zeros_like(self.walls)
+        stresses = [
+            kernels.resistance(*self.space.rows, np.concatenate((still, drift)), self.factors) for drift in drifts
+        ]
+        forces = np.array([kernels.folded(stress, *self.space.images) for stress in stresses])
+        among = np.tensordot(np.array(stresses)[:, len(still) :], drifts, ((1, 2), (1, 2)))
+
+        def ridden(field: Floats) -> Floats:
+            rates = riders.rates(field)
+            force = operator(field) + np.tensordot(rates, forces, 1)
+            return self._admitted_load(force, np.tensordot(forces, field, 2) + among @ rates)
+
+        return ridden
+
+    def _admitted_load(self, force: Floats, on_images: Floats) -> Floats:
+        """Forces `(n, 3)` that walls admit; on plates that float by these, and by more `(k,)` on images and plates."""
+        riders = cast(Riders, self.riders)
+        on_plates = np.tensordot(riders.fields, force, 2) + on_images
+        return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)
+
+    def _image_rates(self) -> Floats:
+        """Rates of volume `(k, n)` that images of plates that float make."""
+        drifts, still = cast(tuple, self.space.riding)[1], np.zeros_like(self.walls)
+        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in drifts])
+
+    def _rates_of_images(self, images: Floats) -> Floats:
+        """Rates of volume `(n,)` of velocities of images alone `(n + g, 3)`, none in all."""
+        return self._balanced(self.space.volumes * kernels.divergence(*self.space.rows, images))
+
+    def twists(self, velocity: Floats, floating: Collection[int]) -> dict[int, Floats]:
+        """Twists `(6,)` of the plates that float, of a velocity `(n, 3)` [m/s]."""
+        if self.riders is None:
+            return {}
+        found = np.tensordot(self.riders.rates(velocity), self.riders.twists, 1)
+        return {wall: found[wall] for wall in floating}
 
     def pulled(self, start: Floats, _end: Floats) -> Floats:
         """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
@@ -191,7 +253,7 @@ class GalerkinEquations:
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
         rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
-        return rates + self._balanced(self.space.volumes * self.space.divergence(np.zeros_like(field)))
+        return rates + self._rates_of_images(np.concatenate((np.zeros_like(field), self.space.driven(field))))
 
     def _balanced(self, rates: Floats) -> Floats:
         """Rates `(n,)` less their sum, which is shared out by the volumes."""

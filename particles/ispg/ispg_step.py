@@ -30,6 +30,7 @@ from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, nor
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
+    Riders,
     admitted_motions,
     edges_turn,
     held,
@@ -179,13 +180,13 @@ class PreparedIspgStep:
         """
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
-        plates = self._plates(base, time_step)
-        twists = {wall: moved[1] for wall, moved in plates.items()}
-        ways = {wall: moved[0] for wall, moved in plates.items()}
-        guess = self._guess(base, twists)
-        predicted = body.placed(base.points + base.time_step * guess, ways)
+        pace = self._pace(base)
+        given, guessed = self._given_twists(base, time_step), self._guessed_twists(pace)
+        twists = given | guessed
+        guess = self._guess(pace, twists)
+        predicted = body.placed(base.points + base.time_step * guess, self._ways(base, twists))
         enclosed, slope = predicted.volume()
-        equations = self.equations(predicted, base.time_step, twists)
+        equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
@@ -194,6 +195,8 @@ class PreparedIspgStep:
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
+        twists = given | equations.twists(velocity, guessed)
+        ways = self._ways(base, twists)
         moved = body.placed(base.points + base.time_step * velocity, ways)
         history = BackwardDifference(moved.points - body.points, velocity - past.velocity, time_step)
         volumes = equations.space.volumes
@@ -205,15 +208,14 @@ class PreparedIspgStep:
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(moved)
         pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
-        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
-        if plates:
+        loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
+        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure + loads)
+        if given:
             acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
             forces = equations.reaction((base.velocity, start, velocity), force, acting)
-            given = time_step * equations.power(
-                predicted, {wall: way / time_step for wall, way in ways.items()}, forces
-            )
-            losses = replace(losses, plates=losses.plates - given)
-            work += time_step * equations.power(predicted, twists, forces) - given
+            done = equations.power(predicted, {wall: ways[wall] for wall in given}, forces)
+            losses = replace(losses, plates=losses.plates - done)
+            work += time_step * equations.power(predicted, given, forces) - done
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
@@ -230,7 +232,7 @@ class PreparedIspgStep:
             momenta_change=gain,
             history=history,
             losses=replace(losses, integration=losses.integration + self.energy - potential - work),
-            plates=plates,
+            plates={wall: np.stack((ways[wall], twist)) for wall, twist in twists.items()},
         )
         return Motion(
             velocity=velocity,
@@ -269,24 +271,34 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _plates(self, base: Base, time_step: float) -> dict[int, Floats]:
-        """Ways of plates that move in a step [s], and their twists at the end of its equivalent, `(2, 6)`.
+    def _carried(self, base: Base, wall: int) -> Floats:
+        """How far the last step carries a plate on, `(6,)` [m, rad]."""
+        return base.weight * self.past.ways.get(wall, np.zeros(6))
 
-        After the whole step a plate is where it should be: what the last step carries it on is no part of the twist.
-        """
-        body, moved = self.body, {}
-        for motion in self.physics.motions:
-            way = time_step * motion.given(body.plates[motion.wall], time_step)
-            carried = base.weight * self.past.ways.get(motion.wall, np.zeros(6))
-            moved[motion.wall] = np.stack((way, (way - carried) / base.time_step))
-        return moved
+    def _given_twists(self, base: Base, time_step: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+        moved = [motion for motion in self.physics.motions if not len(motion.directions)]
+        ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
+        return {wall: (way - self._carried(base, wall)) / base.time_step for wall, way in ways.items()}
 
-    def _guess(self, base: Base, twists: Mapping[int, Floats]) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go, and that of plates."""
-        velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+    def _guessed_twists(self, pace: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
+        walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
+        return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
+
+    def _ways(self, base: Base, twists: Mapping[int, Floats]) -> dict[int, Floats]:
+        """Displacements and rotations of plates in the whole step `(6,)` [m, rad]."""
+        return {wall: self._carried(base, wall) + base.time_step * twist for wall, twist in twists.items()}
+
+    def _pace(self, base: Base) -> float:
+        """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
+        way = base.time_step * float(np.sqrt((self.body.velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        velocity = velocity if way <= bound else bound / way * velocity
+        return 1.0 if way <= bound else bound / way
+
+    def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, at a share of its pace, and that of plates."""
+        velocity = pace * self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
         if not twists:
             return velocity
         return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
@@ -310,6 +322,10 @@ class PreparedIspgStep:
         clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
+        riders = Riders.of(self.physics.motions, body, self.projections, fluid.density * space.carried)
+        if riders is not None:
+            drifts = np.array([space.drift_of(body, dict(enumerate(twist))) for twist in riders.twists])
+            space = replace(space, riding=(riders.momenta, drifts))
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -319,6 +335,7 @@ class PreparedIspgStep:
             spacing=spacing,
             rigid=orthonormal(rigid, fluid.density * space.carried),
             walls=wall_velocities(body, twists),
+            riders=riders,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
