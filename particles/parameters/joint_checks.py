@@ -40,7 +40,7 @@ def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find joints that the scheme ispg is not verified for."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     places = {
-        "packages that float": joint.package is not None,
+        "packages that float, on walls with friction": joint.package is not None and solder.wall != "free-slip",
         f"joints without inertia ({inertia['why']})": not inertia["on"],
     }
     return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
