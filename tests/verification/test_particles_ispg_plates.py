@@ -1,4 +1,4 @@
-"""Joints of the scheme ispg between plates that move: pulled, pushed aside, tilted, torn off, and packages that float."""
+"""Joints of the scheme ispg between plates that move: pulled, pushed aside, tilted, torn off; packages that float."""
 
 from dataclasses import replace
 

@@ -122,6 +122,38 @@ def test_a_path_goes_from_rest_to_rest_at_least_energy(setting, key):
     assert key in problems_of(JOINT, "joint.path.standoff=0.3 mm", setting)
 
 
+SPEED = "joint.path={standoff='0.5 mm',speed='100 mm/s'}"
+GALERKIN = "solder.numerics.scheme=ispg"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ([SPEED], ['joint.path.speed = "100 mm/s"', "without inertia", 'inertia = "on"']),
+        ([SPEED, "solder.effects.inertia=on"], ["solder.numerics.scheme", "at a speed (100 mm/s)", "ispg"]),
+        (["joint.path.standoff=0.5 mm", GALERKIN, "solder.effects.inertia=on"], ["or joint.path.speed with"]),
+        (["joint.path={speed='100 mm/s'}", GALERKIN, "solder.effects.inertia=on"], ["ends where it starts"]),
+        (["joint.path={standoff='0.5 mm',speed='0 mm/s'}"], ["joint.path.speed", "> 0"]),
+        (
+            ["joint.path={standoff='0.5 mm',speed='100 mm/s',steps=4}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.steps = 4", "in one go"],
+        ),
+        (
+            ["joint.package.load=1 mN", GALERKIN, "solder.effects.inertia=on", "solder.wall=no-slip"],
+            ["solder.numerics.scheme", "packages that float, on walls with friction"],
+        ),
+    ],
+)
+def test_a_package_at_a_speed_needs_inertia_and_the_scheme_ispg(settings, words):
+    text = problems_of(JOINT, *settings)
+    assert [word for word in words if word not in text] == [], text
+
+
+@pytest.mark.parametrize("table", [SPEED, "joint.package.load=1 mN"])
+def test_packages_move_by_the_scheme_ispg(table):
+    assert of_joint(read_case(JOINT, [table, GALERKIN, "solder.effects.inertia=on"])) == []
+
+
 def test_too_little_solder_pulls_its_package_down():
     text = problems_of(JOINT, "joint.package.load=1 mN", "joint.volume=0.005 mm^3")
     assert 'joint.volume = "0.005 mm^3"' in text and "more solder" in text
@@ -242,19 +274,6 @@ def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, messag
     asked = ["drop.section=axisymmetric", "solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
     assert read_case(DROP, asked).drop.particles == 77
     assert message in problems_of(DROP, *asked, setting)
-
-
-@pytest.mark.parametrize(
-    ("setting", "place"),
-    [
-        ("joint.package.load=0.1 mN", "packages that float"),
-        ("joint.path.standoff=0.4 mm", "packages that are moved"),
-    ],
-)
-def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setting, place):
-    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
-    assert read_case(JOINT, asked).molten.numerics.scheme == "ispg"
-    assert place in problems_of(JOINT, *asked, setting)
 
 
 def test_the_scheme_ispg_takes_planes_of_symmetry():
