@@ -1,10 +1,8 @@
 """Parameters of one joint that are each allowed but make no joint together. Loads neither numba nor PETSc."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from math import asin, inf, sin
+from math import asin, inf, sin, sqrt
 
-from reflowshock.effect import Decision
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, mm_per_s, mn, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_effects
@@ -109,12 +107,13 @@ def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
         return []
     if solder.numerics.scheme == "gripc":
         return [Problem("solder.numerics.scheme", "the scheme gripc needs plates at rest", "gripc", "energy")]
-    return [] if joint.path is None else _speed_problems(joint.path, solder, decide_effects(joint.geometry, solder))
+    return [] if joint.path is None else _speed_problems(joint, joint.path, solder)
 
 
-def _speed_problems(path: PackagePath, solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
+def _speed_problems(joint: Joint, path: PackagePath, solder: Solder) -> list[Problem]:
     """Find a package that is moved with inertia at no speed, or at one that means nothing."""
-    inertia, key, speed = effects["inertia"], "joint.path.speed", path.speed
+    inertia = decide_effects(joint.geometry, solder)["inertia"]
+    key, speed = "joint.path.speed", path.speed
     if speed is None and inertia["on"]:
         message = f"a package follows its path from rest to rest, at no particular speed; {inertia['why']}"
         allowed = 'off, or joint.path.speed with solder.numerics.scheme = "ispg"'
@@ -130,4 +129,9 @@ def _speed_problems(path: PackagePath, solder: Solder, effects: Mapping[str, Dec
     if path.steps is not None:
         message = "at a speed a package goes all the way in one go"
         return [Problem("joint.path.steps", message, path.steps, "joint.path.steps or joint.path.speed")]
+    slowest = joint.way / solder.process_time
+    fastest = sqrt(solder.surface_tension / (solder.density * max(joint.pad_bottom, joint.pad_top)))
+    if not slowest < speed <= fastest:
+        message = "it must end within solder.process_time, at a Weber number of its pad below 1"
+        return [Problem(key, message, mm_per_s(speed), f"{mm_per_s(slowest)} to {mm_per_s(fastest)}")]
     return []

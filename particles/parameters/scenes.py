@@ -175,6 +175,15 @@ class Joint(Parameters):
         return [self.place(*(a + share * (b - a) for a, b in ways)) for share in shares]
 
     @property
+    def way(self) -> float:
+        """Length of the path [m], a rotation counted at the edge of the upper pad; zero without one."""
+        if not self.places:
+            return 0.0
+        end = self.places[-1]
+        turn = self.pad_top * (end.tilt[1] - self.tilt)
+        return math.hypot(end.gap - self.standoff, end.offset[0] - self.offset, turn)
+
+    @property
     def resolution(self) -> float:
         """Spacing of the particles at the start [m]."""
         return self.spacing

@@ -1,7 +1,7 @@
 """Effects, size and cost of the reflow of solder alone, and its table of the plan."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any
 
@@ -65,12 +65,16 @@ def _of_drop(case: DropCase) -> SolderForecast:
 
 def _of_joint(case: JointCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_effects
-    from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
+    from reflowshock.particles.parameters.estimate import ispg_seconds, particle_count, reflow_seconds
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
     seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
-    return _towards_rest(case, decide_effects(geometry, solder), particles, seconds)
+    found, path = _towards_rest(case, decide_effects(geometry, solder), particles, seconds), case.joint.path
+    if path is None or path.speed is None:
+        return found
+    on_the_way = ispg_seconds(particles, ceil(case.joint.way / path.speed / found.largest_step))
+    return replace(found, seconds={"reflow": 2.0 * found.seconds["reflow"] + on_the_way})  # at rest before and after
 
 
 def _of_drops(case: DropsCase) -> SolderForecast:

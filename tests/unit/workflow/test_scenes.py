@@ -139,6 +139,14 @@ GALERKIN = "solder.numerics.scheme=ispg"
             ["joint.path.steps = 4", "in one go"],
         ),
         (
+            ["joint.path={standoff='0.5 mm',speed='1000 mm/s'}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.speed", "Weber number", "0.0025 mm/s to 482.3 mm/s"],
+        ),
+        (
+            ["joint.path={standoff='0.5 mm',speed='0.001 mm/s'}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.speed", "solder.process_time"],
+        ),
+        (
             ["joint.package.load=1 mN", GALERKIN, "solder.effects.inertia=on", "solder.wall=no-slip"],
             ["solder.numerics.scheme", "packages that float, on walls with friction"],
         ),
@@ -147,6 +155,15 @@ GALERKIN = "solder.numerics.scheme=ispg"
 def test_a_package_at_a_speed_needs_inertia_and_the_scheme_ispg(settings, words):
     text = problems_of(JOINT, *settings)
     assert [word for word in words if word not in text] == [], text
+
+
+def test_a_slow_package_is_predicted_to_take_longer():
+    asked = [GALERKIN, "solder.effects.inertia=on"]
+    slow, fast = (
+        forecast_solder(read_case(JOINT, [f"joint.path={{standoff='0.5 mm',speed='{speed} mm/s'}}", *asked]))
+        for speed in (1, 100)
+    )
+    assert slow.seconds["reflow"] > fast.seconds["reflow"] > forecast_solder(read_case(JOINT, asked)).seconds["reflow"]
 
 
 @pytest.mark.parametrize("table", [SPEED, "joint.package.load=1 mN"])
