@@ -44,6 +44,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.descent import ARRIVED
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
@@ -207,15 +208,16 @@ class PreparedIspgStep:
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
         potential = self.physics.energy(moved)
-        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
+        driving = force - base.time_step * equations.tension(equations.pulled(start, velocity))
         loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
-        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure + loads)
+        work = time_step * (float((driving * velocity).sum()) + rate * mean_pressure + loads)
+        done, pull = 0.0, float("nan")
         if given:
             acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
             forces = equations.reaction((base.velocity, start, velocity), force, acting)
-            done = equations.power(predicted, {wall: ways[wall] for wall in given}, forces)
-            losses = replace(losses, plates=losses.plates - done)
+            done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
             work += time_step * equations.power(predicted, given, forces) - done
+        losses = replace(losses, plates=losses.plates - done)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
@@ -241,7 +243,18 @@ class PreparedIspgStep:
             surface_pressure=mean_pressure,
             twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
+            pull=pull,
         )
+
+    def _plate_work(
+        self, body: Body, equations: GalerkinEquations, ways: dict[int, Floats], forces: tuple[Floats, Floats]
+    ) -> tuple[float, float]:
+        """Work of plates on their ways `(6,)` [J] by the forces of `GalerkinEquations.reaction`, mean force along them.
+
+        There is no such force where they have arrived.
+        """
+        done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
+        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
         """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import log
+from math import isfinite, log
 from time import perf_counter
 from typing import Any
 
@@ -100,8 +100,23 @@ class Run:
         return self.calm >= CALM_STEPS
 
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
-        """Columns of the records, with width and capillary number mu v / gamma."""
-        names = ("step", "time", "time_step", "binding", "height", "volume", "energy", "displacement", "iterations")
+        """Columns of the records, with width and capillary number mu v / gamma.
+
+        Where a plate was moved by a known force they have this, too, and the standoff.
+        """
+        names: tuple[str, ...] = (
+            "step",
+            "time",
+            "time_step",
+            "binding",
+            "height",
+            "volume",
+            "energy",
+            "displacement",
+            "iterations",
+        )
+        if any(isfinite(record.pull) for record in self.records):
+            names = (*names, "standoff", "pull")
         columns = {name: np.array([getattr(record, name) for record in self.records]) for name in names}
         if self.profiles:
             columns["width"] = np.array([profile.max_width for profile in self.profiles])

@@ -60,7 +60,7 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> list[Chart
 
 
 def history_curve(history: dict) -> list[Chart]:
-    """Return height and width, energy, capillary number and time step against the steps."""
+    """Return height and width, energy, capillary number and time step against the steps; the force of a pull first."""
     step, steps = history["step"], Axis("step")
     sizes = [
         Series(name, step, history[name] / MILLI, colour)
@@ -69,12 +69,16 @@ def history_curve(history: dict) -> list[Chart]:
     ]
     energy = [Series("energy", step, history["energy"] / MICRO)]
     capillary = [Series("capillary number", step, history["capillary_number"])]
-    return [
+    charts = [
         Chart(steps, Axis("size [mm]"), sizes),
         Chart(steps, Axis("energy [µJ]"), energy),
         Chart(steps, Axis("capillary number", log=True), capillary),
         Chart(steps, Axis("time step [µs]", log=True), [Series("time step", step, history["time_step"] / MICRO)]),
     ]
+    if "pull" in history:
+        force = Series("package", history["standoff"] / MILLI, history["pull"] / MILLI)
+        charts.insert(0, Chart(Axis("standoff [mm]"), Axis("force along the way [mN]"), [force]))
+    return charts
 
 
 def path_curve(places: Sequence[Mapping]) -> list[Chart]:
