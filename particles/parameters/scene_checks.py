@@ -3,6 +3,7 @@
 from math import degrees, pi, radians
 from typing import Protocol
 
+from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop
@@ -28,6 +29,20 @@ class HasWall(Protocol):
     @property
     def is_free(self) -> bool:
         """Whether there is no wall."""
+
+
+def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
+    """The solder of a scene with the scheme that auto stands for, and why: ispg wherever it is verified, else energy."""
+    ispg = changed(solder, "numerics.scheme", "ispg")
+    if isinstance(scene, Drop):
+        found = [] if scene.section != "none" else _ispg_problems(scene, ispg)
+    elif isinstance(scene, Joint):
+        found = _ispg_joint_problems(scene, ispg)
+    else:
+        found = _ispg_pair_problems(scene, ispg)
+    if found:
+        return solder, found[0].message
+    return ispg, "with inertia ISPG costs less than tetrahedra"
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
