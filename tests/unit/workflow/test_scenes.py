@@ -50,7 +50,11 @@ BAD_VALUES = {
     "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
     "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
-    "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of auto, energy, ispg, gripc", "did you mean gripc?"]),
+    "unknown scheme": (
+        DROP,
+        "solder.numerics.scheme=gripk",
+        ["of auto, energy, ispg, gripc", "did you mean gripc?"],
+    ),
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
     "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
     "ispg without inertia": (DROP, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "without inertia", "energy"]),
@@ -130,7 +134,10 @@ GALERKIN = "solder.numerics.scheme=ispg"
     ("settings", "words"),
     [
         ([SPEED], ['joint.path.speed = "100 mm/s"', "without inertia", 'inertia = "on"']),
-        ([SPEED, "solder.effects.inertia=on"], ["solder.numerics.scheme", "at a speed (100 mm/s)", "ispg"]),
+        (
+            [SPEED, "solder.effects.inertia=on", "solder.numerics.scheme=energy"],
+            ["solder.numerics.scheme", "at a speed (100 mm/s)", "ispg"],
+        ),
         (["joint.path.standoff=0.5 mm", GALERKIN, "solder.effects.inertia=on"], ["or joint.path.speed with"]),
         (["joint.path={speed='100 mm/s'}", GALERKIN, "solder.effects.inertia=on"], ["ends where it starts"]),
         (["joint.path={standoff='0.5 mm',speed='0 mm/s'}"], ["joint.path.speed", "> 0"]),
