@@ -220,7 +220,7 @@ class GalerkinEquations:
     def twists(self, velocity: Floats, floating: Collection[int]) -> dict[int, Floats]:
         """Twists `(6,)` of the plates that float, of a velocity `(n, 3)` [m/s]."""
         if self.riders is None:
-            return {}
+            return {wall: np.zeros(6) for wall in floating}
         found = np.tensordot(self.riders.rates(velocity), self.riders.twists, 1)
         return {wall: found[wall] for wall in floating}
 

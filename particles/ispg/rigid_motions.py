@@ -85,22 +85,26 @@ class Riders:
     def of(cls, motions: Sequence[PlateMotion], body: Body, projections: Floats, masses: Floats) -> "Riders | None":
         """Make them of the directions in which plates are free; None where there are none.
 
+        A plate that slides on liquid which no edge of it holds is left where it is: it has no mass.
+
         Args:
-            motions: of plates; each free direction must take particles along.
+            motions: of plates.
             body: the liquid body.
             projections: `(n, 3, 3)` of velocities onto those that walls admit.
             masses: of the particles, `(n,)` [kg].
         """
-        ways = [(motion, way) for motion in motions for way in motion.directions]
-        if not ways:
+        found = []
+        for motion, way in [(free, way) for free in motions for way in free.directions]:
+            whole = wall_velocities(body, {motion.wall: way})
+            taken = held(projections, whole)
+            if np.abs(taken).max() > ROUNDING * np.abs(whole).max():
+                twist = np.zeros((len(body.plates), 6))
+                twist[motion.wall] = way
+                found.append((twist, taken, way[:3] @ motion.load))
+        if not found:
             return None
-        twists = np.zeros((len(ways), len(body.plates), 6))
-        for twist, (motion, way) in zip(twists, ways, strict=True):
-            twist[motion.wall] = way
-        taken = [held(projections, wall_velocities(body, dict(enumerate(twist)))) for twist in twists]
-        fields = np.array(taken).reshape(len(ways), *body.points.shape)
+        twists, fields, loads = (np.array(parts) for parts in zip(*found, strict=True))
         momenta = masses[:, None] * fields
-        loads = np.array([way[:3] @ motion.load for motion, way in ways])
         basis = np.linalg.inv(np.linalg.cholesky(np.tensordot(fields, momenta, ((1, 2), (1, 2)))))
         return cls(*(np.tensordot(basis, part, 1) for part in (twists, fields, momenta, loads)))
 
