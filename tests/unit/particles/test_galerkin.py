@@ -173,7 +173,7 @@ def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
 
 
 def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
-    """The projection with a plate free to lift meets volumes, by a change of momentum that has no power in the result."""
+    """The projection with a plate free to lift meets volumes; what changes momentum has no power in the result."""
     joint, _, _ = between_plates
     physics = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     equations = IspgStep().prepare(joint, physics, NeighbourList(1.0, 0.0)).equations(joint, 1e-3)
