@@ -29,12 +29,12 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
     found = (
-        found or _ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
+        found or ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
     )
     return found or too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
-def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
+def ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find joints that the scheme ispg is not verified for."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     places = {

@@ -3,10 +3,12 @@
 from math import degrees, pi, radians
 from typing import Protocol
 
+from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop
-from reflowshock.particles.parameters.scenes import Drop, Drops, Oscillation
+from reflowshock.particles.parameters.joint_checks import ispg_joint_problems
+from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
 from reflowshock.particles.reference.young_laplace import cap_angle, sessile_meridian
@@ -28,6 +30,20 @@ class HasWall(Protocol):
     @property
     def is_free(self) -> bool:
         """Whether there is no wall."""
+
+
+def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
+    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy."""
+    ispg = changed(solder, "numerics.scheme", "ispg")
+    if isinstance(scene, Drop):
+        found = [] if scene.section != "none" else _ispg_problems(scene, ispg)
+    elif isinstance(scene, Joint):
+        found = ispg_joint_problems(scene, ispg)
+    else:
+        found = _ispg_pair_problems(scene, ispg)
+    if found:
+        return solder, found[0].message
+    return ispg, "with inertia ISPG costs less than tetrahedra"
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:

@@ -241,10 +241,15 @@ class Fluid(Liquid, Walls):
     def resolve(self, scene: Scene, gravity: Switch) -> Solder:
         """Return the solder of a scene, with the set's properties where none are given.
 
+        The scheme auto is energy here; `scene_checks.with_scheme` may take another.
+
         Args:
             scene: volume and contact angles.
             gravity: whether gravity acts.
         """
+        numerics = self.numerics.model_dump()
+        if self.numerics.scheme == "auto":
+            del numerics["scheme"]
         return Solder(
             volume=scene.volume,
             gravity=self.gravity,
@@ -252,7 +257,7 @@ class Fluid(Liquid, Walls):
             wall=self.wall,
             slip_length=self.slip_length,
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
-            numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
+            numerics=SolderNumerics(spacing=scene.resolution, **numerics),
             **scene.contact_angles,
             **self.properties,
         )

@@ -25,7 +25,18 @@ class SolderCase(Case):
     @property
     def molten(self) -> Solder:
         """The solder as the solver takes it."""
-        return self.solder.resolve(getattr(self, self.kind), self.gravity)
+        return self.decided[0]
+
+    @property
+    def decided(self) -> tuple[Solder, str]:
+        """The solder as the solver takes it, and why it has its scheme; no words where the case says it."""
+        scene = getattr(self, self.kind)
+        solder = self.solder.resolve(scene, self.gravity)
+        if self.solder.numerics.scheme != "auto":
+            return solder, ""
+        from reflowshock.particles.parameters.scene_checks import with_scheme
+
+        return with_scheme(scene, solder)
 
 
 class DropCase(SolderCase):

@@ -32,6 +32,7 @@ class SolderForecast:
         effects: effect -> {"on", "why"}.
         particles: number of particles.
         scheme: how steps are solved.
+        why: why so, where the case leaves it open.
         spacing: their distance at the start [m].
         capillary_limit: largest stable time step of an explicit surface tension [s].
         largest_step: largest time step that will be taken [s].
@@ -45,6 +46,7 @@ class SolderForecast:
     capillary_limit: float
     largest_step: float
     seconds: dict[str, float]
+    why: str = ""
 
 
 def forecast_solder(case: Case) -> SolderForecast:
@@ -109,7 +111,8 @@ def _towards_rest(
     if scheme == "ispg":
         seconds = (of_ispg or ispg_seconds)(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
-    return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
+    why = case.decided[1] if effects["inertia"]["on"] else ""
+    return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost, why)
 
 
 def _of_oscillation(case: OscillationCase) -> SolderForecast:
@@ -151,7 +154,7 @@ def solder_tables(case: Case, outlook: SolderForecast) -> Iterator[RenderableTyp
     """Yield particles, scheme and time steps; then what the costs assume."""
     table = new_table("\nReflow", "what", "value", "remark")
     table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} µm spacing at the start")
-    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
+    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme] + (f"; {outlook.why}" if outlook.why else ""))
     table.add_row(
         "capillary limit", short(outlook.capillary_limit), "largest stable time step of explicit surface tension"
     )
