@@ -162,14 +162,15 @@ def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
     """Lift and shift, without an edge: the motion that is left takes along what lies on the plate, across it."""
     joint, _, equations = between_plates
     free = Floating(1, np.vstack([LIFT, SHIFT]), np.array([0.0, 0.0, -2.0]))
-    riders = Riders.of((free,), joint, equations.admitted, equations.masses)
+    parts = joint, equations.admitted, equations.masses, equations.space.drift_of
+    riders = Riders.of((free,), *parts)
     assert riders.twists.shape == (1, 2, 6)
     on_plate = joint.cloud.wall == 1
     lift = 1.0 / np.sqrt(equations.masses[on_plate].sum())
     assert riders.fields[0] == pytest.approx(np.outer(on_plate, [0.0, 0.0, lift]))
     assert riders.twists[0, 1] == pytest.approx([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     assert riders.loads == pytest.approx(-2.0 * lift)
-    assert Riders.of((Floating(1, SHIFT, np.zeros(3)),), joint, equations.admitted, equations.masses) is None
+    assert Riders.of((Floating(1, SHIFT, np.zeros(3)),), *parts) is None
 
 
 def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
@@ -178,7 +179,7 @@ def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
     physics = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     equations = IspgStep().prepare(joint, physics, NeighbourList(1.0, 0.0)).equations(joint, 1e-3)
     start = np.random.default_rng(9).normal(size=joint.points.shape)
-    start = projected(equations.admitted, start) + equations.riders.along(start)
+    start = projected(equations.admitted, start) + equations.space.riders.along(start)
     field, _ = equations.project(start, 0.0, LaggedCholesky())
     assert equations.constraint(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.constraint(start)).max())
     change = equations.momentum(field - start)
