@@ -68,27 +68,28 @@ def test_slow_plates_do_the_work_of_the_surface():
 
 
 @pytest.mark.parametrize(
-    ("end", "wall", "force"),
+    ("end", "wall"),
     [
-        (place(0.40e-3), "free-slip", 2e-3),
-        pytest.param(place(0.31e-3), "free-slip", 0.015, marks=pytest.mark.long),
-        (place(0.36e-3, 0.03e-3), "no-slip", 2e-3),
-        pytest.param(place(0.36e-3, 0.03e-3), "free-slip", 2e-3, marks=pytest.mark.long),
-        pytest.param(place(0.35e-3, 0.0, 3.0), "free-slip", 2e-3, marks=pytest.mark.long),
-        pytest.param(place(0.36e-3, 0.0, 3.0), "slip", 2e-3, marks=pytest.mark.long),
+        (place(0.40e-3), "free-slip"),
+        pytest.param(place(0.31e-3), "free-slip", marks=pytest.mark.long),
+        (place(0.36e-3, 0.03e-3), "no-slip"),
+        pytest.param(place(0.36e-3, 0.03e-3), "free-slip", marks=pytest.mark.long),
+        pytest.param(place(0.35e-3, 0.0, 3.0), "free-slip", marks=pytest.mark.long),
+        pytest.param(place(0.36e-3, 0.0, 3.0), "slip", marks=pytest.mark.long),
     ],
 )
-def test_a_moved_joint_rests_where_the_default_does(end, wall, force):
-    """Pulled, pressed, pushed aside, tilted, at 100 mm/s: at rest it does not matter how it came there.
+def test_a_moved_joint_rests_where_the_default_does(end, wall):
+    """Pulled, pressed, pushed aside, tilted, at 100 mm/s; the default is moved there from rest to rest.
 
-    But for the triangles: those of a barrel that has been pressed have another force, by 1 % of pi a gamma.
+    Its triangles are those that came from there: with new ones the force of a barrel differs by 1 % of pi a gamma.
     """
     *_, shape = follow_path(START, solder(wall=wall), [end], speed=0.1)
-    metrics, still = named(shape), named(solve_joint(end, solder("energy")))
+    *_, slow = follow_path(START, solder("energy"), [end])
+    metrics, still = named(shape), named(slow)
     assert metrics["at_rest"] == 1.0
     assert metrics["particles_lost"] == 0
-    assert metrics["max_width"] == pytest.approx(still["max_width"], rel=5e-4)
-    assert metrics["axial_force"] == pytest.approx(still["axial_force"], abs=force * PULL)
+    assert metrics["max_width"] == pytest.approx(still["max_width"], rel=1e-4)
+    assert metrics["axial_force"] == pytest.approx(still["axial_force"], abs=2e-3 * PULL)
     assert abs(metrics["volume_drift"]) < 1e-8
     assert abs(metrics["energy_imbalance"]) < 1e-3
     assert metrics["plates_loss"] < 0.0 or end.gap < START.gap
