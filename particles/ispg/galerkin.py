@@ -22,6 +22,7 @@ from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.collocation import Ghosts, mirror
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes, with_moments
+from reflowshock.particles.ispg.rigid_motions import Riders
 
 # Reach of the search for neighbours in spacings, and that of particles with too few of them.
 REACH, WIDEST = 2.6, 4.4
@@ -39,8 +40,7 @@ class Galerkin:
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
         drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
-        riding: momenta `(k, n, 3)` of motions of plates that float, and the velocities `(k, g, 3)` that these give
-            images.
+        riders: motions of plates that float.
     """
 
     volumes: Floats
@@ -51,7 +51,7 @@ class Galerkin:
     shape: sparse.csr_matrix
     ghosts: Ghosts
     drift: Floats
-    riding: tuple[Floats, Floats] | None = None
+    riders: Riders | None = None
 
     @classmethod
     def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "Galerkin":
@@ -147,10 +147,9 @@ class Galerkin:
 
     def driven(self, field: Floats) -> Floats:
         """Velocities that plates which move give the images `(g, 3)` [m/s]: as prescribed, or with a field `(n, 3)`."""
-        if self.riding is None:
+        if self.riders is None:
             return self.drift
-        momenta, drifts = self.riding
-        return self.drift + np.tensordot(np.tensordot(momenta, field, 2), drifts, 1)
+        return self.drift + np.tensordot(self.riders.rates(field), self.riders.drifts, 1)
 
     def shown(self, force: Floats) -> Floats:
         """Forces on particles `(n, 3)` [N] of those on N v."""

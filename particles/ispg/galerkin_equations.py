@@ -26,7 +26,6 @@ holds, q what they admit. Images move with their walls (`Ghosts.drift`), frictio
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import cast
 
 import numpy as np
 
@@ -77,7 +76,6 @@ class GalerkinEquations:
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         walls: `(n, 3)` velocities that walls prescribe at the particles on them [m/s], zero elsewhere.
-        riders: motions of plates that float.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -90,7 +88,6 @@ class GalerkinEquations:
     rigid: Floats
     drag: Floats
     walls: Floats
-    riders: Riders | None
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -133,12 +130,12 @@ class GalerkinEquations:
         parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
         operator: Apply = partial(kernels.momentum_operator, *parts)
         right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given
-        if self.riders is not None:
+        if (riders := self.space.riders) is not None:
             unheld = np.broadcast_to(np.eye(3), self.admitted.shape).copy()
             parts = (self.space.rows, self.space.images, (inertia, self.factors, unheld), implicit)
-            operator = self._ridden(partial(kernels.momentum_operator, *parts))
-            on_images = self.riders.loads + self._image_rates() @ pressure
-            right, begun = self._admitted_load(load, on_images), begun + self.riders.along(velocity)
+            operator = self._ridden(riders, partial(kernels.momentum_operator, *parts))
+            on_images = riders.loads + self._image_rates(riders) @ pressure
+            right, begun = self._admitted_load(riders, load, on_images), begun + riders.along(velocity)
         solution, _ = conjugate_gradients(
             operator,
             right,
@@ -166,9 +163,9 @@ class GalerkinEquations:
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
         parts = (space.rows, space.images, self._parts, mobility)
         ridden = np.zeros((0, len(missing)))
-        if self.riders is not None:
-            carried = [kernels.rates_of_volume(*parts[:3], field) for field in self.riders.fields]
-            ridden = np.array(carried) + self._image_rates()
+        if (riders := space.riders) is not None:
+            carried = [kernels.rates_of_volume(*parts[:3], field) for field in riders.fields]
+            ridden = np.array(carried) + self._image_rates(riders)
         potential = factors.solve(
             lambda pressure: (
                 kernels.pressure_operator(*parts, pressure) + self.time_step * (ridden @ pressure) @ ridden
@@ -178,17 +175,16 @@ class GalerkinEquations:
             Tolerance(VOLUME_TOLERANCE, enough),
         )
         velocity = start + kernels.projected(mobility, self.push(potential))
-        if self.riders is not None:
-            velocity += self.time_step * np.tensordot(ridden @ potential, self.riders.fields, 1)
+        if riders is not None:
+            velocity += self.time_step * np.tensordot(ridden @ potential, riders.fields, 1)
         return velocity, potential - self.fluid.viscosity * divergence / space.volumes
 
-    def _ridden(self, operator: Apply) -> Apply:
+    def _ridden(self, riders: Riders, operator: Apply) -> Apply:
         """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
 
         The forces on images that a motion of a plate makes have a power in the others, and on the particles.
         """
-        riders, drifts = cast(Riders, self.riders), cast(tuple, self.space.riding)[1]
-        still = np.zeros_like(self.walls)
+        drifts, still = riders.drifts, np.zeros_like(self.walls)
         stresses = [
             kernels.resistance(*self.space.rows, np.concatenate((still, drift)), self.factors) for drift in drifts
         ]
@@ -198,20 +194,19 @@ class GalerkinEquations:
         def ridden(field: Floats) -> Floats:
             rates = riders.rates(field)
             force = operator(field) + np.tensordot(rates, forces, 1)
-            return self._admitted_load(force, np.tensordot(forces, field, 2) + among @ rates)
+            return self._admitted_load(riders, force, np.tensordot(forces, field, 2) + among @ rates)
 
         return ridden
 
-    def _admitted_load(self, force: Floats, on_images: Floats) -> Floats:
+    def _admitted_load(self, riders: Riders, force: Floats, on_images: Floats) -> Floats:
         """Forces `(n, 3)` that walls admit; on plates that float by these, and by more `(k,)` on images and plates."""
-        riders = cast(Riders, self.riders)
         on_plates = np.tensordot(riders.fields, force, 2) + on_images
         return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)
 
-    def _image_rates(self) -> Floats:
+    def _image_rates(self, riders: Riders) -> Floats:
         """Rates of volume `(k, n)` that images of plates that float make."""
-        drifts, still = cast(tuple, self.space.riding)[1], np.zeros_like(self.walls)
-        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in drifts])
+        still = np.zeros_like(self.walls)
+        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in riders.drifts])
 
     def _rates_of_images(self, images: Floats) -> Floats:
         """Rates of volume `(n,)` of velocities of images alone `(n + g, 3)`, none in all."""
@@ -219,9 +214,9 @@ class GalerkinEquations:
 
     def twists(self, velocity: Floats, floating: Collection[int]) -> dict[int, Floats]:
         """Twists `(6,)` of the plates that float, of a velocity `(n, 3)` [m/s]."""
-        if self.riders is None:
-            return {}
-        found = np.tensordot(self.riders.rates(velocity), self.riders.twists, 1)
+        if (riders := self.space.riders) is None:
+            return {wall: np.zeros(6) for wall in floating}
+        found = np.tensordot(riders.rates(velocity), riders.twists, 1)
         return {wall: found[wall] for wall in floating}
 
     def pulled(self, start: Floats, _end: Floats) -> Floats:

@@ -335,10 +335,8 @@ class PreparedIspgStep:
         clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
-        riders = Riders.of(self.physics.motions, body, self.projections, fluid.density * space.carried)
-        if riders is not None:
-            drifts = np.array([space.drift_of(body, dict(enumerate(twist))) for twist in riders.twists])
-            space = replace(space, riding=(riders.momenta, drifts))
+        masses, motions = fluid.density * space.carried, self.physics.motions
+        space = replace(space, riders=Riders.of(motions, body, self.projections, masses, space.drift_of))
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -346,9 +344,8 @@ class PreparedIspgStep:
             admitted=self.projections,
             surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
             spacing=spacing,
-            rigid=orthonormal(rigid, fluid.density * space.carried),
+            rigid=orthonormal(rigid, masses),
             walls=wall_velocities(body, twists),
-            riders=riders,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,

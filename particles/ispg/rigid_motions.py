@@ -1,6 +1,6 @@
 """Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,37 +72,51 @@ class Riders:
     Attributes:
         twists: `(k, p, 6)` of the p plates, over the root of a mass.
         fields: `(k, n, 3)` velocities of the particles.
-        momenta: `(k, n, 3)` these times the masses.
+        drifts: `(k, g, 3)` velocities of their images at the walls, as those of `Ghosts.drift`.
+        momenta: `(k, n, 3)` fields times the masses.
         loads: `(k,)` power of the loads on the plates.
     """
 
     twists: Floats
     fields: Floats
+    drifts: Floats
     momenta: Floats
     loads: Floats
 
     @classmethod
-    def of(cls, motions: Sequence[PlateMotion], body: Body, projections: Floats, masses: Floats) -> "Riders | None":
+    def of(
+        cls,
+        motions: Sequence[PlateMotion],
+        body: Body,
+        projections: Floats,
+        masses: Floats,
+        drift: Callable[[Body, Mapping[int, Floats]], Floats],
+    ) -> "Riders | None":
         """Make them of the directions in which plates are free; None where there are none.
 
+        A plate that slides on liquid which no edge of it holds is left where it is: it has no mass.
+
         Args:
-            motions: of plates; each free direction must take particles along.
+            motions: of plates.
             body: the liquid body.
             projections: `(n, 3, 3)` of velocities onto those that walls admit.
             masses: of the particles, `(n,)` [kg].
+            drift: velocities of images `(g, 3)` by the body and twists of its plates.
         """
-        ways = [(motion, way) for motion in motions for way in motion.directions]
-        if not ways:
+        found = []
+        for motion, way in [(free, way) for free in motions for way in free.directions]:
+            whole = wall_velocities(body, {motion.wall: way})
+            taken = held(projections, whole)
+            if np.abs(taken).max() > ROUNDING * np.abs(whole).max():
+                twist = np.zeros((len(body.plates), 6))
+                twist[motion.wall] = way
+                found.append((twist, taken, drift(body, {motion.wall: way}), way[:3] @ motion.load))
+        if not found:
             return None
-        twists = np.zeros((len(ways), len(body.plates), 6))
-        for twist, (motion, way) in zip(twists, ways, strict=True):
-            twist[motion.wall] = way
-        taken = [held(projections, wall_velocities(body, dict(enumerate(twist)))) for twist in twists]
-        fields = np.array(taken).reshape(len(ways), *body.points.shape)
+        twists, fields, drifts, loads = (np.array(parts) for parts in zip(*found, strict=True))
         momenta = masses[:, None] * fields
-        loads = np.array([way[:3] @ motion.load for motion, way in ways])
         basis = np.linalg.inv(np.linalg.cholesky(np.tensordot(fields, momenta, ((1, 2), (1, 2)))))
-        return cls(*(np.tensordot(basis, part, 1) for part in (twists, fields, momenta, loads)))
+        return cls(*(np.tensordot(basis, part, 1) for part in (twists, fields, drifts, momenta, loads)))
 
     def rates(self, field: Floats) -> Floats:
         """How fast a velocity `(n, 3)` has each motion, `(k,)`."""

@@ -83,20 +83,31 @@ def follow_path(
         flow.physics = replace(flow.physics, motions=(motion,))
         checkpoint = checkpoints(number) if checkpoints else None
         run = run_to_rest(flow, replace(rule, max_steps=flow.steps + steps + rule.max_steps), checkpoint=checkpoint)
-        shape = joint_shape(place, solder, flow, run)
         if run.ruptured:
-            yield _broken(shape, place, solder, flow, begun)
+            time, there = flow.time - begun, placed_geometry(place, flow.body.plates)
+            yield _broken(joint_shape(there, solder, flow, run), place, solder, flow, time)
             return
-        yield shape
+        yield joint_shape(place, solder, flow, run)
 
 
-def _broken(shape: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, begun: float) -> JointShape:
-    """The shape of a joint that breaks on the way to a place, with the standoff there and the time since it began."""
-    standoff = placed_geometry(place, flow.body.plates).gap
-    found: Metrics = {"standoff_at_break": (standoff, "m")}
-    if flow.physics.momenta:
-        found["time_at_break"] = (flow.time - begun, "s")
-        shape = parted(place, solder, flow, shape)
+def _broken(joint: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, time: float) -> JointShape:
+    """A joint that broke on the way to a place, with the standoff there; with inertia the drops that it leaves.
+
+    Args:
+        joint: when it broke.
+        place: to which the package goes on with inertia.
+        solder: volume, fluid and numerics.
+        flow: of the joint.
+        time: that it was on the way [s].
+    """
+    found: Metrics = {"standoff_at_break": joint.metrics["standoff"]}
+    if not flow.physics.momenta:
+        return replace(joint, metrics=joint.metrics | found)
+    shape = parted(place, solder, flow, joint)
+    found |= {
+        "time_at_break": (time, "s"),
+        "standoff": (place.gap, "m") if shape is not joint else joint.metrics["standoff"],
+    }
     return replace(shape, metrics=shape.metrics | found)
 
 

@@ -93,6 +93,10 @@ class SectionSpace:
         return cls(section_volumes(body, density), scalar, *pairs_of)
 
     @property
+    def riders(self) -> None:
+        """None: the wall of a section rests."""
+
+    @property
     def carried(self) -> Floats:
         """Volumes whose mass the particles carry: here those that they have."""
         return self.volumes

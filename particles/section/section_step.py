@@ -196,7 +196,6 @@ class PreparedSectionStep(PreparedIspgStep):
             rigid=rigid,
             drag=np.zeros(len(masses)),
             walls=np.zeros_like(body.points),
-            riders=None,
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             spacing=body.cloud.spacing,
             time_step=time_step,

@@ -79,12 +79,16 @@ def test_slow_plates_do_the_work_of_the_surface():
     ],
 )
 def test_a_moved_joint_rests_where_the_default_does(end, wall):
-    """Pulled, pressed, pushed aside, tilted, at 100 mm/s: at rest it does not matter how it came there."""
+    """Pulled, pressed, pushed aside, tilted, at 100 mm/s; the default is moved there from rest to rest.
+
+    Its triangles are those that came from there: with new ones the force of a barrel differs by 1 % of pi a gamma.
+    """
     *_, shape = follow_path(START, solder(wall=wall), [end], speed=0.1)
-    metrics, still = named(shape), named(solve_joint(end, solder("energy")))
+    *_, slow = follow_path(START, solder("energy"), [end])
+    metrics, still = named(shape), named(slow)
     assert metrics["at_rest"] == 1.0
     assert metrics["particles_lost"] == 0
-    assert metrics["max_width"] == pytest.approx(still["max_width"], rel=3e-4)
+    assert metrics["max_width"] == pytest.approx(still["max_width"], rel=1e-4)
     assert metrics["axial_force"] == pytest.approx(still["axial_force"], abs=2e-3 * PULL)
     assert abs(metrics["volume_drift"]) < 1e-8
     assert abs(metrics["energy_imbalance"]) < 1e-3

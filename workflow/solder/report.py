@@ -16,8 +16,8 @@ from reflowshock.workflow.report.tables import figures_of, limited_metrics
 DEGREE = np.pi / 180.0
 HEADLINE = (
     "height", "max_width", "waist", "contact_angle", "max_width_error", "axial_force", "offset",
-    "collapse_height_error", "drops_left", "radius_error", "period", "period_error", "decay_rate", "decay_rate_error",
-    "verdict", "at_rest", "particles", "seconds",
+    "collapse_height_error", "standoff_at_break", "time_at_break", "drops_left", "radius_error",
+    "period", "period_error", "decay_rate", "decay_rate_error", "verdict", "at_rest", "particles", "seconds",
 )  # fmt: skip
 
 

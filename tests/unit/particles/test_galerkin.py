@@ -20,11 +20,12 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import centre
-from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.rigid_motions import Riders, rigid_momenta, rigid_motions
 from reflowshock.particles.ispg.step_kernels import pressure_matrix, pressure_operator, projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, Floating
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.time_step import TimeStep
@@ -155,6 +156,35 @@ def test_plates_do_the_work_that_liquid_gains(between_plates):
     lost, inertia = equations.losses(start, now), (now * equations.momentum(now - before)).sum() / 1e-3
     expansion = rate * float(acting @ equations.space.volumes) / equations.space.volumes.sum()
     assert power + expansion == pytest.approx(inertia + lost.viscous + lost.smoothing, rel=1e-4)
+
+
+def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
+    """Lift and shift, without an edge: the motion that is left takes along what lies on the plate, across it."""
+    joint, _, equations = between_plates
+    free = Floating(1, np.vstack([LIFT, SHIFT]), np.array([0.0, 0.0, -2.0]))
+    parts = joint, equations.admitted, equations.masses, equations.space.drift_of
+    riders = Riders.of((free,), *parts)
+    assert riders.twists.shape == (1, 2, 6)
+    on_plate = joint.cloud.wall == 1
+    lift = 1.0 / np.sqrt(equations.masses[on_plate].sum())
+    assert riders.fields[0] == pytest.approx(np.outer(on_plate, [0.0, 0.0, lift]))
+    assert riders.twists[0, 1] == pytest.approx([0.0, 0.0, lift, 0.0, 0.0, 0.0])
+    assert riders.loads == pytest.approx(-2.0 * lift)
+    assert Riders.of((Floating(1, SHIFT, np.zeros(3)),), *parts) is None
+
+
+def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
+    """The projection with a plate free to lift meets volumes; what changes momentum has no power in the result."""
+    joint, _, _ = between_plates
+    physics = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
+    equations = IspgStep().prepare(joint, physics, NeighbourList(1.0, 0.0)).equations(joint, 1e-3)
+    start = np.random.default_rng(9).normal(size=joint.points.shape)
+    start = projected(equations.admitted, start) + equations.space.riders.along(start)
+    field, _ = equations.project(start, 0.0, LaggedCholesky())
+    assert equations.constraint(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.constraint(start)).max())
+    change = equations.momentum(field - start)
+    assert (change * field).sum() == pytest.approx(0.0, abs=1e-4 * np.abs((change * start).sum()))
+    assert np.abs(equations.twists(field, [1])[1]).max() > 0.0
 
 
 def test_the_pressure_matrix_is_that_of_its_operator(body, space):
