@@ -1,280 +1,110 @@
-"""Four models of surface tension in the same delta-SPH: error against cost at rest, on a wall, swinging, merging.
+"""Four models of surface tension in one delta-SPH: error against cost at rest, on a wall, swinging, merging.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py              (all; results/tension_models.json and .png)
-    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py oscillation  (one scene)
+    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py         (all; results/tension_models.json and .png)
+    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py swing   (one of them)
 
 A colour function with corrected normals, forces between pairs, a pressure on the free surface (`tension/`), and the
-program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; but only a tracked
-surface keeps particles from being shifted out of the liquid, so that the others run without shifting, as they do at
-their authors'. Units of density, tension and diameter; time in sqrt(rho D^3 / gamma). Parameters are those published;
-the strength of the forces between pairs is that of the theory at rest, where the pressure tells how far it is off, and
-in the other scenes that one over this error. Shapes are read from one level of a smoothed colour for all models.
+program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; parameters are
+those published. The strength of the forces between pairs is calibrated on the pressure of a sphere, as their authors
+do (`strength`: over the theoretical one). Shapes are those of one level of a smoothed colour for all models. `cost`
+takes turns between the models; seconds of the runs are those of one core. A quarter of an hour.
 """
 
 import json
 import os
-from collections.abc import Callable
-from math import cos, pi, radians, sin, sqrt
-from time import process_time
+from functools import cache, partial
+from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
-
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
-from scipy.optimize import curve_fit
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from benchmarks.support.tables import write_tables
-from benchmarks.tension.colour import ColourFunction
-from benchmarks.tension.free_pressure import FreeSurfacePressure
-from benchmarks.tension.half_level import filled, level_points
-from benchmarks.tension.pairwise import Pairwise, cohesion
-from reflowshock.arrays import Floats
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
-from reflowshock.particles.scenes.droplet import base_width, droplet
-from reflowshock.particles.sph import flow
-from reflowshock.particles.sph.fluid_state import Fields
-from reflowshock.particles.sph.liquid_surface import EDGE, SurfaceLost
-from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.smoothing import SUPPORT
+from benchmarks.support.turns import batch, in_turns
+from benchmarks.tension.scenes import MODELS, at_rest, cap_at_rest, merging, start, swing, unit_drop
 
 mpl.use("Agg")
 RESULTS = Path(__file__).parent / "results" / "tension_models.json"
-MODELS = ("colour function", "pairwise", "free-surface pressure", "tracked surface")
-UNIT = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0, "gravity": 0.0}
-SIZES = (10, 14)  # particles a diameter
-STRETCH, APPROACH = 1.05, 0.3
-# Share of the particles that may have left the liquid; with more it is torn apart.
-LOST = 0.02
-LOOKS = 100
-NO_ANGLE = {"none": "the model has no contact angle; over a mirror its angle would be 90 degrees"}
+# Particles a diameter; of the sphere on which the forces between pairs are calibrated, and whose cost is measured.
+SIZES, SMALLER, SPHERE = (10, 14), (8, 10), 14
+# Error that is drawn for each scene, and its name.
+DRAWN = {
+    "rest": ("pressure_error", "pressure at rest"),
+    "cap_60": ("height_error", "height of the cap, 60 degrees"),
+    "cap_120": ("height_error", "height of the cap, 120 degrees"),
+    "swing": ("period_error", "period of a swing"),
+    "merging": ("radius_error", "radius after merging"),
+}
 
 
-def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
-    """Set up the drop of a scene, at the pressure of a sphere, with one of the models."""
-    tracked = droplet(scene)
-    if model == "tracked surface":
-        return tracked
-    law, fields = tracked.law._replace(tracked=0, shifting=0.0), tracked.fields
-    return untracked(law, np.array(fields[:3]), scene, model, strength)
+@cache
+def strength() -> float:
+    """Strength of the forces between pairs at which a sphere has its pressure, over the theoretical one."""
+    return 1.0 / (1.0 + at_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
 
 
-def untracked(law, points: Floats, scene: Droplet, model: str, strength: float) -> Simulation:
-    """The same particles `(3, n)` without a tracked surface."""
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
-    given = (law, scene.surface_tension, cos(scene.angle))
-    if model == "pairwise":
-        surface = Pairwise(*given, factor=strength)
-        rest = law.rest_density + strength * cohesion(law, scene.surface_tension) / law.sound**2
-        law = law._replace(rest_density=rest)
-    else:
-        surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*given)
-    return Simulation(fields, points.shape[1], law, surface)
+def models(scene, sizes: tuple[int, ...]) -> dict:
+    """The scene with each model and size."""
+    found = {}
+    for model in MODELS:
+        found[model] = {str(size): scene(model, size, strength() if model == "pairwise" else 1.0) for size in sizes}
+        for size, row in found[model].items():
+            told = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in told.items()), flush=True)
+    return found
 
 
-def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
-    """A drop of density, tension and diameter one."""
-    return Droplet(**UNIT | more, viscosity=ohnesorge, numerics=DropletNumerics(particles_per_diameter=across))
+def cost() -> dict:
+    """Microseconds of a particle-step of a drop at rest with each model, in turns, and over the tracked one."""
+
+    def step_of(simulation):
+        return batch(lambda: simulation.step(simulation.time_step()), 0.5)
+
+    drops = {model: start(unit_drop(SPHERE, 0.2), model, strength()) for model in MODELS}
+    seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
+    tracked = seconds["tracked surface"]
+    found = {
+        model: {
+            "us_per_particle_step": 1e6 * float(np.median(seconds[model])) / drops[model].fluids,
+            "over_tracked": float(np.median(seconds[model] / tracked)),
+        }
+        for model in MODELS
+    }  # fmt: skip
+    print(json.dumps(found, indent=1))
+    return found
 
 
-def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
-    """Run to a time; what was sampled every step, the cost, and when and whether the liquid came apart."""
-    simulation.step(1e-9)  # compiled
-    rows, begin, looked, torn = [], process_time(), 0, {}
-    try:
-        while simulation.time < until and not torn:
-            simulation.step(simulation.time_step())
-            rows.append(sample(simulation))
-            if simulation.time > looked * until / LOOKS:
-                looked, torn = looked + 1, came_apart(simulation)
-    except (SurfaceLost, FloatingPointError) as error:
-        torn = {"torn_apart_at": simulation.time, "why": str(error)}
-    seconds, count = process_time() - begin, simulation.fluids
-    found = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
-    return found | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
+def draw(found: dict) -> None:
+    """Draw errors against core-seconds, a panel a scene; what was torn apart or cannot be computed has no point."""
+    figure, panels = plt.subplots(1, len(found), figsize=(3.4 * len(found), 3.2), layout="constrained")
+    for panel, (scene, sides) in zip(np.atleast_1d(panels), found.items(), strict=True):
+        name, title = DRAWN[scene]
+        for model, marker in zip(MODELS, "so^D", strict=True):
+            rows = [row for row in sides[model].values() if name in row]
+            errors = [100.0 * abs(row[name]) for row in rows]
+            panel.loglog([row["seconds"] for row in rows], errors, f"{marker}-", label=model)
+        panel.set(title=title, xlabel="core-seconds")
+        panel.grid(alpha=0.3, which="both")
+    panels[0].set_ylabel("error (%)")
+    panels[0].legend(fontsize=7)
+    figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
 
 
-def stray(simulation: Simulation) -> int:
-    """Particles that no longer touch the largest part of the liquid."""
-    points = np.stack(simulation.fields[:3], axis=1)
-    near = cKDTree(points).sparse_distance_matrix(cKDTree(points), SUPPORT * simulation.law.length)
-    return len(points) - int(np.bincount(connected_components(near, directed=False)[1]).max())
-
-
-def came_apart(simulation: Simulation) -> dict:
-    """When the liquid came apart, if it did."""
-    fields = simulation.fields
-    if not np.isfinite(np.array(fields[:3])).all():
-        return {"torn_apart_at": simulation.time, "why": "positions are not finite"}
-    lost = stray(simulation)
-    return {"torn_apart_at": simulation.time, "why": f"{lost} particles left"} if lost > LOST * simulation.fluids else {}
-
-
-def volumes(fields: Fields) -> Floats:
-    """Of each particle [m^3]."""
-    return fields.mass / fields.density
-
-
-def core_pressure(simulation: Simulation, radius: float) -> float:
-    """Mean pressure within half a radius of the centre, with that of the model's own forces [Pa]."""
-    points = np.stack(simulation.fields[:3], axis=1)
-    own = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
-    core = np.linalg.norm(points - points.mean(axis=0), axis=1) < 0.5 * radius
-    return float((simulation.pressures + own)[core].mean())
-
-
-def radii(simulation: Simulation) -> Floats:
-    """Distances of the level from the centre [m]."""
-    points, volume = np.stack(simulation.fields[:3], axis=1), volumes(simulation.fields)
-    level = level_points(points, volume, simulation.law.spacing, half=False)
-    return np.linalg.norm(level - volume @ points / volume.sum(), axis=1)
-
-
-def late(rows: Floats) -> Floats:
-    """The last tenth of what was sampled, time in the first column."""
-    return rows[rows[:, 0] >= 0.9 * rows[-1, 0]]
-
-
-def at_rest(model: str, across: int, strength: float = 1.0) -> dict:
-    """A cube becomes a sphere: pressure, roundness, capillary number at rest."""
-    scene = unit_drop(across, 0.2, start="cube")
-
-    def sample(one):
-        return one.time, core_pressure(one, 0.5) if one.steps % 10 == 0 else np.nan, one.fastest
-
-    simulation = start(scene, model, strength)
-    found = follow(simulation, 3.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
-    radius = radii(simulation)
-    return found | {
-        "pressure_error": float(np.nanmean(late(rows)[:, 1])) / scene.laplace_pressure - 1.0,
-        "pressure_drift": float(np.nanstd(late(rows)[:, 1])) / scene.laplace_pressure,
-        "roundness": float(radius.max() / radius.min()),
-        "capillary_number": float(late(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
-        "volume_error": float(volumes(simulation.fields).sum() / scene.volume - 1.0),
-    }
-
-
-def cap_at_rest(model: str, across: int, degrees: float, strength: float) -> dict:
-    """A half sphere becomes a cap: height and base."""
-    if model == "free-surface pressure":
-        return NO_ANGLE
-    scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
-    simulation = start(scene, model, strength)
-    found = follow(simulation, 3.0, lambda one: (one.time, one.fastest))
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
-    spacing, angle = simulation.law.spacing, scene.angle
-    radius = 0.5 * (4.0 / ((2.0 + cos(angle)) * (1.0 - cos(angle)) ** 2)) ** (1.0 / 3.0)
-
-    def inside(points):
-        below = np.array([0.0, 0.0, -radius * cos(angle)])
-        return (points[:, 2] > 0.0) & (np.linalg.norm(points - below, axis=1) < radius)
-
-    points = np.stack(simulation.fields[:3], axis=1)
-    level = level_points(points, volumes(simulation.fields), spacing, half=True)
-    exact = level_points(*filled(inside, 2.0 * radius, spacing), spacing, half=True)
-    bases = [base_width(one, spacing) for one in (level, exact)]
-    return found | {
-        "height_error": float(level[0, 2] / exact[0, 2] - 1.0),
-        "base_error": bases[0] / bases[1] - 1.0,
-        "exact_base": 2.0 * radius * sin(angle),
-        "capillary_number": float(late(rows)[:, 1].max()) * scene.viscosity / scene.surface_tension,
-        "volume_error": float(volumes(simulation.fields).sum() / scene.volume - 1.0),
-    }
-
-
-def stretched(simulation: Simulation) -> Simulation:
-    """The same drop stretched along z, its surface too."""
-    fields, factors = simulation.fields, np.array([STRETCH**-0.5, STRETCH**-0.5, STRETCH])
-    for axis in range(3):
-        fields[axis][:] *= factors[axis]
-    if hasattr(simulation.surface, "points"):
-        simulation.surface.points *= factors
-    return Simulation(fields, simulation.fluids, simulation.law, simulation.surface)
-
-
-def swing(model: str, across: int, strength: float) -> dict:
-    """A stretched drop swings: period and decay over the exact ones, of a damped cosine fitted to second moments."""
-    scene = unit_drop(across, 0.05)
-    frequency = rayleigh_frequency(2, 0.5, 1.0, 1.0)
-    decay, exact = viscous_oscillation(2, frequency, scene.viscosity / 0.25)
-
-    def sample(one):
-        x, y, z = one.fields[:3]
-        return one.time * frequency, float(one.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
-
-    found = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
-    time, moment = rows[rows[:, 0] > 0.5].T
-
-    def damped(t, rate, turn, *parts):
-        return np.exp(-rate * t) * (parts[0] * np.cos(turn * t) + parts[1] * np.sin(turn * t)) + parts[2]
-
-    first = (decay / frequency, 1.0, 1.0, 0.0, 0.0)
-    try:
-        fit, _ = curve_fit(damped, time, moment / rows[0, 1], first)
-    except RuntimeError:
-        return found | {"why": "what it does is no damped swing"}
-    left = np.std(moment / rows[0, 1] - damped(time, *fit)) / np.std(moment / rows[0, 1])
-    return found | {
-        "period_error": float(exact / frequency / fit[1] - 1.0),
-        "decay_error": float(fit[0] * frequency / decay - 1.0),
-        "not_a_swing": float(left),
-    }
-
-
-def pair(scene: Droplet, model: str, strength: float) -> Simulation:
-    """Two drops beside each other that fly at each other along x, a gap of one edge of the surface between them."""
-    one = start(scene, "tracked surface")
-    aside = np.array([0.5 * scene.diameter + 0.5 * EDGE * one.law.spacing, 0.0, 0.0])
-    points = np.array(one.fields[:3])
-    both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    if model == "tracked surface":
-        fields, surface = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law), one.surface
-        corners, triangles = surface.points.copy(), surface.triangles.copy()
-        surface.points = corners - aside
-        surface.add(corners + aside, triangles)
-        simulation = Simulation(fields, both.shape[1], one.law, surface)
-    else:
-        simulation = untracked(one.law._replace(tracked=0, shifting=0.0), both, scene, model, strength)
-    simulation.fields.u[:] = APPROACH * np.sign(-both[0])
-    return simulation
-
-
-def merging(model: str, across: int, strength: float) -> dict:
-    """Two drops become one sphere: its radius, roundness and volume, and when it is longer than wide by 5 % only."""
-    scene = unit_drop(across, 0.2)
-    simulation = pair(scene, model, strength)
-
-    def sample(one):
-        x, y, z = (axis - axis.mean() for axis in one.fields[:3])
-        return one.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), one.fastest
-
-    found = follow(simulation, 4.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
-    radius, spacing = np.cbrt(0.25), simulation.law.spacing
-    exact = filled(lambda points: np.linalg.norm(points, axis=1) < radius, radius, spacing)
-    distance = radii(simulation)
-    level = np.linalg.norm(level_points(*exact, spacing, half=False), axis=1).mean()
-    longer = np.flatnonzero(rows[:, 1] > 1.05)
-    return found | {
-        "radius_error": float(distance.mean() / level - 1.0),
-        "roundness": float(distance.max() / distance.min()),
-        "pressure_error": core_pressure(simulation, radius) * radius / 2.0 - 1.0,
-        "volume_error": float(volumes(simulation.fields).sum() / (2.0 * scene.volume) - 1.0),
-        "round_after": float(rows[longer[-1], 0]) if len(longer) else 0.0,
-        "capillary_number": float(late(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
-    }
+if __name__ == "__main__":
+    write_tables(
+        __doc__.splitlines()[0],
+        {
+            "strength": strength,
+            "cost": cost,
+            "rest": partial(models, at_rest, SIZES),
+            "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
+            "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
+            "swing": partial(models, swing, SIZES),
+            "merging": partial(models, merging, SMALLER),
+        },
+        RESULTS,
+    )
+    kept = json.loads(RESULTS.read_text())
+    draw({scene: kept[scene] for scene in DRAWN if scene in kept})

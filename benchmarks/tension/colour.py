@@ -117,7 +117,9 @@ def _curvatures(lists, fields, law, normal, curvature):
             dx, dy, dz = fields.x[i] - fields.x[j], fields.y[i] - fields.y[j], fields.z[i] - fields.z[j]
             distance2 = dx * dx + dy * dy + dz * dz
             counts = normal[0, j] ** 2 + normal[1, j] ** 2 + normal[2, j] ** 2  # one, or none
-            weight = counts * slope(law.kernel, False, sqrt(distance2) / law.length) * fields.mass[j] / fields.density[j]
+            weight = (
+                counts * slope(law.kernel, False, sqrt(distance2) / law.length) * fields.mass[j] / fields.density[j]
+            )
             scale -= weight * distance2
             turn = (normal[0, j] - normal[0, i]) * dx + (normal[1, j] - normal[1, i]) * dy
             rise += weight * (turn + (normal[2, j] - normal[2, i]) * dz)

@@ -106,7 +106,9 @@ def _curvatures(lists, feet, at_surface, fields, found):
         if square * spacing * spacing < 1e-8:  # a particle by itself has no surface
             curvature[i] = 0.0
             continue
-        bend = gx * (xx * gx + xy * gy + xz * gz) + gy * (xy * gx + yy * gy + yz * gz) + gz * (xz * gx + yz * gy + zz * gz)
+        bend = (
+            gx * (xx * gx + xy * gy + xz * gz) + gy * (xy * gx + yy * gy + yz * gz) + gz * (xz * gx + yz * gy + zz * gz)
+        )
         size = sqrt(square)
         curvature[i] = -(xx + yy + zz - bend / square) / size
         step = min(max((0.5 - level) / size, -LONGEST * spacing), LONGEST * spacing) / size

@@ -20,7 +20,7 @@ FINE = 1.0 / 3.0
 
 
 def rays(half: bool) -> Floats:
-    """Return directions `(400, 3)` spread evenly over the sphere, or over the upper half of it, the first straight up."""
+    """Return directions `(400, 3)`, even over the sphere or over the upper half of it, the first straight up."""
     height = 1.0 - (np.arange(RAYS) / RAYS if half else 2.0 * np.arange(RAYS) / (RAYS - 1.0))
     turn, across = pi * (1.0 + sqrt(5.0)) * np.arange(RAYS), np.sqrt(np.maximum(1.0 - height**2, 0.0))
     return np.stack((across * np.cos(turn), across * np.sin(turn), height), axis=1)

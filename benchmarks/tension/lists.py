@@ -1,4 +1,4 @@
-"""What the models of surface tension share: lists of neighbours with a skin, and the surface that a simulation asks for."""
+"""What models of surface tension share: lists of neighbours, and the surface that a simulation asks for."""
 
 from dataclasses import dataclass, field
 

@@ -1,13 +1,16 @@
-"""Surface tension of forces between pairs of particles: f(r) = s cos(3 pi r / (2 L)) up to L (Tartakovsky & Meakin 2005).
+"""Surface tension of forces between pairs: f(r) = s cos(3 pi r / (2 L)) up to L (Tartakovsky & Meakin 2005).
 
-Particles repel each other within L / 3 and attract each other farther off, L being the support of the kernel. With n
-particles a volume a continuum of them has the tension gamma = -(pi / 8) n^2 times the integral of r^4 f and a pressure
-of (2 pi / 3) n^2 times that of r^3 f (Tartakovsky & Panchenko 2016, after Kirkwood & Buff 1949): the first gives the
-strength s, the second, which is negative, is taken off the reference density of the equation of state, so that the liquid
-rests with the density that it has. A calibrated strength is a factor of it.
+Particles repel each other within L / 3 and attract each other farther off; there are 27 in L^3. With n particles a
+volume a continuum of them has the tension gamma = -(pi / 8) n^2 times the integral of r^4 f, and a pressure of
+(2 pi / 3) n^2 times that of r^3 f (Tartakovsky & Panchenko 2016, after Kirkwood & Buff 1949): the first gives the
+strength s; the second, which is negative, is taken off the reference density of the equation of state, so that the
+liquid rests with the density that it has.
 
-A wall is a half space of as many particles, whose strength (1 + cos theta) / 2 of that among the liquid's is the balance
-of Young & Dupre of the works of adhesion and cohesion. Its force depends on height alone and is integrated once.
+That pressure p is balanced by one of the sums of SPH, whose forces between pairs have by the same integral a tension of
+their own, -p <r> / 4 with the mean distance <r> of the kernel, a third of gamma: hence a factor of s is calibrated. A
+wall is a half space of as many particles. Its images give the liquid its pressure whole there, so that the works of
+adhesion and cohesion (Young & Dupre) ask for the strength (1 + cos theta / factor) / 2 of that among the liquid's; the
+force depends on height alone and is integrated once.
 """
 
 from dataclasses import dataclass, field
