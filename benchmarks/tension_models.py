@@ -39,17 +39,23 @@ DRAWN = {
 }
 
 
-@cache
 def strength() -> float:
     """Strength of the forces between pairs at which a sphere has its pressure, over the theoretical one."""
     return 1.0 / (1.0 + at_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
+
+
+@cache
+def calibrated() -> float:
+    """Strength as it was found last."""
+    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    return kept.get("strength") or strength()
 
 
 def models(scene, sizes: tuple[int, ...]) -> dict:
     """The scene with each model and size."""
     found = {}
     for model in MODELS:
-        found[model] = {str(size): scene(model, size, strength() if model == "pairwise" else 1.0) for size in sizes}
+        found[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
         for size, row in found[model].items():
             told = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
             print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in told.items()), flush=True)
@@ -62,7 +68,7 @@ def cost() -> dict:
     def step_of(simulation):
         return batch(lambda: simulation.step(simulation.time_step()), 0.5)
 
-    drops = {model: start(unit_drop(SPHERE, 0.2), model, strength()) for model in MODELS}
+    drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
     seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
     tracked = seconds["tracked surface"]
     found = {
@@ -99,10 +105,10 @@ if __name__ == "__main__":
             "strength": strength,
             "cost": cost,
             "rest": partial(models, at_rest, SIZES),
-            "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
-            "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
             "swing": partial(models, swing, SIZES),
             "merging": partial(models, merging, SMALLER),
+            "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
+            "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
         },
         RESULTS,
     )

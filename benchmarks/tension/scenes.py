@@ -10,6 +10,7 @@ from time import process_time
 
 import numpy as np
 from scipy.optimize import curve_fit
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -32,7 +33,7 @@ UNIT = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0
 # Lengths of a stretched drop over those of the sphere; speeds of two drops that meet.
 STRETCH, APPROACH = 1.05, 0.3
 # Share of the particles that may have left the liquid; with more it is torn apart. How often that is looked at.
-LOST, LOOKS = 0.02, 100
+LOST, LOOKS = 0.02, 40
 # How much longer than wide a drop is that is nearly round.
 ROUND = 1.05
 
@@ -67,16 +68,18 @@ def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
 def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
     """Run to a time; what was sampled every step, the cost, and when and whether the liquid came apart."""
     simulation.step(1e-9)  # compiled
-    rows, begin, looked, torn = [], process_time(), 0, {}
+    rows, seconds, looked, torn = [], 0.0, 0, {}
     try:
         while simulation.time < until and not torn:
+            begin = process_time()
             simulation.step(simulation.time_step())
+            seconds += process_time() - begin
             rows.append(sample(simulation))
             if simulation.time > looked * until / LOOKS:
                 looked, torn = looked + 1, came_apart(simulation)
     except (SurfaceLost, FloatingPointError) as error:
         torn = {"torn_apart_at": simulation.time, "why": str(error)}
-    seconds, count = process_time() - begin, simulation.fluids
+    count = simulation.fluids
     found = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
     return found | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
 
@@ -84,8 +87,9 @@ def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], 
 def stray(simulation: Simulation) -> int:
     """Particles that no longer touch the largest part of the liquid."""
     points = np.stack(simulation.fields[:3], axis=1)
-    near = cKDTree(points).sparse_distance_matrix(cKDTree(points), SUPPORT * simulation.law.length)
-    return len(points) - int(np.bincount(connected_components(near, directed=False)[1]).max())
+    pairs = cKDTree(points).query_pairs(SUPPORT * simulation.law.length, output_type="ndarray")
+    touch = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
+    return len(points) - int(np.bincount(connected_components(touch, directed=False)[1]).max())
 
 
 def came_apart(simulation: Simulation) -> dict:
@@ -132,7 +136,7 @@ def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> di
         return one.time, core_pressure(one, 0.5) if one.steps % 10 == 0 else np.nan, one.fastest
 
     simulation = start(scene, model, strength)
-    found = follow(simulation, 3.0, sample)
+    found = follow(simulation, 2.0, sample)
     rows = found.pop("rows")
     if "torn_apart_at" in found:
         return found
@@ -152,7 +156,7 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
         return {"why": "the model has no contact angle; beside a mirror its angle is 90 degrees"}
     scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
     simulation = start(scene, model, strength)
-    found = follow(simulation, 3.0, lambda one: (one.time, one.fastest))
+    found = follow(simulation, 2.5, lambda one: (one.time, one.fastest))
     rows = found.pop("rows")
     if "torn_apart_at" in found:
         return found
@@ -244,7 +248,7 @@ def merging(model: str, across: int, strength: float) -> dict:
         x, y, z = (axis - axis.mean() for axis in one.fields[:3])
         return one.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), one.fastest
 
-    found = follow(simulation, 4.0, sample)
+    found = follow(simulation, 3.0, sample)
     rows = found.pop("rows")
     if "torn_apart_at" in found:
         return found
