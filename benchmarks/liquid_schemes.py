@@ -20,7 +20,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 
 from benchmarks.support.tables import write_tables
-from benchmarks.tension.scenes import pair
+from benchmarks.tension.scenes import TRACKED, pair
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import PROPERTIES, Drop, Drops, Fluid
@@ -86,7 +86,7 @@ def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
 def merging_by_sph(ohnesorge: float, across: int) -> dict:
     """Two balls by delta-SPH that are so near that they merge at once."""
     scene = ink(ohnesorge, across)
-    simulation = pair(scene, "tracked surface", 1.0, gap=0.9, speed=0.0)
+    simulation = pair(scene, TRACKED, 1.0, gap=0.9, speed=0.0)
     simulation.step(1e-9 * UNIT)  # compiled
     begin, rows = process_time(), []
     while simulation.time < FOLLOWED * UNIT:

@@ -23,7 +23,7 @@ from matplotlib import pyplot as plt
 
 from benchmarks.support.tables import write_tables
 from benchmarks.support.turns import batch, in_turns
-from benchmarks.tension.scenes import MODELS, at_rest, cap_at_rest, merging, start, swing, unit_drop
+from benchmarks.tension.scenes import MODELS, TRACKED, at_rest, cap_at_rest, merging, start, swing, unit_drop
 
 mpl.use("Agg")
 RESULTS = Path(__file__).parent / "results" / "tension_models.json"
@@ -70,7 +70,7 @@ def cost() -> dict:
 
     drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
     seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
-    tracked = seconds["tracked surface"]
+    tracked = seconds[TRACKED]
     found = {
         model: {
             "us_per_particle_step": 1e6 * float(np.median(seconds[model])) / drops[model].fluids,

@@ -108,7 +108,7 @@ def _virials_of_pressure(lists, fields, law, found):
 
 @njit(cache=True, error_model="numpy")
 def _cosine(square):
-    """The cosine of the root of a square up to (3 pi / 2)^2, to 1e-6: a series, which loops have several of at a time."""
+    """Cosine of the root of a square up to (3 pi / 2)^2, to 1e-6: a series, so that pairs are computed side by side."""
     total = 1.0
     for k in range(11, 0, -1):
         total = 1.0 - square * total / ((2 * k) * (2 * k - 1))

@@ -28,7 +28,8 @@ from reflowshock.particles.sph.liquid_surface import EDGE, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT
 
-MODELS = ("colour function", "pairwise", "free-surface pressure", "tracked surface")
+TRACKED = "tracked surface"
+MODELS = ("colour function", "pairwise", "free-surface pressure", TRACKED)
 UNIT = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0, "gravity": 0.0}
 # Lengths of a stretched drop over those of the sphere; speeds of two drops that meet.
 STRETCH, APPROACH = 1.05, 0.3
@@ -41,15 +42,19 @@ ROUND = 1.05
 def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
     """Set up the drop of a scene, at the pressure of a sphere, with one of the models."""
     tracked = droplet(scene)
-    if model == "tracked surface":
+    if model == TRACKED:
         return tracked
-    law, fields = tracked.law._replace(tracked=0, shifting=0.0), tracked.fields
-    return untracked(law, np.array(fields[:3]), scene, model, strength)
+    law = tracked.law._replace(tracked=0, shifting=0.0)
+    return untracked(law, fields_at(scene, law, np.array(tracked.fields[:3])), scene, model, strength)
 
 
-def untracked(law: Law, points: Floats, scene: Droplet, model: str, strength: float) -> Simulation:
-    """The same particles `(3, n)` without a tracked surface."""
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
+def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
+    """Particles at rest at points `(3, n)` [m], at the pressure of a sphere."""
+    return flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
+
+
+def untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
+    """Particles without a tracked surface."""
     given = (law, scene.surface_tension, cos(scene.angle))
     if model == "pairwise":
         surface = Pairwise(*given, factor=strength)
@@ -57,7 +62,7 @@ def untracked(law: Law, points: Floats, scene: Droplet, model: str, strength: fl
         law = law._replace(rest_density=rest)
     else:
         surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*given)
-    return Simulation(fields, points.shape[1], law, surface)
+    return Simulation(fields, len(fields.x), law, surface)
 
 
 def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
@@ -223,20 +228,21 @@ def swing(model: str, across: int, strength: float) -> dict:
 
 def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
     """Two drops beside each other along x, a gap [spacings] between them, that fly at each other at a speed [m/s]."""
-    one = start(scene, "tracked surface")
+    one = droplet(scene)
     aside = np.array([0.5 * scene.diameter + 0.5 * gap * one.law.spacing, 0.0, 0.0])
-    points = np.array(one.fields[:3])
+    points, surface = np.array(one.fields[:3]), one.surface
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    if model == "tracked surface":
-        fields, surface = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law), one.surface
-        corners, triangles = surface.points.copy(), surface.triangles.copy()
-        surface.points = corners - aside
-        surface.add(corners + aside, triangles)
-        simulation = Simulation(fields, both.shape[1], one.law, surface)
-    else:
-        simulation = untracked(one.law._replace(tracked=0, shifting=0.0), both, scene, model, strength)
-    simulation.fields.u[:] = speed * np.sign(-both[0])
-    return simulation
+    if model != TRACKED:
+        law = one.law._replace(tracked=0, shifting=0.0)
+        fields = fields_at(scene, law, both)
+        fields.u[:] = -speed * np.sign(both[0])
+        return untracked(law, fields, scene, model, strength)
+    corners, triangles = surface.points.copy(), surface.triangles.copy()
+    surface.points = corners - aside
+    surface.add(corners + aside, triangles)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+    fields.u[:] = -speed * np.sign(both[0])
+    return Simulation(fields, both.shape[1], one.law, surface)
 
 
 def merging(model: str, across: int, strength: float) -> dict:
