@@ -50,7 +50,7 @@ def _smooth(lists, fields, law, colour, layer):
     offsets, indices = lists
     for i in prange(colour.shape[0]):
         total = gx = gy = gz = 0.0
-        for image in range(1 + law.mirror):
+        for image in range(1 + (law.mirror if fields.z[i] < SUPPORT * law.length else 0)):
             for k in range(offsets[i], offsets[i + 1]):
                 j = indices[k]
                 dx, dy = fields.x[i] - fields.x[j], fields.y[i] - fields.y[j]
@@ -69,7 +69,7 @@ def _gradients(lists, fields, law, found, gradient):
     (offsets, indices), (colour, layer) = lists, found
     for i in prange(colour.shape[0]):
         bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
-        for image in range(1 + law.mirror):
+        for image in range(1 + (law.mirror if fields.z[i] < SUPPORT * law.length else 0)):
             for k in range(offsets[i], offsets[i + 1]):
                 j = indices[k]
                 dx, dy = fields.x[i] - fields.x[j], fields.y[i] - fields.y[j]

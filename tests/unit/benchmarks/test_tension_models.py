@@ -93,7 +93,7 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     fields = flow.liquid_and_walls(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
     fields.mass[:] = volume
     radius = np.linalg.norm(level_points(points, volume, law.spacing, half=False), axis=1)
-    assert radius.max() / radius.min() < 1.003
+    assert radius.max() / radius.min() < 1.01  # its stairs are a third of a spacing high
     assert 0.5 - law.spacing**2 / 0.5 < radius.mean() < 0.5
     row = np.arange(len(points))
     level, *found = level_at((radius.mean(), 0.0, 0.0), row, fields, 4.0 * law.spacing)
