@@ -35,11 +35,15 @@ from reflowshock.particles.surface.profile import section_areas
 RESULTS = Path(__file__).parent / "results" / "liquid_schemes.json"
 VOLUME = 1e-9
 RADIUS = float(np.cbrt(0.75 * VOLUME / pi))
+# Radius of the sphere of both [m].
+MERGED = RADIUS * 2.0 ** (1.0 / 3.0)
 PAPER = PROPERTIES["paper"]
 OHNESORGE = (0.0305, 0.2)
 # Particles across a diameter, in a radius; how long drops are followed; part of the neck's growth, in radii.
-ACROSS, IN_RADIUS = (10,), (4,)
+ACROSS, IN_RADIUS = (10, 14), (4, 6)
 FOLLOWED, GROWTH = 4.0, (0.65, 0.8)
+# Of the swing of both as one drop, in the unit of time of one of them.
+PERIOD = 2.0 * pi / 32.0**0.5
 ANGLES = (60.0, 120.0)
 UNIT = float(np.sqrt(PAPER["density"] * (2.0 * RADIUS) ** 3 / PAPER["surface_tension"]))
 
@@ -68,15 +72,23 @@ def neck(points: np.ndarray, triangles: np.ndarray) -> float:
     return float(np.sqrt(section_areas(points[:, [1, 2, 0]], triangles, heights).min() / pi)) / RADIUS
 
 
+def state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:
+    """Time [sqrt(rho D^3 / gamma)], the neck over R until it has grown, the length over the sphere's of both."""
+    length = float(np.ptp(points[:, 0])) / (2.0 * MERGED)
+    return time / UNIT, np.inf if grown else neck(points, triangles), length
+
+
 def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
-    """What is kept of drops that merged: growth of the neck, radius and roundness of what they became."""
-    time, width = np.array(rows).T
+    """What is kept of drops that merged: growth of the neck, the last swing, radii of what they became."""
+    time, width, length = np.array(rows).T
     low, high = (int(np.argmax(width > share)) for share in GROWTH)
     slope = np.polyfit(time[low:high], width[low:high] ** 2, 1)[0] if high > low + 1 else float("nan")
-    distance = np.linalg.norm(points - points.mean(axis=0), axis=1) / (RADIUS * 2.0 ** (1.0 / 3.0))
+    swings = time > time[-1] - PERIOD
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1) / MERGED
     return {
         "growth": float(np.sqrt(slope)) / 8.0**0.25,  # times are in sqrt(rho D^3 / gamma), not of R
-        "neck_over_drop_radius_after": float(time[high]),
+        "neck_grown_after": float(time[high]),
+        "last_swing": float(np.abs(length[swings] - 1.0).max()),
         "radius_error": float(distance.mean() - 1.0),
         "largest_radius_error": float(np.abs(distance - 1.0).max()),
         "seconds": seconds,
@@ -91,9 +103,8 @@ def merging_by_sph(ohnesorge: float, across: int) -> dict:
     begin, rows = process_time(), []
     while simulation.time < FOLLOWED * UNIT:
         simulation.step(simulation.time_step())
-        surface = simulation.surface
-        if not rows or rows[-1][1] < 1.0:
-            rows.append((simulation.time / UNIT, neck(surface.points, surface.triangles)))
+        surface, grown = simulation.surface, bool(rows) and rows[-1][1] > 1.0
+        rows.append(state(simulation.time, surface.points, surface.triangles, grown))
     found = merged(rows, surface.points, process_time() - begin)
     volume = surface.volume / (2.0 * VOLUME) - 1.0
     return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | found
@@ -115,8 +126,8 @@ def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
     while one.time < FOLLOWED * UNIT:
         one.step()
         steps += 1
-        if not rows or rows[-1][1] < 1.0:
-            rows.append((one.time / UNIT, neck(one.body.points, one.body.triangles)))
+        grown, count = bool(rows) and rows[-1][1] > 1.0, one.body.cloud.surface_count
+        rows.append(state(one.time, one.body.points[:count], one.body.triangles, grown))
     surface = one.body.points[: one.body.cloud.surface_count]
     found = merged(rows, surface, process_time() - begin)
     volume = one.body.volume()[0] / (2.0 * VOLUME) - 1.0

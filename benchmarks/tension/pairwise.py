@@ -7,8 +7,8 @@ strength s; the second, which is negative, is taken off the reference density of
 liquid rests with the density that it has.
 
 That pressure p is balanced by one of the sums of SPH, whose forces between pairs have by the same integral a tension of
-their own, -p <r> / 4 with the mean distance <r> of the kernel, a third of gamma: hence a factor of s is calibrated. A
-wall is a half space of as many particles. Its images give the liquid its pressure whole there, so that the works of
+their own, -p <r> / 4 with the mean distance <r> of the kernel, in the limit of many neighbours: hence a factor of s is
+calibrated. A wall is a half space of as many particles. Its images give the liquid its pressure whole, so that works of
 adhesion and cohesion (Young & Dupre) ask for the strength (1 + cos theta / factor) / 2 of that among the liquid's; the
 force depends on height alone and is integrated once.
 """
