@@ -30,6 +30,8 @@ mpl.use("Agg")
 RESULTS = Path(__file__).parent / "results" / "tension_models.json"
 # Particles a diameter; of the sphere on which the forces between pairs are calibrated, and whose cost is measured.
 SIZES, SMALLER, SPHERE = (10, 14), (8, 10), 14
+# Marks of core-seconds.
+TICKS = (2, 5, 10, 20)
 # What is drawn for each scene: its name, the exact value, a title.
 DRAWN = {
     "rest": ("pressure_error", 0.0, "pressure at rest"),
@@ -94,9 +96,12 @@ def draw(found: dict) -> None:
             panel.loglog([row["seconds"] for row in rows], errors, f"{marker}-", label=model)
         panel.set(title=title, xlabel="core-seconds")
         panel.grid(alpha=0.3)
+        panel.set_xticks(TICKS, TICKS)
         panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("error (%)")
-    panels[0].legend(fontsize=7)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
     figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
 
 
