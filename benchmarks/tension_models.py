@@ -7,7 +7,7 @@ A colour function with corrected normals, forces between pairs, a pressure on th
 program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; parameters are
 those published. The strength of the forces between pairs is calibrated on the pressure of a sphere, as their authors
 do (`strength`: over the theoretical one). Shapes are those of one level of a smoothed colour for all models. `cost`
-takes turns between the models; seconds of the runs are those of one core. A quarter of an hour.
+takes turns between the models; seconds of the runs are those of one core. Ten minutes.
 """
 
 import json
