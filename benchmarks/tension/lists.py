@@ -48,6 +48,7 @@ class Untracked:
         tension: gamma [N/m].
         cosine: of the contact angle.
         pressure: that of a tracked surface [Pa]: there is none.
+        needs_volume: whether a step asks for the volume that a tracked surface encloses.
         lists: neighbours within the support of the kernel.
     """
 
@@ -55,6 +56,7 @@ class Untracked:
     tension: float
     cosine: float = 0.0
     pressure: float = 0.0
+    needs_volume: bool = False
     lists: Lists = field(init=False)
 
     def __post_init__(self) -> None:
