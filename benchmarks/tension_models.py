@@ -1,0 +1,123 @@
+"""Four models of surface tension in one delta-SPH: error against cost at rest, on a wall, swinging, merging.
+
+    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py         (all; results/tension_models.json and .png)
+    PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py swing   (one of them)
+
+A colour function with corrected normals, forces between pairs, a pressure on the free surface (`tension/`), and the
+program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; parameters are
+those published. The strength of the forces between pairs is calibrated on the pressure of a sphere, as their authors
+do (`strength`: over the theoretical one). Shapes are those of one level of a smoothed colour for all models. `cost`
+takes turns between the models; seconds of the runs are those of one core. Ten minutes.
+"""
+
+import json
+import os
+from functools import cache, partial
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.ticker import NullFormatter
+
+from benchmarks.support.tables import write_tables
+from benchmarks.support.turns import batch, in_turns
+from benchmarks.tension.scenes import MODELS, TRACKED, at_rest, cap_at_rest, merging, start, swing, unit_drop
+
+mpl.use("Agg")
+RESULTS = Path(__file__).parent / "results" / "tension_models.json"
+# Particles a diameter; of the sphere on which the forces between pairs are calibrated, and whose cost is measured.
+SIZES, SMALLER, SPHERE = (10, 14), (8, 10), 14
+# Marks of core-seconds.
+TICKS = (2, 5, 10, 20)
+# What is drawn for each scene: its name, the exact value, a title.
+DRAWN = {
+    "rest": ("pressure_error", 0.0, "pressure at rest"),
+    "cap_60": ("height_error", 0.0, "height of the cap, 60 degrees"),
+    "cap_120": ("height_error", 0.0, "height of the cap, 120 degrees"),
+    "swing": ("period_error", 0.0, "period of a swing"),
+    "merging": ("roundness", 1.0, "roundness after merging"),
+}
+
+
+def strength() -> float:
+    """Strength of the forces between pairs at which a sphere has its pressure, over the theoretical one."""
+    return 1.0 / (1.0 + at_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
+
+
+@cache
+def calibrated() -> float:
+    """Strength as it was found last."""
+    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    return kept.get("strength") or strength()
+
+
+def models(scene, sizes: tuple[int, ...]) -> dict:
+    """The scene with each model and size."""
+    found = {}
+    for model in MODELS:
+        found[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
+        for size, row in found[model].items():
+            told = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in told.items()), flush=True)
+    return found
+
+
+def cost() -> dict:
+    """Microseconds of a particle-step of a drop at rest with each model, in turns, and over the tracked one."""
+
+    def step_of(simulation):
+        return batch(lambda: simulation.step(simulation.time_step()), 0.5)
+
+    drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
+    seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
+    tracked = seconds[TRACKED]
+    found = {
+        model: {
+            "us_per_particle_step": 1e6 * float(np.median(seconds[model])) / drops[model].fluids,
+            "over_tracked": float(np.median(seconds[model] / tracked)),
+        }
+        for model in MODELS
+    }  # fmt: skip
+    print(json.dumps(found, indent=1))
+    return found
+
+
+def draw(found: dict) -> None:
+    """Draw errors against core-seconds, a panel a scene; what was torn apart or cannot be computed has no point."""
+    figure, panels = plt.subplots(1, len(found), figsize=(3.4 * len(found), 3.2), layout="constrained")
+    for panel, (scene, sides) in zip(np.atleast_1d(panels), found.items(), strict=True):
+        name, exact, title = DRAWN[scene]
+        for model, marker in zip(MODELS, "so^D", strict=True):
+            rows = [row for row in sides[model].values() if name in row]
+            errors = [100.0 * abs(row[name] - exact) for row in rows]
+            panel.loglog([row["seconds"] for row in rows], errors, f"{marker}-", label=model)
+        panel.set(title=title, xlabel="core-seconds")
+        panel.grid(alpha=0.3)
+        panel.set_xticks(TICKS, TICKS)
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_ylabel("error (%)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
+    figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
+
+
+if __name__ == "__main__":
+    write_tables(
+        __doc__.splitlines()[0],
+        {
+            "strength": strength,
+            "cost": cost,
+            "rest": partial(models, at_rest, SIZES),
+            "swing": partial(models, swing, SIZES),
+            "merging": partial(models, merging, SMALLER),
+            "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
+            "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
+        },
+        RESULTS,
+    )
+    kept = json.loads(RESULTS.read_text())
+    draw({scene: kept[scene] for scene in DRAWN if scene in kept})
