@@ -35,15 +35,17 @@ from reflowshock.particles.core.surface_measure import area_gradient, surface_ar
 from reflowshock.particles.sph import grounds, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.surface_care import EDGE, TOUCH, changes, evened_out, is_worn, on_wall
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, between, boundary_loops, mirrored
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
-from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
-# In spacings of the particles: edges of triangles, the skin of the lists.
-EDGE, SKIN = 1.2, 0.5
-# The same: triangles lower than this above the wall are on it; no air is followed that would have to leave.
-TOUCH = 0.3
+# In spacings of the particles: the skin of the lists.
+SKIN = 0.5
+# The same: how far beyond its particles the surface is at least and at most, its radius about one that it has to follow,
+# and how far outside a vertex one is still its own, not one of other liquid before it.
+COVER, CREST, OWN = (0.05, 2.0), 1.5, 0.75
 # The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
 # tried where contact lines would meet in a point.
 MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
@@ -51,8 +53,8 @@ MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
 FOOT, THIN = 2.0, 3.0
 # Steps after which triangles are evened out.
 CARE = 10
-# Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
-AREAS, LOWEST_QUALITY = (0.5, 2.0), 0.1
+# Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
+LOST_FILM = 0.03
 WALL = Plate.horizontal(0.0)
 
 
@@ -191,6 +193,7 @@ class LiquidSurface:
             SurfaceLost: there are no particles beside a vertex.
         """
         self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
+        self._cover(fields)
         weights, offsets = np.empty((2, len(self._lists[1]))), self._lists[0]
         surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
         level = np.add.reduceat(np.append(weights[0], 0.0), offsets[:-1])
@@ -208,6 +211,18 @@ class LiquidSurface:
         fluids = rates.shape[1]
         rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
         rates[7:10] += crowd[:, :fluids]
+
+    def _cover(self, fields: Fields) -> None:
+        """Move vertices that particles are about to pass, or have left behind: liquid and surface stay together.
+
+        Vertices move with means of velocities over the kernel; at the rim of a film particles are faster, or slower.
+        """
+        outward, spacing = self._outward(), self.law.spacing
+        normals = outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+        cover = COVER[0] * spacing, COVER[1] * spacing, 0.5 / (CREST * spacing), OWN * spacing
+        strays = np.empty(len(self.points))
+        surface_loops.find_strays(self.points, normals, self._lists, fields, cover, strays)
+        self.points += strays[:, None] * normals
 
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
@@ -273,12 +288,12 @@ class LiquidSurface:
         if self.law.mirror:
             self._wet()
         if self.moves % CARE == 0:
-            self._even_out()
+            self._care()
             if self._meets():
                 self._make_anew(CLOSED)
             elif self._leaves(velocity):
                 self._make_anew((-THIN,))
-            elif self._is_worn():
+            elif is_worn(self.points, self.triangles, self.law.spacing):
                 self._make_anew()
             self.enclose(volume)
         self._find_wetness()
@@ -300,7 +315,7 @@ class LiquidSurface:
         for ring in self.rings:
             self.points[ring, 2] = 0.0
         np.maximum(self.points[:, 2], 0.0, out=self.points[:, 2])
-        flat = np.flatnonzero((self.points[self.triangles, 2] <= TOUCH * self.law.spacing).all(axis=1))
+        flat = np.flatnonzero(on_wall(self.points, self.triangles, self.law.spacing))
         if len(flat) and not self._take(self.points, np.delete(self.triangles, flat, axis=0)):
             for triangle in flat[::-1]:
                 self._take(self.points, np.delete(self.triangles, triangle, axis=0))
@@ -321,15 +336,17 @@ class LiquidSurface:
         self._find_wetness()
         return True
 
-    def _even_out(self) -> None:
+    def _care(self) -> None:
+        """Split and collapse edges, and even out triangles."""
         try:
+            for change in changes(self.law.spacing):
+                new = change(self.points, self.triangles, self.rings + self._lines_on_ground())
+                if len(new.triangles) != len(self.triangles):
+                    self._take(0.5 * (self.points[new.first] + self.points[new.second]), new.triangles)
             lines = self.rings + self._lines_on_ground()
         except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
             return
-        self.points += smoothing_offsets(self.points, self.triangles, len(self.points), lines)
-        for ring in self.rings:
-            self.points[ring, 2] = 0.0
-        self.triangles, _ = flip_to_delaunay(self.points, self.triangles, lines)
+        self.points, self.triangles = evened_out(self.points, self.triangles, self.rings, lines)
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -341,24 +358,13 @@ class LiquidSurface:
             return ()
         return boundary_loops(self.triangles[self._wet_shares() > 0.5])
 
-    def _is_worn(self) -> bool:
-        """Whether triangles are too small, too large or slivers."""
-        corner = self.points[self.triangles]
-        square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
-        area = triangle_areas(self.points, self.triangles)
-        even = np.sqrt(3.0) / 4.0 * (EDGE * self.law.spacing) ** 2
-        low, high = AREAS
-        return not low * even < area.mean() < high * even or bool(
-            (4.0 * np.sqrt(3.0) * area / square).min() < LOWEST_QUALITY
-        )
-
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
         spacing, normals = self.law.spacing, vertex_normals(self.points, self.triangles, len(self.points))
         for ring in self.rings:  # where it meets its image
             normals[ring, 2] = 0.0
-            normals[ring] /= np.linalg.norm(normals[ring], axis=1)[:, None]
-        return narrowest_gap(self.points, normals, MEETING * spacing, spacing) < MEETING * spacing
+            normals[ring] /= np.maximum(np.linalg.norm(normals[ring], axis=1), 1e-300)[:, None]
+        return narrowest_gap(self.points, self.triangles, normals, MEETING * spacing, spacing) < MEETING * spacing
 
     def _leaves(self, velocity: Floats) -> bool:
         """Whether liquid moves away from the wall on a foot that is too thin for its particles."""
@@ -379,6 +385,9 @@ class LiquidSurface:
             try:
                 rings = boundary_loops(triangles)
             except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
+                continue
+            wet = sum(area_within(points[ring]) for ring in rings)
+            if gap >= 0.0 and wet < (1.0 - LOST_FILM) * self.wetted_area:
                 continue
             self._take(*relax(level, points, triangles, rings))
             after = parts_of(self.triangles)
