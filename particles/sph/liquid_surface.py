@@ -34,7 +34,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import grounds, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.smoothing import SUPPORT, shape
 from reflowshock.particles.sph.surface_care import EDGE, TOUCH, changes, evened_out, is_worn, on_wall
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, between, boundary_loops, mirrored
@@ -211,6 +211,23 @@ class LiquidSurface:
         fluids = rates.shape[1]
         rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
         rates[7:10] += crowd[:, :fluids]
+        if self.law.mirror and self.law.no_slip:
+            self._hold_films(rates, fields, weights[0])
+
+    def _hold_films(self, rates, fields, weights):
+        fluids, law = rates.shape[1], self.law
+        found = np.zeros((2, len(fields.x)))
+        surface_loops.find_heights(self.points, self._lists, weights, found)
+        z = fields.z[:fluids]
+        next_to_wall = (z < 0.75 * law.spacing) & (found[1, :fluids] > 0)
+        z = z[next_to_wall]
+        height = np.maximum(found[0, :fluids][next_to_wall] / found[1, :fluids][next_to_wall], z + COVER[0] * law.spacing)
+        nu = law.viscosity / law.rest_density
+        w = law.norm * np.array([shape(law.kernel, False, q) for q in 2.0 * z / law.length])
+        drag = np.clip(3.0 * nu / height**2 - 8.0 * np.pi * nu * height * w, 0.0, 2.0 * law.sound / law.length)
+        if self.moves % 200 == 0 and len(z): print('films', self.moves, (drag > 0).sum(), (height/law.spacing).min(), np.median(height)/law.spacing)
+        for axis in range(2):
+            rates[1 + axis, next_to_wall] -= drag * fields[3 + axis][:fluids][next_to_wall]
 
     def _cover(self, fields: Fields) -> None:
         """Move vertices that particles are about to pass, or have left behind: liquid and surface stay together.

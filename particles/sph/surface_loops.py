@@ -79,3 +79,13 @@ def find_strays(points, normals, lists, fields, cover, strays):
             if along < before:
                 top = max(top, along - bend * aside2)
         strays[v] = max(top + least, min(top + most, 0.0)) if top > -inf else 0.0
+
+
+@njit(cache=True)
+def find_heights(points, lists, weights, found):
+    offsets, indices = lists
+    for v in range(points.shape[0]):
+        for k in range(offsets[v], offsets[v + 1]):
+            j = indices[k]
+            found[0, j] += weights[k] * points[v, 2]
+            found[1, j] += weights[k]
