@@ -30,22 +30,18 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside, have_moved
-from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
-from reflowshock.particles.sph import grounds, surface_loops
+from reflowshock.particles.sph import grounds, surface_care, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.smoothing import SUPPORT, shape
-from reflowshock.particles.sph.surface_care import EDGE, TOUCH, changes, evened_out, is_worn, on_wall
+from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.thin_films import hold_films
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, between, boundary_loops, mirrored
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops, mirrored
+from reflowshock.particles.surface.level_set import Grid, LevelSet, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 # In spacings of the particles: the skin of the lists.
 SKIN = 0.5
-# The same: how far beyond its particles the surface is at least and at most, its radius about one that it has to follow,
-# and how far outside a vertex one is still its own, not one of other liquid before it.
-COVER, CREST, OWN = (0.05, 2.0), 1.5, 0.75
 # The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
 # tried where contact lines would meet in a point.
 MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
@@ -55,7 +51,6 @@ FOOT, THIN = 2.0, 3.0
 CARE = 10
 # Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
 LOST_FILM = 0.03
-WALL = Plate.horizontal(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +153,7 @@ class LiquidSurface:
         if self.ground is None or not len(self.points):
             return
         normals = vertex_normals(self.points, self.triangles, len(self.points))
-        self.wetness = grounds.settle(self.ground, self.points, normals, TOUCH * self.law.spacing)
+        self.wetness = grounds.settle(self.ground, self.points, normals, surface_care.TOUCH * self.law.spacing)
 
     def add(self, points: Floats, triangles: Indices) -> None:
         """Add the surface of more liquid, apart from this one: `(k, 3)` [m], `(t, 3)`."""
@@ -204,6 +199,8 @@ class LiquidSurface:
         surface_loops.share_out(self._lists, self._shares, self.forces(), pushes)
         outward = self._outward()
         surface_loops.share_out(self._lists, weights, outward, crowd)
+        if self.law.mirror and self.law.no_slip:
+            hold_films((self.points, self._lists, weights), fields, self.law, rates)
         if self.ground is not None:
             images, outward = grounds.reflected(self.ground, self.points, outward, SUPPORT * self.law.length)
             surface_loops.find_weights(images, self._lists, fields, self.law, weights)
@@ -211,35 +208,15 @@ class LiquidSurface:
         fluids = rates.shape[1]
         rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
         rates[7:10] += crowd[:, :fluids]
-        if self.law.mirror and self.law.no_slip:
-            self._hold_films(rates, fields, weights[0])
-
-    def _hold_films(self, rates, fields, weights):
-        fluids, law = rates.shape[1], self.law
-        found = np.zeros((2, len(fields.x)))
-        surface_loops.find_heights(self.points, self._lists, weights, found)
-        z = fields.z[:fluids]
-        next_to_wall = (z < 0.75 * law.spacing) & (found[1, :fluids] > 0)
-        z = z[next_to_wall]
-        height = np.maximum(found[0, :fluids][next_to_wall] / found[1, :fluids][next_to_wall], z + COVER[0] * law.spacing)
-        nu = law.viscosity / law.rest_density
-        w = law.norm * np.array([shape(law.kernel, False, q) for q in 2.0 * z / law.length])
-        drag = np.clip(3.0 * nu / height**2 - 8.0 * np.pi * nu * height * w, 0.0, 2.0 * law.sound / law.length)
-        if self.moves % 200 == 0 and len(z): print('films', self.moves, (drag > 0).sum(), (height/law.spacing).min(), np.median(height)/law.spacing)
-        for axis in range(2):
-            rates[1 + axis, next_to_wall] -= drag * fields[3 + axis][:fluids][next_to_wall]
 
     def _cover(self, fields: Fields) -> None:
         """Move vertices that particles are about to pass, or have left behind: liquid and surface stay together.
 
         Vertices move with means of velocities over the kernel; at the rim of a film particles are faster, or slower.
         """
-        outward, spacing = self._outward(), self.law.spacing
-        normals = outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
-        cover = COVER[0] * spacing, COVER[1] * spacing, 0.5 / (CREST * spacing), OWN * spacing
-        strays = np.empty(len(self.points))
-        surface_loops.find_strays(self.points, normals, self._lists, fields, cover, strays)
-        self.points += strays[:, None] * normals
+        normals = self._normals()
+        offset = surface_care.strays((self.points, normals), self._lists, fields, self.law.spacing)
+        self.points += offset[:, None] * normals
 
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
@@ -247,6 +224,11 @@ class LiquidSurface:
         for ring in self.rings:
             area[ring, 2] = 0.0
         return area if self.ground is None else grounds.along(area, *self.wetness)
+
+    def _normals(self) -> Floats:
+        """Outward unit normals `(m, 3)`, of contact lines along the wall; zero where there is none."""
+        outward = self._outward()
+        return outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
 
     def forces(self) -> Floats:
         """Forces -d(E - p V)/dx on the vertices `(m, 3)` [N], with the pressure that leaves none on the whole surface.
@@ -310,7 +292,7 @@ class LiquidSurface:
                 self._make_anew(CLOSED)
             elif self._leaves(velocity):
                 self._make_anew((-THIN,))
-            elif is_worn(self.points, self.triangles, self.law.spacing):
+            elif surface_care.is_worn(self.points, self.triangles, self.law.spacing):
                 self._make_anew()
             self.enclose(volume)
         self._find_wetness()
@@ -332,7 +314,7 @@ class LiquidSurface:
         for ring in self.rings:
             self.points[ring, 2] = 0.0
         np.maximum(self.points[:, 2], 0.0, out=self.points[:, 2])
-        flat = np.flatnonzero(on_wall(self.points, self.triangles, self.law.spacing))
+        flat = np.flatnonzero(surface_care.on_wall(self.points, self.triangles, self.law.spacing))
         if len(flat) and not self._take(self.points, np.delete(self.triangles, flat, axis=0)):
             for triangle in flat[::-1]:
                 self._take(self.points, np.delete(self.triangles, triangle, axis=0))
@@ -356,14 +338,14 @@ class LiquidSurface:
     def _care(self) -> None:
         """Split and collapse edges, and even out triangles."""
         try:
-            for change in changes(self.law.spacing):
+            for change in surface_care.changes(self.law.spacing):
                 new = change(self.points, self.triangles, self.rings + self._lines_on_ground())
                 if len(new.triangles) != len(self.triangles):
                     self._take(0.5 * (self.points[new.first] + self.points[new.second]), new.triangles)
             lines = self.rings + self._lines_on_ground()
         except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
             return
-        self.points, self.triangles = evened_out(self.points, self.triangles, self.rings, lines)
+        self.points, self.triangles = surface_care.evened_out(self.points, self.triangles, self.rings, lines)
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -377,11 +359,8 @@ class LiquidSurface:
 
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
-        spacing, normals = self.law.spacing, vertex_normals(self.points, self.triangles, len(self.points))
-        for ring in self.rings:  # where it meets its image
-            normals[ring, 2] = 0.0
-            normals[ring] /= np.maximum(np.linalg.norm(normals[ring], axis=1), 1e-300)[:, None]
-        return narrowest_gap(self.points, self.triangles, normals, MEETING * spacing, spacing) < MEETING * spacing
+        gap = MEETING * self.law.spacing
+        return narrowest_gap(self.points, self.triangles, self._normals(), gap, self.law.spacing) < gap
 
     def _leaves(self, velocity: Floats) -> bool:
         """Whether liquid moves away from the wall on a foot that is too thin for its particles."""
@@ -393,14 +372,11 @@ class LiquidSurface:
         self.rebuilds += 1
         before, energy = parts_of(self.triangles), self.energy
         closed = mirrored(self.points, self.triangles) if self.law.mirror else (self.points, self.triangles)
-        distance = signed_distance(*closed, Grid.around(closed[0], EDGE * self.law.spacing))
+        distance = signed_distance(*closed, Grid.around(closed[0], surface_care.EDGE * self.law.spacing))
         for gap in gaps:
             level = closed_level(distance, gap * self.law.spacing) if gap else distance
-            points, triangles = extract_surface(level)
-            if self.law.mirror:
-                points, triangles = between(points, triangles, (WALL,), 1e-6 * self.law.spacing)
             try:
-                rings = boundary_loops(triangles)
+                points, triangles, rings = surface_care.triangulated(level, bool(self.law.mirror))
             except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
                 continue
             wet = sum(area_within(points[ring]) for ring in rings)

@@ -11,8 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas
+from reflowshock.particles.sph import surface_loops
+from reflowshock.particles.sph.fluid_state import Fields
+from reflowshock.particles.surface.cloud_level_set import between, boundary_loops
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 # In spacings of the particles: edges of triangles.
@@ -27,12 +32,28 @@ SHARPEST_TURN = 0.5
 # In spacings: triangles lower than the first above the wall are on it where they face it; a film thinner than the
 # second is none.
 TOUCH, DRY = 0.3, 0.1
+# The same: how far beyond its particles the surface is at least and at most, its radius about one that it follows, and
+# how far outside a vertex one is still its own, not one of other liquid before it.
+COVER, CREST, OWN = (0.05, 2.0), 1.5, 0.75
+WALL = Plate.horizontal(0.0)
 
 
 def changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
     """Return what splits edges that are too long and what collapses those that are too short, for a spacing [m]."""
     long, short = LONGEST * EDGE * spacing, SHORTEST * EDGE * spacing
     return partial(split_long, longest=long, on_rings=True), partial(collapse_short, shortest=short, on_rings=True)
+
+
+def triangulated(level: LevelSet, mirror: bool) -> tuple[Floats, Indices, tuple[Indices, ...]]:
+    """Return points `(m, 3)` [m], triangles `(t, 3)` and contact lines of a level set, above a mirror in z = 0 or not.
+
+    Raises:
+        CannotRebuild: contact lines meet in a point.
+    """
+    points, triangles = extract_surface(level)
+    if mirror:
+        points, triangles = between(points, triangles, (WALL,), 1e-6 * level.grid.spacing)
+    return points, triangles, boundary_loops(triangles)
 
 
 def evened_out(
@@ -82,3 +103,18 @@ def on_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bo
     first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     faces_wall = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
     return corner[:, :, 2].max(axis=1) <= np.where(faces_wall, TOUCH, DRY) * spacing
+
+
+def strays(vertices: tuple[Floats, Floats], lists: tuple[Indices, Indices], fields: Fields, spacing: float) -> Floats:
+    """Return how far vertices have to move outward to lie beyond their particles, and not far beyond them, `(m,)` [m].
+
+    Args:
+        vertices: points `(m, 3)` [m] and outward normals `(m, 3)`.
+        lists: particles beside each vertex.
+        fields: of the particles.
+        spacing: of the particles [m].
+    """
+    cover = COVER[0] * spacing, COVER[1] * spacing, 0.5 / (CREST * spacing), OWN * spacing
+    found = np.empty(len(vertices[0]))
+    surface_loops.find_strays(vertices, lists, fields, cover, found)
+    return found

@@ -56,19 +56,18 @@ def share_out(lists, shares, vectors, found):
 
 
 @njit(cache=True, parallel=True)
-def find_strays(points, normals, lists, fields, cover, strays):
+def find_strays(vertices, lists, fields, cover, strays):
     """Write how far vertices are to move along their normals [m] to lie just beyond the particles beside them `(m,)`.
 
     Args:
-        points: vertices `(m, 3)` [m].
-        normals: outward `(m, 3)`.
+        vertices: points `(m, 3)` [m] and outward normals `(m, 3)`.
         lists: particles beside each vertex.
         fields: of the particles.
         cover: how far beyond each particle the surface is at least and at most [m]; its curvature about one, halved
             [1/m]; how far before a vertex a particle is left out [m].
         strays: found.
     """
-    (offsets, indices), (least, most, bend, before) = lists, cover
+    (points, normals), (offsets, indices), (least, most, bend, before) = vertices, lists, cover
     for v in prange(points.shape[0]):
         top = -inf
         for k in range(offsets[v], offsets[v + 1]):
@@ -79,13 +78,3 @@ def find_strays(points, normals, lists, fields, cover, strays):
             if along < before:
                 top = max(top, along - bend * aside2)
         strays[v] = max(top + least, min(top + most, 0.0)) if top > -inf else 0.0
-
-
-@njit(cache=True)
-def find_heights(points, lists, weights, found):
-    offsets, indices = lists
-    for v in range(points.shape[0]):
-        for k in range(offsets[v], offsets[v + 1]):
-            j = indices[k]
-            found[0, j] += weights[k] * points[v, 2]
-            found[1, j] += weights[k]
