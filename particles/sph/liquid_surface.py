@@ -11,8 +11,8 @@ sums carry too little of a pressure, nor that a lattice of particles under press
 Particles that no pressure spreads draw together where it is negative: they are shifted to where there are fewer
 (`simulation.py`). Beside the surface it is itself what lacks in their sums, so that they fill it evenly.
 
-A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
-have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
+A part that comes down on the wall becomes wet. Triangles are split, joined and evened out every few steps
+(`surface_care.py`); where they are worn all the same, the surface is made anew from its distance, and may then part.
 Parts that come as near to each other as particles stand, of two drops or of one, become one: the gap between them is
 closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched. A foot on the wall that
 has become thinner than particles fill leaves it where the liquid moves away: a drop that rebounds.
@@ -210,13 +210,12 @@ class LiquidSurface:
         rates[7:10] += crowd[:, :fluids]
 
     def _cover(self, fields: Fields) -> None:
-        """Move vertices that particles are about to pass, or have left behind: liquid and surface stay together.
-
-        Vertices move with means of velocities over the kernel; at the rim of a film particles are faster, or slower.
-        """
-        normals = self._normals()
+        """Move vertices that particles pass, or leave behind, at the rim of a film. The volume stays."""
+        volume, normals = self.volume, self._normals()
         offset = surface_care.strays((self.points, normals), self._lists, fields, self.law.spacing)
-        self.points += offset[:, None] * normals
+        if offset.any():
+            self.points += offset[:, None] * normals
+            self.enclose(volume)
 
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""

@@ -32,9 +32,9 @@ SHARPEST_TURN = 0.5
 # In spacings: triangles lower than the first above the wall are on it where they face it; a film thinner than the
 # second is none.
 TOUCH, DRY = 0.3, 0.1
-# The same: how far beyond its particles the surface is at least and at most, its radius about one that it follows, and
-# how far outside a vertex one is still its own, not one of other liquid before it.
-COVER, CREST, OWN = (0.05, 2.0), 1.5, 0.75
+# The same: how far beyond its particles the surface is at least (they may be a bit outside) and at most, its radius
+# about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
+COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
 WALL = Plate.horizontal(0.0)
 
 
