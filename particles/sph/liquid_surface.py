@@ -200,7 +200,7 @@ class LiquidSurface:
         outward = self._outward()
         surface_loops.share_out(self._lists, weights, outward, crowd)
         if self.law.mirror and self.law.no_slip:
-            hold_films((self.points, self._lists, weights), fields, self.law, rates)
+            hold_films((self.points, self._normals(), self._lists, weights), fields, self.law, rates)
         if self.ground is not None:
             images, outward = grounds.reflected(self.ground, self.points, outward, SUPPORT * self.law.length)
             surface_loops.find_weights(images, self._lists, fields, self.law, weights)
@@ -359,6 +359,8 @@ class LiquidSurface:
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
         gap = MEETING * self.law.spacing
+        if any(-(gap**2) < area_within(self.points[ring]) < 0.0 for ring in self.rings):  # a dry spot
+            return True
         return narrowest_gap(self.points, self.triangles, self._normals(), gap, self.law.spacing) < gap
 
     def _leaves(self, velocity: Floats) -> bool:

@@ -15,6 +15,7 @@ from reflowshock.particles.surface.closing import narrowest_gap
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 1.0}
 COARSE = DropletNumerics(particles_per_diameter=8)
 ACROSS = 6
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def film(layers, height):
@@ -59,7 +60,7 @@ def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
     lists = np.arange(0, count * count + 1, count, dtype=np.int32), np.tile(np.arange(count, dtype=np.int32), count)
     weights = np.empty((2, count * count))
     find_weights(points, lists, fields, law, weights)
-    hold_films((points, lists, weights), fields, law, simulation.rates)
+    hold_films((points, UP * np.ones_like(points), lists, weights), fields, law, simulation.rates)
     assert by_images < 0.6 * height**2
     assert -simulation.rates[1].mean() * height**2 / 3.0 == pytest.approx(1.0, abs=0.05)
 
@@ -73,7 +74,7 @@ def test_a_film_of_two_particles_is_left_to_the_sums_over_pairs():
     lists = np.array([0, simulation.fluids], np.int32), np.arange(simulation.fluids, dtype=np.int32)
     weights = np.empty((2, simulation.fluids))
     find_weights(points, lists, fields, simulation.law, weights)
-    hold_films((points, lists, weights), fields, simulation.law, simulation.rates)
+    hold_films((points, UP * np.ones_like(points), lists, weights), fields, simulation.law, simulation.rates)
     assert np.array_equal(simulation.rates, before)
 
 
