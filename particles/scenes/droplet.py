@@ -52,7 +52,7 @@ def solve_droplet(
         raise SurfaceLost(
             f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
             f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
-            "films thinner than two spacings are not followed: take more particles per diameter"
+            "parts smaller than their particles are not followed: take more particles per diameter"
         ) from error
     history = run.history(COLUMNS)
     words = {"outcome": outcome(history)} if scene.impact_speed else {}
@@ -229,6 +229,9 @@ def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
         found["weber"], found["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
         found["spread_max"] = (float(history["spread"][widest]), "")
         found["time_of_spread_max"] = (float(history["time"][widest]), "s")
+        if history["foot"][widest] > 0.0:
+            film = scene.volume / (0.25 * pi * (history["foot"][widest] * scene.diameter) ** 2)
+            found["film_over_spacing"] = (float(film / scene.spacing), "")
         wets = np.flatnonzero(history["foot"] > 0.0)
         if len(wets) and wets[-1] + 1 < len(history["time"]):
             found["contact_time"] = (float(history["time"][wets[-1] + 1] - history["time"][wets[0]]), "s")

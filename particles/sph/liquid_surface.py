@@ -335,16 +335,18 @@ class LiquidSurface:
         return True
 
     def _care(self) -> None:
-        """Split and collapse edges, and even out triangles."""
+        """Close dry spots, split and collapse edges, and even out triangles."""
+        if lidded := surface_care.without_dry_spots(self.points, self.triangles, self.rings, self.law.spacing):
+            self._take(*lidded)
         try:
             for change in surface_care.changes(self.law.spacing):
                 new = change(self.points, self.triangles, self.rings + self._lines_on_ground())
                 if len(new.triangles) != len(self.triangles):
                     self._take(0.5 * (self.points[new.first] + self.points[new.second]), new.triangles)
             lines = self.rings + self._lines_on_ground()
+            self.points, self.triangles = surface_care.evened_out(self.points, self.triangles, self.rings, lines)
         except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
             return
-        self.points, self.triangles = surface_care.evened_out(self.points, self.triangles, self.rings, lines)
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -359,8 +361,6 @@ class LiquidSurface:
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
         gap = MEETING * self.law.spacing
-        if any(-(gap**2) < area_within(self.points[ring]) < 0.0 for ring in self.rings):  # a dry spot
-            return True
         return narrowest_gap(self.points, self.triangles, self._normals(), gap, self.law.spacing) < gap
 
     def _leaves(self, velocity: Floats) -> bool:

@@ -15,7 +15,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas
 from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields
-from reflowshock.particles.surface.cloud_level_set import between, boundary_loops
+from reflowshock.particles.surface.cloud_level_set import area_within, between, boundary_loops
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
@@ -42,6 +42,24 @@ def changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indi
     """Return what splits edges that are too long and what collapses those that are too short, for a spacing [m]."""
     long, short = LONGEST * EDGE * spacing, SHORTEST * EDGE * spacing
     return partial(split_long, longest=long, on_rings=True), partial(collapse_short, shortest=short, on_rings=True)
+
+
+def without_dry_spots(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float
+) -> tuple[Floats, Indices] | None:
+    """Return points and triangles with a film over dry spots of the wall that are smaller than a particle; else None.
+
+    Args: as `evened_out`; contact lines run clockwise about dry spots.
+    """
+    spots = [ring for ring in rings if -(spacing**2) < area_within(points[ring]) < 0.0]
+    if not spots:
+        return None
+    points = np.concatenate((points, [points[ring].mean(axis=0) for ring in spots]))
+    lids = []
+    for number, ring in enumerate(spots, len(points) - len(spots)):
+        points[ring, 2] = points[number, 2] = TOUCH * spacing
+        lids.append(np.stack((np.roll(ring, -1), ring, np.full_like(ring, number)), axis=1))
+    return points, np.concatenate((triangles, *lids)).astype(np.int32)
 
 
 def triangulated(level: LevelSet, mirror: bool) -> tuple[Floats, Indices, tuple[Indices, ...]]:

@@ -7,10 +7,12 @@ from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.scenes.droplet import droplet, liquid_of
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import evened_out, on_wall, strays
+from reflowshock.particles.sph.surface_care import evened_out, on_wall, strays, without_dry_spots
 from reflowshock.particles.sph.surface_loops import find_weights
 from reflowshock.particles.sph.thin_films import hold_films
 from reflowshock.particles.surface.closing import narrowest_gap
+from reflowshock.particles.surface.cloud_level_set import boundary_loops
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 1.0}
 COARSE = DropletNumerics(particles_per_diameter=8)
@@ -120,3 +122,20 @@ def test_a_notch_is_no_gap():
     apart, joined = np.empty((0, 3), np.int32), np.array([[0, 2, 1]], np.int32)
     assert narrowest_gap(points, apart, normals, 0.5, 0.5) == pytest.approx(0.3)
     assert narrowest_gap(points, joined, normals, 0.5, 0.5) == np.inf
+
+
+def test_a_dry_spot_smaller_than_a_particle_is_closed():
+    """A plate of triangles on a wall, in the middle of which one is missing."""
+    x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
+    points = np.stack((x.ravel(), y.ravel(), np.full(25, 0.5)), axis=1)
+    corner = np.array([i + 5 * j for j in range(4) for i in range(4)], np.int32)
+    triangles = np.concatenate((corner[:, None] + [0, 1, 6], corner[:, None] + [0, 6, 5])).astype(np.int32)
+    whole = boundary_loops(triangles)
+    assert without_dry_spots(points, triangles, whole, 1.0) is None
+    torn = np.delete(triangles, 10, axis=0)
+    closed = without_dry_spots(points, torn, boundary_loops(torn), 1.0)
+    assert closed is not None
+    assert len(boundary_loops(closed[1])) == 1
+    assert vertex_normals(*closed, len(closed[0]))[:, 2].min() > 0.5
+    assert len(closed[0]) == 26 and len(closed[1]) == len(triangles) + 2
+    assert without_dry_spots(points, torn, boundary_loops(torn), 0.5) is None
