@@ -32,6 +32,8 @@ DIRECTIONS = 36
 # In spacings, and over the height: where the profile of a drop on a wall is read. Next to the wall it is rounded.
 FOOT, SHOULDER = 1.5, 0.7
 FEWEST = 12
+# Over the diameter, times Re^(2/5): thickness of the film that an impact leaves (Roisman 2009).
+RESIDUAL_FILM = 0.79
 # Newton steps until the surface encloses the volume.
 ENCLOSURES = 3
 
@@ -52,11 +54,19 @@ def solve_droplet(
         raise SurfaceLost(
             f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
             f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
-            "parts smaller than their particles are not followed: take more particles per diameter"
+            f"parts smaller than their particles are not followed: take more particles per diameter{_enough(scene)}"
         ) from error
     history = run.history(COLUMNS)
     words = {"outcome": outcome(history)} if scene.impact_speed else {}
     return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
+
+
+def _enough(scene: Droplet) -> str:
+    """Tell with how many the film that an impact leaves is two particles thick."""
+    if not scene.impact_speed:
+        return ""
+    film = RESIDUAL_FILM / scene.reynolds_number**0.4
+    return f" ({2.0 / film:.0f} have two in the film of {film:.2g} diameters that the impact leaves)"
 
 
 def droplet(scene: Droplet) -> Simulation:

@@ -85,13 +85,17 @@ def struck(weber, reynolds, across, units):
     return solve_droplet(scene.model_copy(update={"duration": units * scene.unit_of_time}))
 
 
-def test_the_spread_at_weber_30_is_within_its_correlations_and_hardly_depends_on_the_spacing():
-    """Pasandideh-Fard, Roisman, Laan: 1.94 to 2.24 D; with 20 particles a diameter: README of `sph`."""
-    results = [struck(30.0, 500.0, across, 1.9) for across in (8, 10)]
-    for result in results:
-        assert 1.9 <= value(result, "spread_max") <= 2.35
-        assert abs(value(result, "volume_drift")) < 0.01
-    assert value(results[0], "spread_max") == pytest.approx(value(results[1], "spread_max"), rel=0.03)
+def test_the_spread_at_weber_30_is_that_of_volumes_of_fluid():
+    """InterFoam: 2.428 D (`benchmarks/droplet_peers.py`); correlations: 1.94 to 2.24 D."""
+    result = struck(30.0, 500.0, 10, 1.9)
+    assert value(result, "spread_max") == pytest.approx(2.428, rel=0.03)
+    assert abs(value(result, "volume_drift")) < 0.01
+
+
+@pytest.mark.long
+def test_half_the_spacing_hardly_changes_the_spread_at_weber_30():
+    coarse, fine = (value(struck(30.0, 500.0, across, 1.9), "spread_max") for across in (10, 20))
+    assert coarse == pytest.approx(fine, rel=0.03)
 
 
 def test_a_film_thinner_than_its_particles_spreads_on_and_keeps_them():
