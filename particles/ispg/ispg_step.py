@@ -23,23 +23,28 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import cotangents
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
+    Riders,
     admitted_motions,
     edges_turn,
+    held,
     orthonormal,
     rigid_momenta,
     rigid_motions,
+    wall_velocities,
 )
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.descent import ARRIVED
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
@@ -126,7 +131,11 @@ class IspgStep:
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
         past = self.past
-        kept = past and fields_of(past) | {"history": fields_of(past.history), "losses": fields_of(past.losses)}
+        kept = past and fields_of(past) | {
+            "history": fields_of(past.history),
+            "losses": fields_of(past.losses),
+            "plates": {str(wall): moved for wall, moved in past.plates.items()},
+        }
         return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -134,7 +143,8 @@ class IspgStep:
         past = saved["past"]
         if past:
             history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
-            past = GalerkinPast(**{**past, "history": history, "losses": losses})
+            plates = {int(wall): moved for wall, moved in past["plates"].items()}
+            past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
@@ -171,10 +181,13 @@ class PreparedIspgStep:
         """
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
-        guess = self._guess(base)
-        predicted = replace(body, points=base.points + base.time_step * guess)
+        pace = self._pace(base)
+        given, guessed = self._given_twists(base, time_step), self._guessed_twists(pace)
+        twists = given | guessed
+        guess = self._guess(pace, twists)
+        predicted = body.placed(base.points + base.time_step * guess, self._ways(base, twists))
         enclosed, slope = predicted.volume()
-        equations = self.equations(predicted, base.time_step)
+        equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
@@ -183,21 +196,32 @@ class PreparedIspgStep:
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
-        points = base.points + base.time_step * velocity
-        history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
-        mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
+        twists = given | equations.twists(velocity, guessed)
+        ways = self._ways(base, twists)
+        moved = body.placed(base.points + base.time_step * velocity, ways)
+        history = BackwardDifference(moved.points - body.points, velocity - past.velocity, time_step)
+        volumes = equations.space.volumes
+        mean_pressure = float(pressure @ volumes / volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
-        potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
-        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
+        potential = self.physics.energy(moved)
+        driving = force - base.time_step * equations.tension(equations.pulled(start, velocity))
+        loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
+        work = time_step * (float((driving * velocity).sum()) + rate * mean_pressure + loads)
+        done, pull = 0.0, float("nan")
+        if given:
+            acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
+            forces = equations.reaction((base.velocity, start, velocity), force, acting)
+            done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
+            work += time_step * equations.power(predicted, given, forces) - done
+        losses = replace(losses, plates=losses.plates - done)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
-            points=points,
+            points=moved.points,
             centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
             velocity=velocity,
             gradient=gradient,
@@ -210,15 +234,27 @@ class PreparedIspgStep:
             momenta_change=gain,
             history=history,
             losses=replace(losses, integration=losses.integration + self.energy - potential - work),
+            plates={wall: np.stack((ways[wall], twist)) for wall, twist in twists.items()},
         )
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
-            twists={},
+            twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
+            pull=pull,
         )
+
+    def _plate_work(
+        self, body: Body, equations: GalerkinEquations, ways: dict[int, Floats], forces: tuple[Floats, Floats]
+    ) -> tuple[float, float]:
+        """Work of plates on their ways `(6,)` [J] by the forces of `GalerkinEquations.reaction`, mean force along them.
+
+        There is no such force where they have arrived.
+        """
+        done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
+        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
         """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
@@ -248,12 +284,37 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
-        velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+    def _carried(self, base: Base, wall: int) -> Floats:
+        """How far the last step carries a plate on, `(6,)` [m, rad]."""
+        return base.weight * self.past.ways.get(wall, np.zeros(6))
+
+    def _given_twists(self, base: Base, time_step: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+        moved = [motion for motion in self.physics.motions if not len(motion.directions)]
+        ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
+        return {wall: (way - self._carried(base, wall)) / base.time_step for wall, way in ways.items()}
+
+    def _guessed_twists(self, pace: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
+        walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
+        return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
+
+    def _ways(self, base: Base, twists: Mapping[int, Floats]) -> dict[int, Floats]:
+        """Displacements and rotations of plates in the whole step `(6,)` [m, rad]."""
+        return {wall: self._carried(base, wall) + base.time_step * twist for wall, twist in twists.items()}
+
+    def _pace(self, base: Base) -> float:
+        """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
+        way = base.time_step * float(np.sqrt((self.body.velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        return velocity if way <= bound else bound / way * velocity
+        return 1.0 if way <= bound else bound / way
+
+    def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, at a share of its pace, and that of plates."""
+        velocity = pace * self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
+        if not twists:
+            return velocity
+        return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
 
     def fluid(self, spacing: float) -> Flow:
         """What the liquid is made of, of particles at a spacing [m]."""
@@ -267,13 +328,17 @@ class PreparedIspgStep:
         """Surface tension of the liquid [N/m]."""
         return sum(part.coefficient for part in self.physics.operators if isinstance(part, SurfaceTension))
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a body at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a body at other positions, for a time step [s]; its plates move with twists `(6,)`."""
         fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
-        held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
+        clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
-        space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
+        space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
+        riders = Riders.of(self.physics.motions, body, self.projections, fluid.density * space.carried)
+        if riders is not None:
+            drifts = np.array([space.drift_of(body, dict(enumerate(twist))) for twist in riders.twists])
+            space = replace(space, riding=(riders.momenta, drifts))
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -282,6 +347,8 @@ class PreparedIspgStep:
             surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
             spacing=spacing,
             rigid=orthonormal(rigid, fluid.density * space.carried),
+            walls=wall_velocities(body, twists),
+            riders=riders,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
