@@ -21,7 +21,7 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import GalerkinPast
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference
+from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
 
 # The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
@@ -227,6 +227,7 @@ def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
         velocity=change.mean(past.velocity),
         gradient=change.mean(past.gradient),
         pressure=change.mean(past.pressure),
+        acceleration=change.mean(past.acceleration),
         volumes=change.mean(past.volumes),
-        history=BackwardDifference(displacement, change_of_velocity, last.time_step),
+        history=OneLeg(displacement, change_of_velocity, last.time_step),
     )

@@ -23,15 +23,21 @@ that do.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
+import os
+LUMP = float(os.environ.get("LUMP", 1.0))
+ITS = []
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,7 @@ class GalerkinEquations:
         surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
+        inertia: masses and implicit surface tension of velocities, by particle.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -79,6 +86,7 @@ class GalerkinEquations:
     surface: tuple[Indices, Floats]
     rigid: Floats
     drag: Floats
+    inertia: StiffMass
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -102,34 +110,33 @@ class GalerkinEquations:
         """Kinetic energy [J]."""
         return 0.5 * float((field * self.momentum(field)).sum())
 
-    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
-        """Velocity v* [m/s] under the last pressure.
+    def predict(self, velocity: Floats, force: Floats) -> Floats:
+        """Velocity [m/s] that friction leaves: of viscosity, walls and smoothing.
 
         Args:
             velocity: that the step starts with, `(n, 3)` [m/s].
-            force: on the particles at the end of the step, were they at rest, `(n, 3)` [N].
-            pressure: at the particles, `(n,)` [Pa].
+            force: on the particles, as it is expected to be, `(n, 3)` [N].
 
         Raises:
             SolveFailed: the linear solve failed.
         """
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        load = self.momentum(velocity) / self.time_step + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        implicit = (self.surface, self.rigid, self.masses, self.time_step)
-        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
-        solution, _ = conjugate_gradients(
+        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted))
+        solution, its = conjugate_gradients(
             lambda field: kernels.momentum_operator(*parts, field),
             kernels.projected(self.admitted, load),
             kernels.projected(self.admitted, velocity),
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
+        ITS.append(its)
         return solution
 
-    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
-        """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].
+    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> Floats:
+        """Pressure `(n,)` [Pa] that takes the divergence of a velocity away.
 
         Args:
             start: predicted velocity v*, `(n, 3)` [m/s].
@@ -140,23 +147,32 @@ class GalerkinEquations:
             SolveFailed: the linear solve failed.
         """
         space, divergence = self.space, self.constraint(start)
-        mobility = (self.time_step / self.masses)[:, None, None] * self.admitted
-        roots = np.sqrt(self.time_step / self.masses)[:, None, None] * self.admitted
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        parts = (space.rows, space.images, self._parts, mobility)
-        potential = factors.solve(
-            lambda pressure: kernels.pressure_operator(*parts, pressure),
-            lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
+        return factors.solve(
+            lambda pressure: self.constraint(self.accelerated(pressure)),
+            self.pressure_matrix,
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
-        change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + kernels.projected(mobility, self.push(potential)), change
 
-    def pulled(self, start: Floats, _end: Floats) -> Floats:
-        """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
-        return start
+    def accelerated(self, pressure: Floats) -> Floats:
+        """Change of the velocity in a step under a pressure `(n,)` [Pa], `(n, 3)` [m/s]."""
+        return self.moved(self.push(pressure))
+
+    def moved(self, force: Floats) -> Floats:
+        load = kernels.projected(self.admitted, force)
+        return self.inertia.solve(load.ravel()).reshape(-1, 3)
+
+    def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
+        """Rates of volume under such changes, A, but for what nodal integration misses, and with K by its diagonal.
+
+        Returns the lower triangle of S A S `(n, n)`, whose diagonal is about one, and S `(n,)`.
+        """
+        space, stiff = self.space, self.masses / self.time_step
+        np.add.at(stiff, self.surface[0], LUMP * self.time_step * (self.surface[1].sum(axis=1)[:, None] - self.surface[1]))
+        roots = stiff[:, None, None] ** -0.5 * self.admitted
+        return kernels.pressure_matrix(space.rows, space.images, space.volumes, roots)
 
     @property
     def _parts(self) -> tuple[Floats, Floats]:
@@ -194,3 +210,21 @@ class GalerkinEquations:
     def _friction(self, rough: Floats) -> Floats:
         """Resistance to velocities `(n, 3)` that the shape functions do not show [N]."""
         return (self.fluid.smoothing * self.masses)[:, None] * rough
+
+
+def admitted_stiffness(surface: tuple[Indices, Floats], admitted: Floats) -> sparse.csr_matrix:
+    """Stiffness `(3 s, 3 s)` [N/m], by particle, of a surface's s vertices to velocities that walls admit.
+
+    Args:
+        surface: as in `GalerkinEquations`.
+        admitted: `(s, 3, 3)`.
+    """
+    triangles, weights = surface
+    count = len(admitted)
+    i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
+    pull = weights.ravel()
+    rows, columns = np.concatenate((i, j, i, j)), np.concatenate((j, i, i, j))
+    links = sparse.csr_matrix((np.concatenate((-pull, -pull, pull, pull)), (rows, columns)), shape=(count, count))
+    blocks = admitted[np.repeat(np.arange(count), np.diff(links.indptr))] @ admitted[links.indices]
+    blocks *= links.data[:, None, None]
+    return sparse.bsr_matrix((blocks, links.indices, links.indptr), shape=(3 * count, 3 * count))

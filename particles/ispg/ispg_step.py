@@ -23,8 +23,9 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import cotangents
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
+from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
@@ -39,11 +40,15 @@ from reflowshock.particles.ispg.rigid_motions import (
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.backward_difference import Base
+from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
+import os
+THETA=float(os.environ.get("THETA",0))
+DEFER=float(os.environ.get("DEFER",1))
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
 SMOOTHING = 10.0
@@ -133,7 +138,7 @@ class IspgStep:
         """Continue from what `saved` returned."""
         past = saved["past"]
         if past:
-            history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
+            history, losses = OneLeg(**past["history"]), LostEnergy(**past["losses"])
             past = GalerkinPast(**{**past, "history": history, "losses": losses})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
@@ -170,30 +175,35 @@ class PreparedIspgStep:
             NoVolumes: the particles do not fill the body.
         """
         body, past = self.body, self.past
-        base = past.history.base(body.points, past.velocity, time_step)
+        last = past.history.as_long_as(time_step, past.velocity)
+        base = last.base(body.points, past.velocity)
         guess = self._guess(base)
         predicted = replace(body, points=base.points + base.time_step * guess)
-        enclosed, slope = predicted.volume()
         equations = self.equations(predicted, base.time_step)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past, base = self._with_momenta(equations, base, motions)
+            past, last = self._with_momenta(equations, last, motions)
+            base = last.base(body.points, past.velocity)
         force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
-        start = equations.predict(base.velocity, force, past.pressure)
-        rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
-        velocity, change = equations.project(start, rate, self.solver.factors)
-        pressure = past.pressure + change
-        points = base.points + base.time_step * velocity
-        history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
+        expected = equations.momentum(past.acceleration)
+        rubbed = equations.predict(base.velocity, expected)
+        load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
+        start = equations.moved(load)
+        rate = self._rate_of_volume(last, guess, predicted, volume)
+        change = equations.project(start, rate, self.solver.factors)
+        mean, pressure = start + equations.accelerated(change), past.pressure + change
+        history = last.followed_by(past.velocity, mean)
+        velocity, points = past.velocity + history.velocity_change, body.points + history.displacement
+        transport = history.displacement / time_step
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
-        losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
+        losses = with_step(losses, equations, base, (past.velocity, velocity), (rubbed, mean, transport), time_step)
         potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
-        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
+        pull = force - base.time_step * equations.tension(mean) + equations.push(pressure)
+        work = time_step * float((pull * transport).sum())
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
@@ -204,6 +214,7 @@ class PreparedIspgStep:
             kinetic=equations.kinetic(velocity),
             potential=potential,
             pressure=pressure,
+            acceleration=past.acceleration + (mean - rubbed) / base.time_step,
             volumes=equations.space.carried,
             evening=_passes(gradient, equations.fluid, time_step),
             momenta=momenta,
@@ -213,14 +224,14 @@ class PreparedIspgStep:
         )
         return Motion(
             velocity=velocity,
-            transport=history.displacement / time_step,
+            transport=transport,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
             twists={},
             iterations=self.solver.factors.iterations,
         )
 
-    def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
+    def _with_momenta(self, equations: GalerkinEquations, last: OneLeg, motions: Floats) -> tuple[GalerkinPast, OneLeg]:
         """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
@@ -237,9 +248,16 @@ class PreparedIspgStep:
             return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
 
         if not kept.any():
-            return past, base
-        start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
-        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+            return past, last
+        share = last.time_step / past.history.time_step
+        change = corrected(last.velocity_change, share * past.momenta_change)
+        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(last, velocity_change=change)
+
+    def _rate_of_volume(self, last: OneLeg, guess: Floats, predicted: Body, volume: float) -> float:
+        """Rate [m^3/s] with which the body ends the step at a volume [m^3]; slopes are those of predicted positions."""
+        way = last.followed_by(self.past.velocity, guess).displacement
+        enclosed, slope = replace(predicted, points=self.body.points + way).volume()[0], predicted.volume()[1]
+        return (volume - enclosed) / last.leg + float((slope * guess).sum())
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
@@ -250,7 +268,7 @@ class PreparedIspgStep:
 
     def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
-        velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
+        velocity = self.body.velocity + THETA * self.past.history.velocity_change if self.physics.momenta else np.zeros_like(self.body.points)
         way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
@@ -274,17 +292,21 @@ class PreparedIspgStep:
         held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
-        rigid = rigid_motions(body.points)[self.admitted]
+        masses = fluid.density * space.carried
+        rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
+        surface = (body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles))
+        stiffness = admitted_stiffness(surface, self.projections[: body.cloud.surface_count])
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             admitted=self.projections,
-            surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
+            surface=surface,
             spacing=spacing,
-            rigid=orthonormal(rigid, fluid.density * space.carried),
+            rigid=rigid,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
+            inertia=StiffMass.of(np.repeat(masses, 3), stiffness, rigid.reshape(len(rigid), -1), time_step),
         )
 
     def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:

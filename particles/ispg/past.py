@@ -12,7 +12,8 @@ from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.backward_difference import Base
+from reflowshock.particles.steps.one_leg import OneLeg
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +73,21 @@ class GalerkinPast:
     kinetic: float | None
     potential: float
     pressure: Floats
+    acceleration: Floats
     volumes: Floats
     evening: float
     momenta: Floats
     momenta_change: Floats
-    history: BackwardDifference
+    history: OneLeg
     losses: LostEnergy
 
     @classmethod
     def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
         """A body that starts with its velocity, and an energy of the forces [J]."""
-        slope, start = np.zeros((len(body.points), 3, 3)), BackwardDifference.start(len(body.points))
+        slope, start = np.zeros((len(body.points), 3, 3)), OneLeg.start(len(body.points))
         losses = losses or LostEnergy()
         still, unknown = np.zeros(6), np.zeros(len(body.points))
-        at_rest = (body.pressure, unknown, 1.0, still, still)
+        at_rest = (body.pressure, np.zeros((len(body.points), 3)), unknown, 1.0, still, still)
         return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
 
     def carried_on(
@@ -113,7 +115,8 @@ def with_step(
     losses: LostEnergy,
     equations: GalerkinEquations,
     base: Base,
-    velocities: tuple[Floats, Floats, Floats],
+    velocities: tuple[Floats, Floats],
+    acting: tuple[Floats, Floats, Floats],
     time_step: float,
 ) -> LostEnergy:
     """Losses with those of a step [s], but for the way that the forces act along.
@@ -122,9 +125,10 @@ def with_step(
 
     Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
     """
-    last, start, now = velocities
-    power = equations.losses(start, now)
-    change = time_step / base.time_step * float((now * equations.momentum(now - base.velocity)).sum())
+    last, now = velocities
+    rubbed, mean, way = acting
+    power = equations.losses(rubbed, way)
+    change = time_step / base.time_step * float((way * equations.momentum(mean - base.velocity)).sum())
     gain = equations.kinetic(now) - equations.kinetic(last)
     return replace(
         losses,

@@ -79,18 +79,17 @@ def pull_back(surface, rigid, masses, field):
 
 
 @njit(cache=True)
-def momentum_operator(rows, images, resisted, implicit, field):
-    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia, resistance and implicit surface tension.
+def momentum_operator(rows, images, resisted, field):
+    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia and resistance.
 
     ``resisted``: masses over the time step `(n,)` [kg/s], factors of
-    `resistance`, projections of the particles `(n, 3, 3)`; ``implicit``: what `pull_back` takes, and the time step [s].
+    `resistance`, projections of the particles `(n, 3, 3)`.
     """
-    (inertia, factors, admitted), (surface, rigid, masses, time_step) = resisted, implicit
+    inertia, factors, admitted = resisted
     force = folded(resistance(*rows, reflected(field, *images), factors), *images)
-    pull = pull_back(surface, rigid, masses, field)
     for i in range(field.shape[0]):
         for c in range(3):
-            force[i, c] += inertia[i] * field[i, c] + time_step * pull[i, c]
+            force[i, c] += inertia[i] * field[i, c]
     return projected(admitted, force)
 
 

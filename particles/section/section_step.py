@@ -11,13 +11,13 @@ from typing import ClassVar, cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
@@ -40,40 +40,6 @@ from reflowshock.particles.surface.surface_quality import SMOOTHING as EVENING
 
 
 @dataclass(frozen=True, slots=True)
-class StiffMass:
-    """Masses and implicit surface tension of d admissible velocities, m / dt + dt P^T K P, factored.
-
-    P takes out the rigid motions R, orthonormal by the masses: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
-
-    Attributes:
-        factors: of m / dt + dt K.
-        across: `(d, 2 k)` columns m R^T and K R^T.
-        moved: `(d, 2 k)` these, solved for.
-        core: `(2 k, 2 k)` of Woodbury's formula.
-    """
-
-    factors: SuperLU
-    across: Floats
-    moved: Floats
-    core: Floats
-
-    @classmethod
-    def of(cls, masses: Floats, stiffness: sparse.csr_matrix, rigid: Floats, time_step: float) -> "StiffMass":
-        """Factor masses `(d,)` [kg] and stiffness `(d, d)` [N/m] with rigid motions `(k, d)`, for a time step [s]."""
-        factors = splu((sparse.diags(masses / time_step) + time_step * stiffness).tocsc())
-        count, pull = len(rigid), rigid @ stiffness
-        across = np.concatenate((masses * rigid, pull)).T
-        moved, unit = factors.solve(across), np.eye(count)
-        inner = np.block([[np.zeros((count, count)), -unit], [-unit, -pull @ rigid.T]]) / time_step
-        return cls(factors, across, moved, np.linalg.inv(inner + across.T @ moved))
-
-    def solve(self, load: Floats) -> Floats:
-        """Velocities `(d,)` or `(d, l)` that loads reach in a time step."""
-        first = self.factors.solve(load)
-        return first - self.moved @ (self.core @ (self.across.T @ first))
-
-
-@dataclass(frozen=True, slots=True)
 class SectionEquations(GalerkinEquations):
     """The equations of a section, by matrices.
 
@@ -85,13 +51,11 @@ class SectionEquations(GalerkinEquations):
         matrices: shape functions and volumes.
         basis: `(3 n, d)` admissible velocities, by particle.
         stiffness: `(3 n, 3 n)` of the surface tension [N/m].
-        inertia: masses and surface tension.
     """
 
     matrices: SectionSpace
     basis: sparse.csr_matrix
     stiffness: sparse.csr_matrix
-    inertia: StiffMass
 
     def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
         """Velocity v* [m/s] under the last pressure, as in space."""
@@ -142,10 +106,6 @@ class SectionEquations(GalerkinEquations):
         """B^T p, [N]."""
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
-
-    def pulled(self, _start: Floats, end: Floats) -> Floats:
-        """The projected velocity is what the implicit surface tension has resisted."""
-        return end
 
     def accelerated(self, pressure: Floats) -> Floats:
         """Change of the velocity in a step under a pressure `(n,)` [Pa]."""
