@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from reflowshock.arrays import Floats, Indices
+from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
@@ -36,7 +36,6 @@ from reflowshock.particles.ispg.galerkin import Galerkin
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
 import os
-LUMP = float(os.environ.get("LUMP", 1.0))
 ITS = []
 
 
@@ -71,7 +70,7 @@ class GalerkinEquations:
         space: shape functions and volumes.
         fluid: its density, viscosity and smoothing.
         admitted: `(n, 3, 3)` projections of the particles' velocities onto those that walls admit.
-        surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
+        stiffness: `(3 s, 3 s)` of the surface tension by particle, those of the surface are the first s [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         inertia: masses and implicit surface tension of velocities, by particle.
@@ -83,7 +82,7 @@ class GalerkinEquations:
     space: Galerkin
     fluid: Flow
     admitted: Floats
-    surface: tuple[Indices, Floats]
+    stiffness: sparse.spmatrix
     rigid: Floats
     drag: Floats
     inertia: StiffMass
@@ -169,9 +168,9 @@ class GalerkinEquations:
 
         Returns the lower triangle of S A S `(n, n)`, whose diagonal is about one, and S `(n,)`.
         """
-        space, stiff = self.space, self.masses / self.time_step
-        np.add.at(stiff, self.surface[0], LUMP * self.time_step * (self.surface[1].sum(axis=1)[:, None] - self.surface[1]))
-        roots = stiff[:, None, None] ** -0.5 * self.admitted
+        space, stiff = self.space, np.repeat(self.masses / self.time_step, 3)
+        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
+        roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
         return kernels.pressure_matrix(space.rows, space.images, space.volumes, roots)
 
     @property
@@ -184,7 +183,11 @@ class GalerkinEquations:
 
         K alone resists turning, which a surface does not: a drop would be left turning on its wall.
         """
-        return kernels.pull_back(self.surface, self.rigid, self.masses, field)
+        size, count = self.stiffness.shape[0], len(self.rigid)
+        rigid, pull = self.rigid.reshape(count, field.size), np.zeros(field.size)
+        moving = (rigid @ self.momentum(field).ravel()) @ rigid
+        pull[:size] = self.stiffness @ (field.ravel() - moving)[:size]
+        return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -212,19 +215,8 @@ class GalerkinEquations:
         return (self.fluid.smoothing * self.masses)[:, None] * rough
 
 
-def admitted_stiffness(surface: tuple[Indices, Floats], admitted: Floats) -> sparse.csr_matrix:
-    """Stiffness `(3 s, 3 s)` [N/m], by particle, of a surface's s vertices to velocities that walls admit.
-
-    Args:
-        surface: as in `GalerkinEquations`.
-        admitted: `(s, 3, 3)`.
-    """
-    triangles, weights = surface
-    count = len(admitted)
-    i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
-    pull = weights.ravel()
-    rows, columns = np.concatenate((i, j, i, j)), np.concatenate((j, i, i, j))
-    links = sparse.csr_matrix((np.concatenate((-pull, -pull, pull, pull)), (rows, columns)), shape=(count, count))
-    blocks = admitted[np.repeat(np.arange(count), np.diff(links.indptr))] @ admitted[links.indices]
-    blocks *= links.data[:, None, None]
-    return sparse.bsr_matrix((blocks, links.indices, links.indptr), shape=(3 * count, 3 * count))
+def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
+    """Stiffness `(3 s, 3 s)` by particle to velocities of the first s that walls admit by projections `(n, 3, 3)`."""
+    rows = np.repeat(np.arange(len(stiffness.indptr) - 1), np.diff(stiffness.indptr))
+    blocks = admitted[rows] @ stiffness.data @ admitted[stiffness.indices]
+    return sparse.bsr_matrix((blocks, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

@@ -10,6 +10,7 @@ the change of the velocity only.
 """
 
 from collections.abc import Mapping
+import os
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.core.surface_measure import cotangents
+from reflowshock.particles.core.surface_measure import resistance_to_change
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import Galerkin
@@ -46,12 +47,12 @@ from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
-import os
-THETA=float(os.environ.get("THETA",0))
+
+THETA=float(os.environ.get("THETA",-0.25))
 DEFER=float(os.environ.get("DEFER",1))
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
-SMOOTHING = 10.0
+SMOOTHING = float(os.environ.get("SM", 10.0))
 # Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
 EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
@@ -294,19 +295,20 @@ class PreparedIspgStep:
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
         masses = fluid.density * space.carried
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
-        surface = (body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles))
-        stiffness = admitted_stiffness(surface, self.projections[: body.cloud.surface_count])
+        surface = resistance_to_change(body.points, body.triangles, body.cloud.surface_count)
+        stiffness = self.tension * surface
+        free = admitted_stiffness(stiffness, self.projections)
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             admitted=self.projections,
-            surface=surface,
+            stiffness=stiffness,
             spacing=spacing,
             rigid=rigid,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
-            inertia=StiffMass.of(np.repeat(masses, 3), stiffness, rigid.reshape(len(rigid), -1), time_step),
+            inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), -1), time_step),
         )
 
     def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:

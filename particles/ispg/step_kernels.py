@@ -7,7 +7,6 @@ as in `galerkin_kernels`.
 import numpy as np
 from numba import njit, prange
 
-from reflowshock.particles.core.surface_measure import laplacian_product
 from reflowshock.particles.ispg.galerkin_kernels import (
     divergence,
     divergence_transposed,
@@ -47,35 +46,6 @@ def pressure_forces(rows, images, parts, pressure):
     forces = np.zeros((volumes.shape[0] + images[0].shape[0], 3))
     divergence_transposed(*rows, volumes * pressure, forces)
     return folded(forces, *images) + (volumes * pressure).sum() / volumes.sum() * unbalanced
-
-
-@njit(cache=True)
-def pressure_operator(rows, images, parts, mobility, pressure):
-    """Rates of volume `(n,)` that pressures `(n,)` make with a mobility of each particle `(n, 3, 3)`."""
-    return rates_of_volume(rows, images, parts, projected(mobility, pressure_forces(rows, images, parts, pressure)))
-
-
-@njit(cache=True)
-def pull_back(surface, rigid, masses, field):
-    """Force `(n, 3)` that a surface `(triangles, weights)` resists velocities with, but for rigid motions `(k, n, 3)`.
-
-    These, orthonormal by the masses `(n,)`, meet none, and the force moves nothing along them.
-    """
-    moving = field.copy()
-    for motion in rigid:
-        share = 0.0
-        for i in range(masses.shape[0]):
-            for c in range(3):
-                share += motion[i, c] * masses[i] * field[i, c]
-        moving -= share * motion
-    force = laplacian_product(*surface, moving)
-    result = force.copy()
-    for motion in rigid:
-        share = (motion * force).sum()
-        for i in range(masses.shape[0]):
-            for c in range(3):
-                result[i, c] -= share * masses[i] * motion[i, c]
-    return result
 
 
 @njit(cache=True)

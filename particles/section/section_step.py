@@ -50,12 +50,10 @@ class SectionEquations(GalerkinEquations):
     Attributes:
         matrices: shape functions and volumes.
         basis: `(3 n, d)` admissible velocities, by particle.
-        stiffness: `(3 n, 3 n)` of the surface tension [N/m].
     """
 
     matrices: SectionSpace
     basis: sparse.csr_matrix
-    stiffness: sparse.csr_matrix
 
     def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
         """Velocity v* [m/s] under the last pressure, as in space."""
@@ -89,13 +87,6 @@ class SectionEquations(GalerkinEquations):
         """m/dt + V + S + dt K of a velocity, [N]."""
         direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
         return direct + self.matrices.resistance(field, self.factors)
-
-    def tension(self, field: Floats) -> Floats:
-        """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, no moment."""
-        rigid = self.rigid.reshape(len(self.rigid), field.size)
-        moving = (rigid @ self.momentum(field).ravel()) @ rigid
-        pull = self.stiffness @ (field.ravel() - moving)
-        return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -148,7 +139,6 @@ class PreparedSectionStep(PreparedIspgStep):
             space=cast(Galerkin, space),  # what a step asks of either is the same
             matrices=space,
             admitted=self.projections,
-            surface=(body.triangles, np.zeros((0, 3))),
             fluid=fluid,
             basis=basis,
             stiffness=stiffness,

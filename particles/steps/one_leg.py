@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats
 from reflowshock.particles.steps.backward_difference import Base
 import os
-RADIUS = float(os.environ.get("RADIUS", 0.4))
+RADIUS = float(os.environ.get("RADIUS", 0.5))
 # Shares of the new, the present and the last state in the means; what a step carries on of the last one.
 NEW, OLD = 1.0 / (1.0 + RADIUS) ** 2, RADIUS**2 / (1.0 + RADIUS) ** 2
 CARRIED = (1.0 - 3.0 * RADIUS) / (3.0 - RADIUS)
