@@ -1,10 +1,14 @@
-"""Linear equations of a step of the Galerkin scheme: predicted velocity, then its projection.
+"""Linear equations of a step of the Galerkin scheme: friction, then what drives the liquid, with its volumes kept.
 
-    (m/dt + V + S + dt K) v* = m v_n/dt + f + B^T p
-    dt B m^-1 B^T phi = g - B v*,     v = v* + dt m^-1 B^T phi,     p_new = p + phi - mu div v*
+    (m/dt + V + S) v1 = m v_n/dt + m a
+    (m/dt + dt K) v = m v1/dt - m a + f + dt K v_guess + B^T p,     B v = g
 
 v are the velocities of the particles, m their masses, f the forces on them, V viscosity (2 mu D : D), K implicit
-surface tension, S the smoothing (1 - N)^T c m (1 - N). The shape functions N give gradients only, and the velocity
+surface tension, S the smoothing (1 - N)^T c m (1 - N), a the acceleration of the last step but for friction. Tension
+and pressure act together: where a pressure accelerates masses alone, and K resists a velocity that is predicted with
+the last pressure, tension lags by dt^3 K m^-1 grad dp/dt, which lets swings grow, the more the finer the particles are.
+Friction acts on what has been accelerated by forces in balance: on a velocity under new forces and the last pressure,
+which is rough, S takes a multiple of what it should. The shape functions N give gradients only, and the velocity
 N v that slips on walls with friction: the stress that acts on a wall reaches the particles next to it, too. Where
 particles move with N v and forces act as N^T f, as printed, a zigzag of the surface does not show: N reduces it to a
 thousandth. What evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its
@@ -35,8 +39,6 @@ from reflowshock.particles.ispg.galerkin import Galerkin
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
-import os
-ITS = []
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,62 +111,57 @@ class GalerkinEquations:
         """Kinetic energy [J]."""
         return 0.5 * float((field * self.momentum(field)).sum())
 
-    def predict(self, velocity: Floats, force: Floats) -> Floats:
-        """Velocity [m/s] that friction leaves: of viscosity, walls and smoothing.
+    def rubbed(self, velocity: Floats, force: Floats) -> Floats:
+        """Velocity [m/s] under friction: of viscosity, walls and smoothing.
 
         Args:
             velocity: that the step starts with, `(n, 3)` [m/s].
-            force: on the particles, as it is expected to be, `(n, 3)` [N].
+            force: on the particles besides, `(n, 3)` [N].
 
         Raises:
             SolveFailed: the linear solve failed.
         """
-        load = self.momentum(velocity) / self.time_step + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted))
-        solution, its = conjugate_gradients(
-            lambda field: kernels.momentum_operator(*parts, field),
-            kernels.projected(self.admitted, load),
+        parts = (self.space.rows, self.space.images, inertia, self.factors, self.admitted)
+        solution, _ = conjugate_gradients(
+            lambda field: kernels.friction_operator(*parts, field),
+            kernels.projected(self.admitted, self.momentum(velocity) / self.time_step + force),
             kernels.projected(self.admitted, velocity),
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
-        ITS.append(its)
         return solution
 
+    def driven(self, force: Floats) -> Floats:
+        """Velocity `(n, 3)` [m/s] that forces `(n, 3)` [N] give masses and surface in a step from rest."""
+        load = kernels.projected(self.admitted, force)
+        return self.inertia.solve(load.ravel()).reshape(-1, 3)
+
     def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> Floats:
-        """Pressure `(n,)` [Pa] that takes the divergence of a velocity away.
+        """Pressure `(n,)` [Pa] that takes the divergence away from a velocity.
 
         Args:
-            start: predicted velocity v*, `(n, 3)` [m/s].
+            start: the velocity, `(n, 3)` [m/s].
             rate: of the body's volume [m^3/s].
             factors: of an earlier pressure equation.
 
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, divergence = self.space, self.constraint(start)
-        missing = rate * space.volumes / space.volumes.sum() - divergence
-        enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        volumes = self.space.volumes
+        missing = rate * volumes / volumes.sum() - self.constraint(start)
+        enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
         return factors.solve(
-            lambda pressure: self.constraint(self.accelerated(pressure)),
+            lambda pressure: self.constraint(self.driven(self.push(pressure))),
             self.pressure_matrix,
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
 
-    def accelerated(self, pressure: Floats) -> Floats:
-        """Change of the velocity in a step under a pressure `(n,)` [Pa], `(n, 3)` [m/s]."""
-        return self.moved(self.push(pressure))
-
-    def moved(self, force: Floats) -> Floats:
-        load = kernels.projected(self.admitted, force)
-        return self.inertia.solve(load.ravel()).reshape(-1, 3)
-
     def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
-        """Rates of volume under such changes, A, but for what nodal integration misses, and with K by its diagonal.
+        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal.
 
         Returns the lower triangle of S A S `(n, n)`, whose diagonal is about one, and S `(n,)`.
         """
@@ -198,7 +195,7 @@ class GalerkinEquations:
         return kernels.pressure_forces(self.space.rows, self.space.images, self._parts, pressure)
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
-        """What a velocity loses to forces that the prediction v* has set."""
+        """What a velocity loses to the friction on v1, the start."""
         space = self.space
         before, after = space.rough(start), space.rough(field)
         inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())

@@ -1,4 +1,4 @@
-"""ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, with BDF2 in time.
+"""ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, by a one-leg method in time.
 
 Particles move with their own velocities v, which the shape functions N differentiate; nothing is interpolated from step
 to step. What evening out and the shift of particles below the surface displace takes the velocity there. The smoothing
@@ -10,7 +10,6 @@ the change of the velocity only.
 """
 
 from collections.abc import Mapping
-import os
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -47,12 +46,13 @@ from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
+# How long before the start of a step the velocity was that its forces are predicted with, in steps. Later ones are
+# unstable where the surface resists less than its stiffness (from 0.17 on for any such share, with RADIUS = 0.5).
+GUESS_BEFORE = 0.25
 
-THETA=float(os.environ.get("THETA",-0.25))
-DEFER=float(os.environ.get("DEFER",1))
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
-SMOOTHING = float(os.environ.get("SM", 10.0))
+SMOOTHING = 10.0
 # Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
 EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
@@ -178,7 +178,7 @@ class PreparedIspgStep:
         body, past = self.body, self.past
         last = past.history.as_long_as(time_step, past.velocity)
         base = last.base(body.points, past.velocity)
-        guess = self._guess(base)
+        guess = self._guess(last)
         predicted = replace(body, points=base.points + base.time_step * guess)
         equations = self.equations(predicted, base.time_step)
         motions = rigid_motions(predicted.points)
@@ -187,12 +187,12 @@ class PreparedIspgStep:
             base = last.base(body.points, past.velocity)
         force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
         expected = equations.momentum(past.acceleration)
-        rubbed = equations.predict(base.velocity, expected)
+        rubbed = equations.rubbed(base.velocity, expected)
         load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
-        start = equations.moved(load)
+        start = equations.driven(load)
         rate = self._rate_of_volume(last, guess, predicted, volume)
         change = equations.project(start, rate, self.solver.factors)
-        mean, pressure = start + equations.accelerated(change), past.pressure + change
+        mean, pressure = start + equations.driven(equations.push(change)), past.pressure + change
         history = last.followed_by(past.velocity, mean)
         velocity, points = past.velocity + history.velocity_change, body.points + history.displacement
         transport = history.displacement / time_step
@@ -267,10 +267,12 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
-        velocity = self.body.velocity + THETA * self.past.history.velocity_change if self.physics.momenta else np.zeros_like(self.body.points)
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+    def _guess(self, last: OneLeg) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: that of a part of a step ago, as far as a step may go."""
+        if not self.physics.momenta:
+            return np.zeros_like(self.body.points)
+        velocity = self.body.velocity - GUESS_BEFORE * last.velocity_change
+        way = last.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
 

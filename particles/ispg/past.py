@@ -58,6 +58,7 @@ class GalerkinPast:
         gradient: `(n, 3, 3)` of the velocity [1/s].
         kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
         pressure: `(n,)` coefficients [Pa].
+        acceleration: `(n, 3)` by all forces but friction [m/s^2].
         volumes: `(n,)` that the particles carried in it [m^3].
         evening: passes that even out the triangles after the next step.
         momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
@@ -102,7 +103,8 @@ class GalerkinPast:
         body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
         velocity = projected(projections, self.velocity + change)
         history = self.history.stopped(physics.pinned(body))
-        return replace(self, points=body.points, velocity=velocity, history=history)
+        acceleration = projected(projections, self.acceleration)
+        return replace(self, points=body.points, velocity=velocity, acceleration=acceleration, history=history)
 
 
 def centre(body: Body) -> Floats:
@@ -121,7 +123,13 @@ def with_step(
 ) -> LostEnergy:
     """Losses with those of a step [s], but for the way that the forces act along.
 
-    The velocities `(n, 3)` are the last, predicted and new ones [m/s].
+    Args:
+        losses: so far.
+        equations: of the step.
+        base: that it started from.
+        velocities: before and after it, `(n, 3)` [m/s].
+        acting: velocities that friction acted on, that the equations hold for, and that moved the particles.
+        time_step: [s].
 
     Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
     """

@@ -16,13 +16,12 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
-    VOLUME_TOLERANCE,
     GalerkinEquations,
 )
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
@@ -43,10 +42,6 @@ from reflowshock.particles.surface.surface_quality import SMOOTHING as EVENING
 class SectionEquations(GalerkinEquations):
     """The equations of a section, by matrices.
 
-    The projection, too, has the implicit surface tension: where pressures accelerate masses alone, what tension resists
-    is taken back a step later. That error, dt^3 gamma K m^-1 grad dp/dt, lets swings grow, the more the finer particles
-    are: with 25 steps a period 10 of them along the radius no longer decay.
-
     Attributes:
         matrices: shape functions and volumes.
         basis: `(3 n, d)` admissible velocities, by particle.
@@ -55,14 +50,14 @@ class SectionEquations(GalerkinEquations):
     matrices: SectionSpace
     basis: sparse.csr_matrix
 
-    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
-        """Velocity v* [m/s] under the last pressure, as in space."""
+    def rubbed(self, velocity: Floats, force: Floats) -> Floats:
+        """Velocity [m/s] under friction, as in space."""
         basis, across = self.basis, self.basis.T
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        load = self.momentum(velocity) / self.time_step + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inverse = self.time_step / (across @ np.repeat(self.masses, 3))
         solution, _ = conjugate_gradients(
-            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
+            lambda free: across @ self.friction((basis @ free).reshape(-1, 3)).ravel(),
             across @ load.ravel(),
             across @ velocity.ravel(),
             lambda residual: inverse * residual,
@@ -70,23 +65,13 @@ class SectionEquations(GalerkinEquations):
         )
         return (basis @ solution).reshape(-1, 3)
 
-    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
-        """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa], as in space."""
-        volumes, divergence = self.matrices.volumes, self.constraint(start)
-        missing = rate * volumes / volumes.sum() - divergence
-        enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        potential = factors.solve(
-            lambda pressure: self.constraint(self.accelerated(pressure)),
-            self.pressure_matrix,
-            missing,
-            Tolerance(VOLUME_TOLERANCE, enough),
-        )
-        return start + self.accelerated(potential), potential - self.fluid.viscosity * divergence / volumes
+    def friction(self, field: Floats) -> Floats:
+        """m/dt + V + S of a velocity, [N]."""
+        return self.momentum(field) / self.time_step + self.matrices.resistance(field, self.factors)
 
-    def operator(self, field: Floats) -> Floats:
-        """m/dt + V + S + dt K of a velocity, [N]."""
-        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
-        return direct + self.matrices.resistance(field, self.factors)
+    def driven(self, force: Floats) -> Floats:
+        """Velocity `(n, 3)` [m/s] that forces give masses and surface in a step, as in space."""
+        return (self.basis @ self.inertia.solve(self.basis.T @ force.ravel())).reshape(-1, 3)
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -98,12 +83,8 @@ class SectionEquations(GalerkinEquations):
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
 
-    def accelerated(self, pressure: Floats) -> Floats:
-        """Change of the velocity in a step under a pressure `(n,)` [Pa]."""
-        return (self.basis @ self.inertia.solve(self.basis.T @ self.push(pressure).ravel())).reshape(-1, 3)
-
     def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
-        """Rates of volume under such changes, A, but for what nodal integration misses.
+        """Rates of volume under pressures, A, but for what nodal integration misses.
 
         Returns the lower triangle of S A S `(n, n)`, whose diagonal is one, and S `(n,)`.
         """
