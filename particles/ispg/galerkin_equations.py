@@ -124,7 +124,7 @@ class GalerkinEquations:
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        parts = (self.space.rows, self.space.images, inertia, self.factors, self.admitted)
+        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted))
         solution, _ = conjugate_gradients(
             lambda field: kernels.friction_operator(*parts, field),
             kernels.projected(self.admitted, self.momentum(velocity) / self.time_step + force),

@@ -21,14 +21,14 @@ from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.core.surface_measure import resistance_to_change
+from reflowshock.particles.core.surface_measure import area_stiffness
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
+from reflowshock.particles.ispg.past import Acting, GalerkinPast, LostEnergy, centre, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
     admitted_motions,
@@ -40,16 +40,14 @@ from reflowshock.particles.ispg.rigid_motions import (
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
-# How long before the start of a step the velocity was that its forces are predicted with, in steps. Later ones are
-# unstable where the surface resists less than its stiffness (from 0.17 on for any such share, with RADIUS = 0.5).
+# Forces are predicted with the velocity of this part of a step before: with later ones modes that resist less than
+# their stiffness K grow (linear analysis: from 0.17 on with RADIUS = 0.5, whatever the share of K).
 GUESS_BEFORE = 0.25
-
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
 SMOOTHING = 10.0
@@ -201,7 +199,8 @@ class PreparedIspgStep:
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
-        losses = with_step(losses, equations, base, (past.velocity, velocity), (rubbed, mean, transport), time_step)
+        acting = Acting(rubbed, (mean - base.velocity) / base.time_step, transport)
+        losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
         potential = self.physics.energy(replace(body, points=points))
         pull = force - base.time_step * equations.tension(mean) + equations.push(pressure)
         work = time_step * float((pull * transport).sum())
@@ -233,7 +232,7 @@ class PreparedIspgStep:
         )
 
     def _with_momenta(self, equations: GalerkinEquations, last: OneLeg, motions: Floats) -> tuple[GalerkinPast, OneLeg]:
-        """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
+        """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
@@ -297,8 +296,7 @@ class PreparedIspgStep:
         space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
         masses = fluid.density * space.carried
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
-        surface = resistance_to_change(body.points, body.triangles, body.cloud.surface_count)
-        stiffness = self.tension * surface
+        stiffness = self.tension * area_stiffness(body.points, body.triangles, body.cloud.surface_count)
         free = admitted_stiffness(stiffness, self.projections)
         return GalerkinEquations(
             space=space,
@@ -310,7 +308,7 @@ class PreparedIspgStep:
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
-            inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), -1), time_step),
+            inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), 3 * len(masses)), time_step),
         )
 
     def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:

@@ -12,7 +12,6 @@ from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
 
 
@@ -113,30 +112,37 @@ def centre(body: Body) -> Floats:
     return first / volume
 
 
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """What acted in a step, `(n, 3)`.
+
+    Attributes:
+        rubbed: velocity that friction acted on [m/s].
+        acceleration: [m/s^2].
+        transport: velocity that moved the particles [m/s].
+    """
+
+    rubbed: Floats
+    acceleration: Floats
+    transport: Floats
+
+
 def with_step(
     losses: LostEnergy,
     equations: GalerkinEquations,
-    base: Base,
     velocities: tuple[Floats, Floats],
-    acting: tuple[Floats, Floats, Floats],
+    acting: Acting,
     time_step: float,
 ) -> LostEnergy:
     """Losses with those of a step [s], but for the way that the forces act along.
 
-    Args:
-        losses: so far.
-        equations: of the step.
-        base: that it started from.
-        velocities: before and after it, `(n, 3)` [m/s].
-        acting: velocities that friction acted on, that the equations hold for, and that moved the particles.
-        time_step: [s].
+    The velocities `(n, 3)` are those before and after it [m/s].
 
     Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
     """
     last, now = velocities
-    rubbed, mean, way = acting
-    power = equations.losses(rubbed, way)
-    change = time_step / base.time_step * float((way * equations.momentum(mean - base.velocity)).sum())
+    power = equations.losses(acting.rubbed, acting.transport)
+    change = time_step * float((acting.transport * equations.momentum(acting.acceleration)).sum())
     gain = equations.kinetic(now) - equations.kinetic(last)
     return replace(
         losses,

@@ -49,12 +49,13 @@ def pressure_forces(rows, images, parts, pressure):
 
 
 @njit(cache=True)
-def friction_operator(rows, images, inertia, factors, admitted, field):
+def friction_operator(rows, images, resisted, field):
     """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia and friction.
 
-    ``inertia``: masses over the time step `(n,)` [kg/s]; ``factors`` of `resistance`; ``admitted``: projections of the
-    particles `(n, 3, 3)`.
+    ``resisted``: masses over the time step `(n,)` [kg/s], factors of `resistance`, projections of the particles
+    `(n, 3, 3)`.
     """
+    inertia, factors, admitted = resisted
     force = folded(resistance(*rows, reflected(field, *images), factors), *images)
     for i in range(field.shape[0]):
         for c in range(3):
@@ -113,10 +114,10 @@ def _by_particle(starts, particle, entries):
 
 @njit(cache=True, parallel=True)
 def pressure_matrix(rows, images, volumes, roots):
-    """Lower triangle of the matrix A of rates of volume under pressures, in single precision, but for what is unbalanced.
+    """Lower triangle, in single precision, of the matrix A of rates of volume under pressures.
 
-    ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S `(n, n)`, whose diagonal is about one, zero above it, and S
-    `(n,)`.
+    Without what is unbalanced. ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S `(n, n)`,
+    whose diagonal is about one, zero above it, and S `(n,)`.
     """
     starts = rows[0]
     count = starts.shape[0] - 1
