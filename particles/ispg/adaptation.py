@@ -21,7 +21,6 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import GalerkinPast
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
 
 # The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
@@ -229,5 +228,5 @@ def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
         pressure=change.mean(past.pressure),
         acceleration=change.mean(past.acceleration),
         volumes=change.mean(past.volumes),
-        history=OneLeg(displacement, change_of_velocity, last.time_step),
+        history=replace(last, displacement=displacement, velocity_change=change_of_velocity),
     )

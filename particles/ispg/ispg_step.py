@@ -40,6 +40,7 @@ from reflowshock.particles.ispg.rigid_motions import (
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
@@ -174,24 +175,23 @@ class PreparedIspgStep:
             NoVolumes: the particles do not fill the body.
         """
         body, past = self.body, self.past
-        last = past.history.as_long_as(time_step, past.velocity)
-        base = last.base(body.points, past.velocity)
-        guess = self._guess(last)
+        base = past.history.base(body.points, past.velocity, time_step)
+        guess = self._guess(base)
         predicted = replace(body, points=base.points + base.time_step * guess)
         equations = self.equations(predicted, base.time_step)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past, last = self._with_momenta(equations, last, motions)
-            base = last.base(body.points, past.velocity)
+            past = self._with_momenta(equations, motions)
+            base = past.history.base(body.points, past.velocity, time_step)
         force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
         expected = equations.momentum(past.acceleration)
         rubbed = equations.rubbed(base.velocity, expected)
         load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
         start = equations.driven(load)
-        rate = self._rate_of_volume(last, guess, predicted, volume)
+        rate = self._rate_of_volume(guess, predicted, (time_step, volume))
         change = equations.project(start, rate, self.solver.factors)
         mean, pressure = start + equations.driven(equations.push(change)), past.pressure + change
-        history = last.followed_by(past.velocity, mean)
+        history = past.history.followed_by(past.velocity, mean, time_step)
         velocity, points = past.velocity + history.velocity_change, body.points + history.displacement
         transport = history.displacement / time_step
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
@@ -231,7 +231,7 @@ class PreparedIspgStep:
             iterations=self.solver.factors.iterations,
         )
 
-    def _with_momenta(self, equations: GalerkinEquations, last: OneLeg, motions: Floats) -> tuple[GalerkinPast, OneLeg]:
+    def _with_momenta(self, equations: GalerkinEquations, motions: Floats) -> GalerkinPast:
         """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
@@ -248,16 +248,17 @@ class PreparedIspgStep:
             return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
 
         if not kept.any():
-            return past, last
-        share = last.time_step / past.history.time_step
-        change = corrected(last.velocity_change, share * past.momenta_change)
-        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(last, velocity_change=change)
+            return past
+        change = corrected(past.history.velocity_change, past.momenta_change)
+        history = replace(past.history, velocity_change=change)
+        return replace(past, velocity=corrected(past.velocity, past.momenta), history=history)
 
-    def _rate_of_volume(self, last: OneLeg, guess: Floats, predicted: Body, volume: float) -> float:
-        """Rate [m^3/s] with which the body ends the step at a volume [m^3]; slopes are those of predicted positions."""
-        way = last.followed_by(self.past.velocity, guess).displacement
+    def _rate_of_volume(self, guess: Floats, predicted: Body, end: tuple[float, float]) -> float:
+        """Rate [m^3/s] with which a step [s] ends at a volume [m^3], both in `end`; slopes are those predicted."""
+        (time_step, volume), past = end, self.past
+        way = past.history.followed_by(past.velocity, guess, time_step).displacement
         enclosed, slope = replace(predicted, points=self.body.points + way).volume()[0], predicted.volume()[1]
-        return (volume - enclosed) / last.leg + float((slope * guess).sum())
+        return (volume - enclosed) / past.history.leg(time_step) + float((slope * guess).sum())
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
@@ -266,12 +267,12 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, last: OneLeg) -> Floats:
+    def _guess(self, base: Base) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: that of a part of a step ago, as far as a step may go."""
         if not self.physics.momenta:
             return np.zeros_like(self.body.points)
-        velocity = self.body.velocity - GUESS_BEFORE * last.velocity_change
-        way = last.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+        velocity = self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return velocity if way <= bound else bound / way * velocity
 
