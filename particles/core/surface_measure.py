@@ -220,9 +220,9 @@ def area_stiffness(points: Floats, triangles: Indices, count: int) -> sparse.bsr
     """Stiffness `(3 count, 3 count)`, by point, no unit, that stands for the second derivative of the area.
 
     A share of `cotangent_laplacian` in all directions, the rest across each triangle. Along a flat surface its area
-    does not resist, at edges it resists in all directions. For swings of a ball at its volume in mode n = 2 the stiffness is
-    0.99 times the second derivative (1.25 with all directions alone, 0.38 with none), 1.14 for n = 3; for waves of the
-    grid it is 1.
+    does not resist, at edges it resists in all directions. For swings of a ball at its volume in mode n = 2 the
+    stiffness is 0.99 times the second derivative (1.25 with all directions alone, 0.38 with none), 1.14 for n = 3; for
+    waves of the grid it is 1.
     """
     i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
     own = np.arange(count)
