@@ -28,7 +28,7 @@ NEW, OLD = 1.0 / (1.0 + RADIUS) ** 2, RADIUS**2 / (1.0 + RADIUS) ** 2
 class OneLeg:
     """The last step: its displacement and change of velocity, `(n, 3)`, and its size [s]; infinite at the start.
 
-    The first step is one of backward Euler.
+    The first step is one by the midpoint rule.
     """
 
     displacement: Floats
@@ -71,7 +71,7 @@ class OneLeg:
     def _shares(self, time_step: float) -> tuple[float, float, float]:
         """Of the new and the last state in the means, and what a step [s] carries on of the last one: w."""
         if not np.isfinite(self.time_step):
-            return 1.0, 0.0, 0.0
+            return 0.5, 0.0, 0.0
         ratio = time_step / self.time_step
         middle = NEW - OLD / ratio
         return NEW, OLD, (2.0 * middle - 1.0) * ratio**2 / (1.0 + 2.0 * middle * ratio)
