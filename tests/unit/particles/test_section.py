@@ -169,9 +169,9 @@ def test_a_free_drop_swings_in_time(chain):
 
 @pytest.mark.parametrize("chain", [MERIDIAN, RING], ids=["meridian", "plane"])
 def test_long_steps_damp_a_swing(chain):
-    """With tension in the prediction alone, as in space, it grows with 16 steps a period: pressures run after it."""
+    """By little more than viscosity; with tension in a prediction alone it grew."""
     _, decay, flow = swung(chain, 8, 16, 2)
-    assert decay > 1.0
+    assert 0.9 < decay < 1.5
     assert flow.solver.past.losses.integration > 0.0
 
 
