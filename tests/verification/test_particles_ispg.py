@@ -22,7 +22,6 @@ from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.particles.steps.relaxation import Relaxation
-from reflowshock.particles.steps.rest import NoRest
 from reflowshock.particles.steps.time_step import LONGEST_OF_SWING, TimeStep
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
@@ -120,11 +119,10 @@ def test_a_joint_swings_and_comes_to_rest(gap):
     assert abs(metrics["axial_force_error"]) < 0.005
 
 
-@pytest.mark.xfail(raises=NoRest, strict=True, reason="slides on: an edge catches one vertex for four steps")
 def test_a_squeezed_joint_comes_to_rest_on_the_mask():
     """Edges that held vertices left it turning about its axis, 3.7e-3 spacings in 20 capillary limits, for ever.
 
-    It does not turn any more, and its shape rests, but nothing on smooth masks ends a uniform motion.
+    Later it slid on: an edge caught one vertex for four steps, and nothing on smooth masks ends a uniform motion.
     """
     metrics, verdict = joint_at_rest(JointGeometry(0.22e-3, 0.24e-3, 0.24e-3))
     assert verdict == "overflow"
@@ -170,12 +168,13 @@ def test_a_heavy_drop_rests_in_its_exact_shape(count, degrees, bond):
     assert metrics["particles_lost"] == 0
 
 
-FRICTION = [(5, 60.0, {"wall": "slip", "slip_length": 5e-5}), (5, 120.0, {"wall": "no-slip"})]
+FRICTION = [(7, 60.0, {"wall": "slip", "slip_length": 5e-5}), (5, 120.0, {"wall": "no-slip"})]
 FINER = [(count, angle, wall) for count in (7, 11) for angle in (60.0, 120.0) for _, _, wall in FRICTION]
 
 
 @pytest.mark.parametrize(
-    ("count", "degrees", "wall"), [*FRICTION, *(pytest.param(*row, marks=pytest.mark.long) for row in FINER)]
+    ("count", "degrees", "wall"),
+    [*FRICTION, *(pytest.param(*row, marks=pytest.mark.long) for row in FINER if row not in FRICTION)],
 )
 def test_walls_with_friction_do_not_change_the_rest(count, degrees, wall):
     """Such drops crawled along their wall for ever, driven by the evening out of triangles."""
