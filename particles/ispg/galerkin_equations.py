@@ -22,20 +22,29 @@ They add up to the rate of the enclosed volume: what nodal integration misses of
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces of an
 energy of the particles, no mode of the linearised scheme grows. The gradient that is collocated, as printed, has modes
 that do.
+
+Where walls move, velocities are v = q + w: w what walls prescribe, the velocity of a wall across it and of what it
+holds, q what they admit. Images move with their walls (`Ghosts.drift`), friction acts on what slides on them.
 """
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.rigid_motions import Riders, wall_velocities
 
+Drive = Callable[[Floats, Floats], Floats]
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
@@ -76,6 +85,8 @@ class GalerkinEquations:
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
         inertia: masses and implicit surface tension of velocities, by particle.
+        walls: `(n, 3)` velocities that walls prescribe at the particles on them [m/s], zero elsewhere.
+        riders: motions of plates that float.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -88,6 +99,8 @@ class GalerkinEquations:
     rigid: Floats
     drag: Floats
     inertia: StiffMass
+    walls: Floats
+    riders: Riders | None
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -124,28 +137,68 @@ class GalerkinEquations:
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted))
+        load = self.momentum(velocity) / self.time_step + force - self._carried_along()
+        parts = (self.space.rows, self.space.images)
+        operator: Apply = partial(kernels.friction_operator, *parts, (inertia, self.factors, self.admitted))
+        right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given
+        if self.riders is not None:
+            unheld = np.broadcast_to(np.eye(3), self.admitted.shape).copy()
+            operator = self._ridden(partial(kernels.friction_operator, *parts, (inertia, self.factors, unheld)))
+            right = self._admitted_load(load, np.zeros(len(self.riders.loads)))
+            begun = begun + self.riders.along(velocity)
         solution, _ = conjugate_gradients(
-            lambda field: kernels.friction_operator(*parts, field),
-            kernels.projected(self.admitted, self.momentum(velocity) / self.time_step + force),
-            kernels.projected(self.admitted, velocity),
+            operator,
+            right,
+            begun,
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
         return solution
 
-    def driven(self, force: Floats) -> Floats:
-        """Velocity `(n, 3)` [m/s] that forces `(n, 3)` [N] give masses and surface in a step from rest."""
-        load = kernels.projected(self.admitted, force)
-        return self.inertia.solve(load.ravel()).reshape(-1, 3)
+    def driver(self) -> Drive:
+        """How forces `(n, 3)` [N], and more on plates that float `(k,)`, move masses and surface in a step from rest.
 
-    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> Floats:
+        The velocity `(n, 3)` [m/s] is one that walls admit, with those of plates that float.
+        """
+
+        def admitted(force: Floats) -> Floats:
+            return self.inertia.solve(kernels.projected(self.admitted, force).ravel()).reshape(-1, 3)
+
+        riders = self.riders
+        if riders is None:
+            return lambda force, _: admitted(force)
+        pulls = self.time_step * np.array([self.tension(field) for field in riders.fields])
+        taken = np.array([admitted(pull) for pull in pulls])
+        resisting = np.tensordot(pulls, riders.fields - taken, ((1, 2), (1, 2))) + np.eye(len(pulls)) / self.time_step
+
+        def drive(force: Floats, on_plates: Floats) -> Floats:
+            field = admitted(force)
+            load = np.tensordot(riders.fields, force, 2) + on_plates - np.tensordot(pulls, field, 2)
+            return field + np.tensordot(np.linalg.solve(resisting, load), riders.fields - taken, 1)
+
+        return drive
+
+    def beyond_given(self, load: Floats) -> Floats:
+        """Forces `(n, 3)` [N] less what velocities that walls prescribe take of them."""
+        given = self.given
+        return load - self.momentum(given) / self.time_step - self.time_step * self.tension(given)
+
+    def on_images(self, pressure: Floats) -> Floats:
+        """What pressures `(n,)` [Pa] on images add to the forces on plates that float `(k,)`."""
+        return self._image_rates() @ pressure
+
+    def on_plates(self, pressure: Floats) -> Floats:
+        """The same with the loads on them."""
+        return self.on_images(pressure) + (0.0 if self.riders is None else self.riders.loads)
+
+    def project(self, start: Floats, rate: float, factors: LaggedCholesky, drive: Drive) -> Floats:
         """Pressure `(n,)` [Pa] that takes the divergence away from a velocity.
 
         Args:
             start: the velocity, `(n, 3)` [m/s].
             rate: of the body's volume [m^3/s].
             factors: of an earlier pressure equation.
+            drive: of `driver`.
 
         Raises:
             SolveFailed: the linear solve failed.
@@ -153,12 +206,62 @@ class GalerkinEquations:
         volumes = self.space.volumes
         missing = rate * volumes / volumes.sum() - self.constraint(start)
         enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        images = self._image_rates()
         return factors.solve(
-            lambda pressure: self.constraint(self.driven(self.push(pressure))),
+            lambda pressure: self._admitted_rates(drive(self.push(pressure), images @ pressure), images),
             self.pressure_matrix,
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
+
+    def _admitted_rates(self, field: Floats, images: Floats) -> Floats:
+        """Rates of volume `(n,)` of a velocity that walls admit, with those of images `(k, n)` of plates that float."""
+        rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        return rates if self.riders is None else rates + self.riders.rates(field) @ images
+
+    def _ridden(self, operator: Apply) -> Apply:
+        """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
+
+        The forces on images that a motion of a plate makes have a power in the others, and on the particles.
+        """
+        riders, drifts = cast(Riders, self.riders), cast(tuple, self.space.riding)[1]
+        still = np.zeros_like(self.walls)
+        stresses = [
+            kernels.resistance(*self.space.rows, np.concatenate((still, drift)), self.factors) for drift in drifts
+        ]
+        forces = np.array([kernels.folded(stress, *self.space.images) for stress in stresses])
+        among = np.tensordot(np.array(stresses)[:, len(still) :], drifts, ((1, 2), (1, 2)))
+
+        def ridden(field: Floats) -> Floats:
+            rates = riders.rates(field)
+            force = operator(field) + np.tensordot(rates, forces, 1)
+            return self._admitted_load(force, np.tensordot(forces, field, 2) + among @ rates)
+
+        return ridden
+
+    def _admitted_load(self, force: Floats, on_images: Floats) -> Floats:
+        """Forces `(n, 3)` that walls admit; on plates that float by these, and by more `(k,)` on images and plates."""
+        riders = cast(Riders, self.riders)
+        on_plates = np.tensordot(riders.fields, force, 2) + on_images
+        return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)
+
+    def _image_rates(self) -> Floats:
+        """Rates of volume `(k, n)` that images of plates that float make."""
+        if self.riders is None:
+            return np.zeros((0, len(self.walls)))
+        drifts, still = cast(tuple, self.space.riding)[1], np.zeros_like(self.walls)
+        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in drifts])
+
+    def _rates_of_images(self, images: Floats) -> Floats:
+        """Rates of volume `(n,)` of velocities of images alone `(n + g, 3)`, none in all."""
+        return self._balanced(self.space.volumes * kernels.divergence(*self.space.rows, images))
+
+    def twists(self, velocity: Floats, floating: Collection[int]) -> dict[int, Floats]:
+        """Twists `(6,)` of the plates that float, of a velocity `(n, 3)` [m/s]."""
+        if self.riders is None:
+            return {}
+        found = np.tensordot(self.riders.rates(velocity), self.riders.twists, 1)
+        return {wall: found[wall] for wall in floating}
 
     def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
         """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal.
@@ -169,6 +272,16 @@ class GalerkinEquations:
         stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
         roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
         return kernels.pressure_matrix(space.rows, space.images, space.volumes, roots)
+
+    @property
+    def given(self) -> Floats:
+        """Velocities `(n, 3)` that walls prescribe [m/s]."""
+        return self.walls - kernels.projected(self.admitted, self.walls)
+
+    def _carried_along(self) -> Floats:
+        """What resists particles at rest next to walls that move `(n, 3)` [N]."""
+        still = np.zeros_like(self.walls)
+        return self.space.resistance(still, self.factors) - self.space.shown(self.drag[:, None] * self.walls)
 
     @property
     def _parts(self) -> tuple[Floats, Floats]:
@@ -187,8 +300,13 @@ class GalerkinEquations:
         return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
-        """B v: rates of volume `(n,)` [m^3/s]."""
-        return kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
+        rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        return rates + self._rates_of_images(np.concatenate((np.zeros_like(field), self.space.driven(field))))
+
+    def _balanced(self, rates: Floats) -> Floats:
+        """Rates `(n,)` less their sum, which is shared out by the volumes."""
+        return rates - rates.sum() / self.space.volumes.sum() * self.space.volumes
 
     def push(self, pressure: Floats) -> Floats:
         """B^T p, [N]."""
@@ -199,8 +317,39 @@ class GalerkinEquations:
         space = self.space
         before, after = space.rough(start), space.rough(field)
         inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
-        on_walls = float((self.drag[:, None] * (start - before) * (field - after)).sum())
+        sliding = (start - before - self.walls) * (field - after - self.walls)
+        on_walls = float((self.drag[:, None] * sliding).sum())
         return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
+
+    def reaction(
+        self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
+    ) -> tuple[Floats, Floats]:
+        """Forces of walls that hold or rub the liquid: at particles `(n, 3)` and, by stress, at images `(g, 3)` [N].
+
+        Their power in the velocity of a wall there, `Ghosts.drift` at the images, is what it gives the liquid.
+
+        Args:
+            velocities: that the step started with, that friction acted on, and the projected one, `(n, 3)` [m/s].
+            force: with that of the surface tension in the prediction, `(n, 3)` [N].
+            pressure: that has acted, `(n,)` [Pa].
+        """
+        (before, start, now), space, count = velocities, self.space, len(force)
+        rows, volumes = space.rows, space.volumes
+        rub = self.drag[:, None] * (start - space.rough(start) - self.walls)
+        stress = kernels.resistance(*rows, space.with_images(start), self.factors)
+        stress -= space.shape.T @ (self.drag[:, None] * self.walls)
+        inertia = self.momentum(now - before) / self.time_step
+        pull = force - self.time_step * self.tension(now) + self.push(pressure)
+        missing = inertia + kernels.folded(stress, *space.images) - pull
+        thrust = np.zeros_like(stress)
+        kernels.divergence_transposed(*rows, self._balanced(volumes * pressure), thrust)
+        return missing - kernels.projected(self.admitted, missing) - rub, (stress - thrust)[count:]
+
+    def power(self, body: Body, twists: Mapping[int, Floats], forces: tuple[Floats, Floats]) -> float:
+        """Power [W] of the forces of `reaction` where the plates of the body have some twists `(6,)`."""
+        on_walls, on_images = forces
+        at_walls, at_images = wall_velocities(body, twists), self.space.drift_of(body, twists)
+        return float((on_walls * at_walls).sum() + (on_images * at_images).sum())
 
     def _stress(self, gradient: Floats) -> Floats:
         """Viscous stress times volume `(n, 3, 3)` [N m]."""

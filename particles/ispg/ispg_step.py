@@ -24,23 +24,29 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import area_stiffness
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import Acting, GalerkinPast, LostEnergy, centre, with_step
+from reflowshock.particles.ispg.past import Acting, GalerkinPast, LostEnergy, centre, evening_passes, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
+    PlateSteps,
+    Riders,
     admitted_motions,
     edges_turn,
+    held,
     orthonormal,
     rigid_momenta,
     rigid_motions,
+    wall_velocities,
 )
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
+from reflowshock.particles.steps.descent import ARRIVED
 from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
@@ -52,8 +58,6 @@ GUESS_BEFORE = 0.25
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
 SMOOTHING = 10.0
-# Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
-EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
 # of a surface at rest by 4 % of a spacing, and drops of 5 an edge are 1 % too high with one at the top.
 FLIP_WORTH = 0.1
@@ -131,7 +135,11 @@ class IspgStep:
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
         past = self.past
-        kept = past and fields_of(past) | {"history": fields_of(past.history), "losses": fields_of(past.losses)}
+        kept = past and fields_of(past) | {
+            "history": fields_of(past.history),
+            "losses": fields_of(past.losses),
+            "plates": {str(wall): moved for wall, moved in past.plates.items()},
+        }
         return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -139,7 +147,8 @@ class IspgStep:
         past = saved["past"]
         if past:
             history, losses = OneLeg(**past["history"]), LostEnergy(**past["losses"])
-            past = GalerkinPast(**{**past, "history": history, "losses": losses})
+            plates = {int(wall): moved for wall, moved in past["plates"].items()}
+            past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
@@ -176,9 +185,12 @@ class PreparedIspgStep:
         """
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
-        guess = self._guess(base)
-        predicted = replace(body, points=base.points + base.time_step * guess)
-        equations = self.equations(predicted, base.time_step)
+        pace = self._pace(base)
+        given, guessed = self._given_twists(time_step), self._guessed_twists(pace)
+        guess = self._guess(pace, given | guessed)
+        ways = self._plates.middle_ways(given | guessed, time_step)
+        predicted = body.placed(base.points + base.time_step * guess, ways)
+        equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past = self._with_momenta(equations, motions)
@@ -187,27 +199,43 @@ class PreparedIspgStep:
         expected = equations.momentum(past.acceleration)
         rubbed = equations.rubbed(base.velocity, expected)
         load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
-        start = equations.driven(load)
-        rate = self._rate_of_volume(guess, predicted, (time_step, volume))
-        change = equations.project(start, rate, self.solver.factors)
-        mean, pressure = start + equations.driven(equations.push(change)), past.pressure + change
+        drive = equations.driver()
+        start = equations.given + drive(equations.beyond_given(load), equations.on_plates(past.pressure))
+        rate = self._rate_of_volume(guess, predicted, given | guessed, (time_step, volume))
+        change = equations.project(start, rate, self.solver.factors, drive)
+        mean = start + drive(equations.push(change), equations.on_images(change))
+        pressure = past.pressure + change
+        twists = given | equations.twists(mean, guessed)
+        plates = self._plates.next(twists, time_step)
+        ways = {wall: plate.displacement for wall, plate in plates.items()}
         history = past.history.followed_by(past.velocity, mean, time_step)
-        velocity, points = past.velocity + history.velocity_change, body.points + history.displacement
+        velocity = past.velocity + history.velocity_change
+        moved = body.placed(body.points + history.displacement, ways)
+        history = replace(history, displacement=moved.points - body.points)
         transport = history.displacement / time_step
-        mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
+        volumes = equations.space.volumes
+        mean_pressure = float(pressure @ volumes / volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
-        acting = Acting(rubbed, (mean - base.velocity) / base.time_step, transport)
+        way = mean if plates else transport
+        acting = Acting(rubbed, (mean - base.velocity) / base.time_step, way)
         losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
-        potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(mean) + equations.push(pressure)
-        work = time_step * float((pull * transport).sum())
+        potential = self.physics.energy(moved)
+        driving = force - base.time_step * equations.tension(mean)
+        loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
+        work = time_step * (float((driving * way).sum() + pressure @ equations.constraint(way)) + loads)
+        done, pull = 0.0, float("nan")
+        if given:
+            forces = equations.reaction((base.velocity, rubbed, mean), force, pressure)
+            done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
+            work += time_step * equations.power(predicted, given, forces) - done
+        losses = replace(losses, plates=losses.plates - done)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
-            points=points,
+            points=moved.points,
             centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
             velocity=velocity,
             gradient=gradient,
@@ -216,20 +244,32 @@ class PreparedIspgStep:
             pressure=pressure,
             acceleration=past.acceleration + (mean - rubbed) / base.time_step,
             volumes=equations.space.carried,
-            evening=_passes(gradient, equations.fluid, time_step),
+            evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
             momenta_change=gain,
             history=history,
             losses=replace(losses, integration=losses.integration + self.energy - potential - work),
+            plates=self._plates.kept(plates),
         )
         return Motion(
             velocity=velocity,
             transport=transport,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
-            twists={},
+            twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
+            pull=pull,
         )
+
+    def _plate_work(
+        self, body: Body, equations: GalerkinEquations, ways: dict[int, Floats], forces: tuple[Floats, Floats]
+    ) -> tuple[float, float]:
+        """Work of plates on their ways `(6,)` [J] by the forces of `GalerkinEquations.reaction`, mean force along them.
+
+        There is no such force where they have arrived.
+        """
+        done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
+        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _with_momenta(self, equations: GalerkinEquations, motions: Floats) -> GalerkinPast:
         """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
@@ -253,12 +293,15 @@ class PreparedIspgStep:
         history = replace(past.history, velocity_change=change)
         return replace(past, velocity=corrected(past.velocity, past.momenta), history=history)
 
-    def _rate_of_volume(self, guess: Floats, predicted: Body, end: tuple[float, float]) -> float:
+    def _rate_of_volume(
+        self, guess: Floats, predicted: Body, twists: Mapping[int, Floats], end: tuple[float, float]
+    ) -> float:
         """Rate [m^3/s] with which a step [s] ends at a volume [m^3], both in `end`; slopes are those predicted."""
         (time_step, volume), past = end, self.past
         way = past.history.followed_by(past.velocity, guess, time_step).displacement
-        enclosed, slope = replace(predicted, points=self.body.points + way).volume()[0], predicted.volume()[1]
-        return (volume - enclosed) / past.history.leg(time_step) + float((slope * guess).sum())
+        ways = {wall: plate.displacement for wall, plate in self._plates.next(twists, time_step).items()}
+        enclosed = self.body.placed(self.body.points + way, ways).volume()[0]
+        return (volume - enclosed) / past.history.leg(time_step) + float((predicted.volume()[1] * guess).sum())
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
@@ -267,14 +310,39 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: that of a part of a step ago, as far as a step may go."""
+    @property
+    def _plates(self) -> PlateSteps:
+        return PlateSteps(self.past.plates, self.past.history.time_step)
+
+    def _given_twists(self, time_step: float) -> dict[int, Floats]:
+        """Mean twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+        moved = [motion for motion in self.physics.motions if not len(motion.directions)]
+        ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
+        return {wall: self._plates.last(wall).mean_along(way, time_step) for wall, way in ways.items()}
+
+    def _guessed_twists(self, pace: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
+        walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
+        return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
+
+    def _pace(self, base: Base) -> float:
+        """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
+        way = base.time_step * float(np.sqrt((self._before() ** 2).sum(axis=1).max()))
+        bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
+        return 1.0 if way <= bound else bound / way
+
+    def _before(self) -> Floats:
+        """Velocity of a part of a step ago `(n, 3)` [m/s]."""
         if not self.physics.momenta:
             return np.zeros_like(self.body.points)
-        velocity = self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
-        bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        return velocity if way <= bound else bound / way * velocity
+        return self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+
+    def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: that before, at a share of its pace, and that of plates."""
+        velocity = pace * self._before()
+        if not twists:
+            return velocity
+        return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
 
     def fluid(self, spacing: float) -> Flow:
         """What the liquid is made of, of particles at a spacing [m]."""
@@ -288,14 +356,18 @@ class PreparedIspgStep:
         """Surface tension of the liquid [N/m]."""
         return sum(part.coefficient for part in self.physics.operators if isinstance(part, SurfaceTension))
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a body at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a body at other positions, for a time step [s]; its plates move with twists `(6,)`."""
         fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
-        held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
+        clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
-        space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
+        space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
         masses = fluid.density * space.carried
+        riders = Riders.of(self.physics.motions, body, self.projections, masses)
+        if riders is not None:
+            drifts = np.array([space.drift_of(body, dict(enumerate(twist))) for twist in riders.twists])
+            space = replace(space, riding=(riders.momenta, drifts))
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
         stiffness = self.tension * area_stiffness(body.points, body.triangles, body.cloud.surface_count)
         free = admitted_stiffness(stiffness, self.projections)
@@ -306,6 +378,8 @@ class PreparedIspgStep:
             stiffness=stiffness,
             spacing=spacing,
             rigid=rigid,
+            walls=wall_velocities(body, twists),
+            riders=riders,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
@@ -319,17 +393,3 @@ class PreparedIspgStep:
         evening = past.potential - self.energy
         losses = past.losses
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
-
-
-def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
-    """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
-
-    Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a
-    swing each time that it strains them: 5 % in two periods, with 309 particles.
-    """
-    strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
-    return min(
-        1.0,
-        EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
-        + EVENING_RATE * time_step * fluid.smoothing / SMOOTHING,
-    )

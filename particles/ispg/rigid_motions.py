@@ -1,7 +1,7 @@
 """Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.steps.one_leg import OneLeg
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
@@ -48,6 +50,104 @@ def rigid_motions(points: Floats) -> Floats:
         motions[axis, :, axis] = 1.0
         motions[3 + axis, :, axis - 2], motions[3 + axis, :, axis - 1] = -points[:, axis - 1], points[:, axis - 2]
     return motions
+
+
+def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
+    """Velocities of plates at the particles on them `(n, 3)` [m/s], zero elsewhere; twists `(6,)` by the plate."""
+    field = np.zeros_like(body.points)
+    for wall, twist in twists.items():
+        on_plate = body.cloud.wall == wall
+        field[on_plate] = body.plates[wall].rigid_velocity(twist, body.points[on_plate])
+    return field
+
+
+def held(projections: Floats, field: Floats) -> Floats:
+    """The part of a field `(n, 3)` that walls do not admit, by their projections `(n, 3, 3)`."""
+    return field - projected(projections, field)
+
+
+@dataclass(frozen=True, slots=True)
+class PlateSteps:
+    """The last step of plates, and the next one by the method of the particles.
+
+    Attributes:
+        plates: `(3, 6)` displacement in it, twist at its end and change of that, of each that moved, by its index.
+        time_step: its size [s].
+    """
+
+    plates: Mapping[int, Floats]
+    time_step: float
+
+    def twist(self, wall: int) -> Floats:
+        """Twist `(6,)` of a plate now [m/s, rad/s]."""
+        return self.plates[wall][1] if wall in self.plates else np.zeros(6)
+
+    def last(self, wall: int) -> OneLeg:
+        """The last step of a plate."""
+        way, _, change = self.plates.get(wall, np.zeros((3, 6)))
+        return OneLeg(way, change, self.time_step)
+
+    def middle_ways(self, twists: Mapping[int, Floats], time_step: float) -> dict[int, Floats]:
+        """Displacements `(6,)` [m, rad] of plates with mean twists to where the equations of a step [s] hold."""
+        bases = {wall: self.last(wall).base(np.zeros(6), twist, time_step) for wall, twist in twists.items()}
+        return {wall: base.points + base.time_step * twists[wall] for wall, base in bases.items()}
+
+    def next(self, twists: Mapping[int, Floats], time_step: float) -> dict[int, OneLeg]:
+        """The next step [s] of plates with mean twists `(6,)`."""
+        return {wall: self.last(wall).followed_by(self.twist(wall), twist, time_step) for wall, twist in twists.items()}
+
+    def kept(self, steps: Mapping[int, OneLeg]) -> dict[int, Floats]:
+        """What is remembered of the next steps, `(3, 6)` each."""
+        ends = {wall: self.twist(wall) + step.velocity_change for wall, step in steps.items()}
+        return {wall: np.stack((step.displacement, ends[wall], step.velocity_change)) for wall, step in steps.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Riders:
+    """How plates that float take liquid along: k motions across what walls admit, orthonormal by the masses.
+
+    Attributes:
+        twists: `(k, p, 6)` of the p plates, over the root of a mass.
+        fields: `(k, n, 3)` velocities of the particles.
+        momenta: `(k, n, 3)` these times the masses.
+        loads: `(k,)` power of the loads on the plates.
+    """
+
+    twists: Floats
+    fields: Floats
+    momenta: Floats
+    loads: Floats
+
+    @classmethod
+    def of(cls, motions: Sequence[PlateMotion], body: Body, projections: Floats, masses: Floats) -> "Riders | None":
+        """Make them of the directions in which plates are free; None where there are none.
+
+        Args:
+            motions: of plates; each free direction must take particles along.
+            body: the liquid body.
+            projections: `(n, 3, 3)` of velocities onto those that walls admit.
+            masses: of the particles, `(n,)` [kg].
+        """
+        ways = [(motion, way) for motion in motions for way in motion.directions]
+        if not ways:
+            return None
+        twists = np.zeros((len(ways), len(body.plates), 6))
+        for twist, (motion, way) in zip(twists, ways, strict=True):
+            twist[motion.wall] = way
+        taken = [held(projections, wall_velocities(body, dict(enumerate(twist)))) for twist in twists]
+        fields = np.array(taken).reshape(len(ways), *body.points.shape)
+        momenta = masses[:, None] * fields
+        loads = np.array([way[:3] @ motion.load for motion, way in ways])
+        basis = np.linalg.inv(np.linalg.cholesky(np.tensordot(fields, momenta, ((1, 2), (1, 2)))))
+        return cls(*(np.tensordot(basis, part, 1) for part in (twists, fields, momenta, loads)))
+
+    def rates(self, field: Floats) -> Floats:
+        """How fast a velocity `(n, 3)` has each motion, `(k,)`."""
+        return np.tensordot(self.momenta, field, 2)
+
+    def along(self, field: Floats) -> Floats:
+        """The part of a velocity `(n, 3)` that is made of these motions."""
+        return np.tensordot(self.rates(field), self.fields, 1)
 
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:

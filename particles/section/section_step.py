@@ -4,6 +4,7 @@ The vertices of the chain are spaced evenly at the rate at which triangles are e
 shifted as in space.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import ceil
 from typing import ClassVar, cast
@@ -18,10 +19,11 @@ from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
 from reflowshock.particles.discretisation.lagged_cholesky import Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
+    Drive,
     GalerkinEquations,
 )
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
@@ -69,9 +71,13 @@ class SectionEquations(GalerkinEquations):
         """m/dt + V + S of a velocity, [N]."""
         return self.momentum(field) / self.time_step + self.matrices.resistance(field, self.factors)
 
-    def driven(self, force: Floats) -> Floats:
-        """Velocity `(n, 3)` [m/s] that forces give masses and surface in a step, as in space."""
-        return (self.basis @ self.inertia.solve(self.basis.T @ force.ravel())).reshape(-1, 3)
+    def driver(self) -> Drive:
+        """How forces `(n, 3)` [N] move masses and surface in a step, as in space."""
+        basis, across = self.basis, self.basis.T
+        return lambda force, _: (basis @ self.inertia.solve(across @ force.ravel())).reshape(-1, 3)
+
+    def _admitted_rates(self, field: Floats, _images: Floats) -> Floats:
+        return self.constraint(field)
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -106,8 +112,8 @@ class SectionStep(IspgStep):
 class PreparedSectionStep(PreparedIspgStep):
     """A step from the section's current positions."""
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a section at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, _twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a section at other positions, for a time step [s]; its wall rests."""
         section, fluid = as_section(body), self.fluid(body.cloud.spacing)
         tensions = [part for part in self.physics.operators if isinstance(part, ChainTension)]
         space, basis = SectionSpace.of(section), admissible(body)
@@ -125,6 +131,8 @@ class PreparedSectionStep(PreparedIspgStep):
             stiffness=stiffness,
             rigid=rigid,
             drag=np.zeros(len(masses)),
+            walls=np.zeros_like(body.points),
+            riders=None,
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             spacing=body.cloud.spacing,
             time_step=time_step,

@@ -43,6 +43,8 @@ class StepRecord:
         displacement: that velocity times the time step, over the spacing.
         flips: edges flipped.
         iterations: conjugate gradient steps of the pressure solve.
+        standoff: height of the second plate's origin above the first plate [m]; not a number with fewer plates.
+        pull: mean force that has moved a plate, along its way [N]; not a number where none was moved.
     """
 
     step: int
@@ -56,6 +58,8 @@ class StepRecord:
     displacement: float
     flips: int
     iterations: int
+    standoff: float
+    pull: float
 
 
 class LiquidFlow:
@@ -119,7 +123,7 @@ class LiquidFlow:
         self.steps += 1
         self.time += self.time_step.size
         self.pace = (body.points[: len(before)] - before) / self.time_step.size
-        record = self._record(flips, motion.iterations)
+        record = self._record(flips, motion)
         # Where momentum is kept, the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
@@ -220,12 +224,17 @@ class LiquidFlow:
             where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
             raise StepCollapsed(f"{where}: {error}") from error
 
+    def _standoff(self) -> float:
+        """Height of the second plate above the first one [m]."""
+        first, *others = self.body.plates or (None,)
+        return float(first.local(others[0].origin[None])[0, 2]) if first and others else float("nan")
+
     def _normals(self) -> Floats:
         """Unit normals of the surface `(s, 3)`, along the walls on contact lines; zero where an edge holds a vertex."""
         normal = self.physics.admit(self.body, self.body.volume()[1])[: self.body.cloud.surface_count]
         return normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
 
-    def _record(self, flips: int, iterations: int) -> StepRecord:
+    def _record(self, flips: int, motion: Motion) -> StepRecord:
         body, size = self.body, self.time_step.size
         speed = float(np.abs((self.pace * self._normals()).sum(axis=1)).max())
         return StepRecord(
@@ -239,5 +248,7 @@ class LiquidFlow:
             speed=speed,
             displacement=speed * size / body.cloud.spacing,
             flips=flips,
-            iterations=iterations,
+            iterations=motion.iterations,
+            standoff=self._standoff(),
+            pull=motion.pull,
         )

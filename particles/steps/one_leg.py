@@ -40,10 +40,10 @@ class OneLeg:
         """Start a body of `count` particles."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
 
-    def stopped(self, held: NDArray[np.bool_]) -> "OneLeg":
-        """The last step without the motion of particles `(n,)` that something has caught since."""
+    def stopped(self, held: NDArray[np.bool_], carried: Floats) -> "OneLeg":
+        """The last step where particles `(n,)` that something has caught since went with it, by `(n, 3)` [m]."""
         still = held[:, None]
-        displacement, change = (np.where(still, 0.0, field) for field in (self.displacement, self.velocity_change))
+        displacement, change = np.where(still, carried, self.displacement), np.where(still, 0.0, self.velocity_change)
         return OneLeg(displacement, change, self.time_step)
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:
@@ -61,6 +61,10 @@ class OneLeg:
         """Time for which the mean velocity takes the particles on in a step [s]."""
         carried = self._shares(time_step)[2]
         return time_step - carried * self.time_step if carried else time_step
+
+    def mean_along(self, displacement: Floats, time_step: float) -> Floats:
+        """Mean velocity V with which the next step [s] has a displacement [m]."""
+        return (displacement - self._shares(time_step)[2] * self.displacement) / self.leg(time_step)
 
     def followed_by(self, velocity: Floats, mean: Floats, time_step: float) -> "OneLeg":
         """The next step [s], from a velocity `(n, 3)`, with the mean velocity V `(n, 3)`."""

@@ -23,6 +23,7 @@ class Motion:
         surface_pressure: pressure that carries the volume constraint [Pa].
         twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
         iterations: of the pressure solve.
+        pull: mean force on a plate that is moved, along its way [N]; not a number where none is, or it is not known.
     """
 
     velocity: Floats
@@ -31,6 +32,7 @@ class Motion:
     surface_pressure: float
     twists: dict[int, Floats]
     iterations: int
+    pull: float = float("nan")
 
     @property
     def top_speed(self) -> float:

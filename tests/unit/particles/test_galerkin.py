@@ -7,12 +7,14 @@ import pytest
 from scipy.linalg import null_space
 
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
+from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin_equations import Flow
 from reflowshock.particles.ispg.gripc_step import force_pressure
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.mls import DegenerateStencil
@@ -108,8 +110,9 @@ def test_the_projection_keeps_the_volumes(ball):
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 0.1)
     start = np.random.default_rng(4).normal(size=body.points.shape)
-    push = equations.push(equations.project(start, 0.0, LaggedCholesky()))
-    change = equations.driven(push)
+    drive, none = equations.driver(), np.zeros(0)
+    push = equations.push(equations.project(start, 0.0, LaggedCholesky(), drive))
+    change = drive(push, none)
     scale = np.abs(equations.constraint(start)).max()
     assert equations.constraint(start + change) == pytest.approx(0.0, abs=1e-4 * scale)
     resisted = equations.momentum(change) / 0.1 + 0.1 * equations.tension(change)
@@ -117,6 +120,45 @@ def test_the_projection_keeps_the_volumes(ball):
     assert np.abs(0.1 * equations.tension(change)).max() > 0.1 * np.abs(push).max()
     lost = rigid_momenta(rigid_motions(body.points), equations.masses, change)
     assert lost == pytest.approx(0.0, abs=1e-10 * np.abs(push).sum())
+
+
+@pytest.fixture(scope="module")
+def between_plates():
+    """A joint whose plates move: the lower one along its normal, the upper one lifts and leans; its equations."""
+    joint = shaken(joint_cloud(JointGeometry(1.0, 1.0, 1.0), 3.0, 0.3))
+    twists = {0: np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]), 1: np.array([0.0, 0.0, -0.3, 0.1, 0.2, 0.0])}
+    return joint, twists, IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, twists)
+
+
+def test_walls_that_move_change_the_volume(between_plates):
+    """Rates of volume add up to that of the body; together with the liquid plates change none."""
+    joint, twists, equations = between_plates
+    field = equations.given + np.random.default_rng(6).normal(size=joint.points.shape) * (joint.cloud.wall < 0)[:, None]
+    assert equations.constraint(field).sum() == pytest.approx((joint.volume()[1] * field).sum())
+    together = dict.fromkeys(twists, np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]))
+    equations = IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, together)
+    uniform = np.broadcast_to(together[0][:3], joint.points.shape).copy()
+    assert equations.constraint(uniform) == pytest.approx(0.0, abs=1e-12)
+    assert equations.losses(uniform, uniform).viscous == pytest.approx(0.0, abs=1e-20)
+
+
+def test_plates_do_the_work_that_liquid_gains(between_plates):
+    """What the momentum of a step takes, less what the surface, viscosity and smoothing do."""
+    joint, twists, equations = between_plates
+    before = np.random.default_rng(7).normal(size=joint.points.shape)
+    before = projected(equations.admitted, before) + equations.given
+    equations = replace(equations, fluid=Flow(1.0, 0.1, 3.0))
+    still, drive, none = np.zeros_like(before), equations.driver(), np.zeros(0)
+    rubbed = equations.rubbed(before, still)
+    start = equations.given + drive(equations.beyond_given(equations.momentum(rubbed) / 1e-3), none)
+    rate = float((joint.volume()[1] * start).sum())
+    pressure = equations.project(start, rate, LaggedCholesky(), drive)
+    now = start + drive(equations.push(pressure), none)
+    power = equations.power(joint, twists, equations.reaction((before, rubbed, now), still, pressure))
+    lost, inertia = equations.losses(rubbed, now), (now * equations.momentum(now - before)).sum() / 1e-3
+    expansion = rate * float(pressure @ equations.space.volumes) / equations.space.volumes.sum()
+    resisted = 1e-3 * float((now * equations.tension(now)).sum())
+    assert power + expansion == pytest.approx(inertia + resisted + lost.viscous + lost.smoothing, rel=1e-4)
 
 
 def test_the_pressure_matrix_is_that_of_its_operator(body, space):

@@ -49,7 +49,7 @@ def test_stiff_modes_die_away():
 
 
 def test_a_particle_that_is_caught_stands_still():
-    history = OneLeg(np.ones((2, 3)), np.ones((2, 3)), 1.0).stopped(np.array([True, False]))
+    history = OneLeg(np.ones((2, 3)), np.ones((2, 3)), 1.0).stopped(np.array([True, False]), np.zeros((2, 3)))
     assert (history.displacement[0] == 0.0).all()
     assert (history.velocity_change[0] == 0.0).all()
     assert (history.displacement[1] == 1.0).all()

@@ -129,8 +129,9 @@ def test_the_projection_keeps_volumes_and_momenta(body):
     equations = equations_of(body)
     start = equations.basis @ np.random.default_rng(4).normal(size=equations.basis.shape[1])
     start = start.reshape(-1, 3)
-    potential = equations.project(start, 0.0, SectionStep().factors)
-    change = equations.driven(equations.push(potential))
+    drive = equations.driver()
+    potential = equations.project(start, 0.0, SectionStep().factors, drive)
+    change = drive(equations.push(potential), np.zeros(0))
     assert equations.constraint(start + change) == pytest.approx(
         0.0, abs=1e-4 * np.abs(equations.constraint(start)).max()
     )
