@@ -14,6 +14,9 @@ from scipy import sparse
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.plate import Plate
 
+# Share of the stiffness in all directions in `area_stiffness`.
+ALL_WAYS = 0.7
+
 
 @njit(cache=True)
 def area_vector(points, i, j, k):
@@ -198,20 +201,6 @@ def cotangents(points, triangles):
     return result
 
 
-@njit(cache=True)
-def laplacian_product(triangles, weights, field):
-    """K v `(n, 3)` of a field `(n, 3)`, K of `cotangent_laplacian` by its half cotangents, `weights (t, 3)`."""
-    result = np.zeros_like(field)
-    for t in range(triangles.shape[0]):
-        for k in range(3):
-            i, j = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
-            for d in range(3):
-                pull = weights[t, k] * (field[i, d] - field[j, d])
-                result[i, d] += pull
-                result[j, d] -= pull
-    return result
-
-
 def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse.csr_matrix:
     """Stiffness K of the surface Laplacian, `(size, size)`, no unit.
 
@@ -225,3 +214,43 @@ def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse
     columns = np.concatenate((j, i, i, j))
     values = np.concatenate((-weight, -weight, weight, weight))
     return sparse.csr_matrix((values, (rows, columns)), shape=(size, size))
+
+
+def area_stiffness(points: Floats, triangles: Indices, count: int) -> sparse.bsr_matrix:
+    """Stiffness `(3 count, 3 count)`, by point, no unit, that stands for the second derivative of the area.
+
+    A share of `cotangent_laplacian` in all directions, the rest across each triangle. Along a flat surface its area
+    does not resist, at edges it resists in all directions. For swings of a ball at its volume in mode n = 2 the
+    stiffness is 0.99 times the second derivative (1.25 with all directions alone, 0.38 with none), 1.14 for n = 3; for
+    waves of the grid it is 1.
+    """
+    i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
+    own = np.arange(count)
+    rows, columns = np.concatenate((i, j, own)), np.concatenate((j, i, own))
+    links = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    links.sort_indices()
+    blocks = _resisting_blocks(points, triangles, 0.5 * cotangents(points, triangles), links.indptr, links.indices)
+    return sparse.bsr_matrix((blocks, links.indices, links.indptr), shape=(3 * count, 3 * count))
+
+
+@njit(cache=True)
+def _resisting_blocks(points, triangles, weights, starts, columns):
+    """Blocks `(k, 3, 3)` of such a stiffness at the links of points: the columns of each, ascending."""
+    blocks, own = np.zeros((columns.shape[0], 3, 3)), np.empty((3, 3))
+    for t in range(triangles.shape[0]):
+        normal = np.array(area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2]))
+        normal /= np.sqrt((normal * normal).sum())
+        for c in range(3):
+            for d in range(3):
+                own[c, d] = (1.0 - ALL_WAYS) * normal[c] * normal[d]
+            own[c, c] += ALL_WAYS
+        for k in range(3):
+            pair = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+            for row in pair:
+                for column in pair:
+                    at = starts[row] + np.searchsorted(columns[starts[row] : starts[row + 1]], column)
+                    sign = weights[t, k] if row == column else -weights[t, k]
+                    for c in range(3):
+                        for d in range(3):
+                            blocks[at, c, d] += sign * own[c, d]
+    return blocks

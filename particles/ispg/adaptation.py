@@ -12,16 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import GalerkinPast
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
 
 # The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
@@ -29,6 +30,8 @@ LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
 GAP, NEAREST = 1.5, 0.2
 # In a cubic lattice the middle of a cell is 0.87 spacings from the corners, which are 1.7 apart: no gap.
 EMPTY = 0.95
+# Of twice that, how far apart the particles beside a gap are at most.
+WIDEST_GAP = 1.2
 # What is nearer to the surface than this would be pushed back at once.
 DEPTH = 0.6
 MOMENT_PASSES, ROUNDING = 16, 1e-15
@@ -167,14 +170,9 @@ def _too_near(body: Body) -> Indices:
 def _gaps(body: Body) -> Indices:
     """Pairs of particles `(m, 2)` in the middle of which there is room for another one."""
     spacing, points = body.cloud.spacing, body.points
-    tree = cKDTree(points)
-    pairs = tree.query_pairs(2.0 * EMPTY * spacing * 1.2, output_type="ndarray").astype(np.int32)
-    apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    pairs, apart = pairs[apart > GAP * spacing], apart[apart > GAP * spacing]
+    reach = 2.0 * EMPTY * spacing * WIDEST_GAP
+    pairs, room = _open_pairs(points, *find_neighbours(points, reach), GAP * spacing, EMPTY * spacing)
     middle = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])
-    room = tree.query(middle, distance_upper_bound=EMPTY * spacing)[0]  # infinite where there is nothing
-    wide = np.isinf(room)
-    pairs, middle, room = pairs[wide], middle[wide], apart[wide]
     inside = _depth(body, middle) > DEPTH * spacing
     wall = body.cloud.wall[pairs]
     inside &= (wall[:, 0] == wall[:, 1]) | (_height(body, middle) > DEPTH * spacing)
@@ -184,6 +182,37 @@ def _gaps(body: Body) -> Indices:
         if inside[candidate] and min(near, default=np.inf) > EMPTY * spacing:
             chosen.append(int(candidate))
     return pairs[chosen].reshape(-1, 2)
+
+
+@njit(cache=True)
+def _open_pairs(points, offsets, indices, gap, empty):
+    """Pairs `(m, 2)` more than a gap apart with no particle nearer to their middle than `empty`, and how far apart."""
+    pairs, apart, count = np.empty((indices.shape[0] // 2 + 1, 2), np.int32), np.empty(indices.shape[0] // 2 + 1), 0
+    least, limit = max(gap, 2.0 * empty), empty**2
+    for i in range(points.shape[0]):
+        for a in range(offsets[i], offsets[i + 1]):
+            j = indices[a]
+            length = np.sqrt(_square(points, j, points[i, 0], points[i, 1], points[i, 2]))
+            if j < i or length <= least:
+                continue
+            x, y, z = points[i, 0] + points[j, 0], points[i, 1] + points[j, 1], points[i, 2] + points[j, 2]
+            nearest = limit
+            for b in range(offsets[i], offsets[i + 1]):
+                nearest = min(nearest, _square(points, indices[b], 0.5 * x, 0.5 * y, 0.5 * z))
+                if nearest < limit:
+                    break
+            if nearest == limit:
+                pairs[count, 0], pairs[count, 1] = i, j
+                apart[count] = length
+                count += 1
+    return pairs[:count], apart[:count]
+
+
+@njit(cache=True)
+def _square(points, j, x, y, z):
+    """Square of the distance of a point from a place."""
+    dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+    return dx * dx + dy * dy + dz * dz
 
 
 def _depth(body: Body, points: Floats) -> Floats:
@@ -227,6 +256,7 @@ def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
         velocity=change.mean(past.velocity),
         gradient=change.mean(past.gradient),
         pressure=change.mean(past.pressure),
+        acceleration=change.mean(past.acceleration),
         volumes=change.mean(past.volumes),
-        history=BackwardDifference(displacement, change_of_velocity, last.time_step),
+        history=replace(last, displacement=displacement, velocity_change=change_of_velocity),
     )

@@ -1,10 +1,14 @@
-"""Linear equations of a step of the Galerkin scheme: predicted velocity, then its projection.
+"""Linear equations of a step of the Galerkin scheme: friction, then what drives the liquid, with its volumes kept.
 
-    (m/dt + V + S + dt K) v* = m v_n/dt + f + B^T p
-    dt B m^-1 B^T phi = g - B v*,     v = v* + dt m^-1 B^T phi,     p_new = p + phi - mu div v*
+    (m/dt + V + S) v1 = m v_n/dt + m a
+    (m/dt + dt K) v = m v1/dt - m a + f + dt K v_guess + B^T p,     B v = g
 
 v are the velocities of the particles, m their masses, f the forces on them, V viscosity (2 mu D : D), K implicit
-surface tension, S the smoothing (1 - N)^T c m (1 - N). The shape functions N give gradients only, and the velocity
+surface tension, S the smoothing (1 - N)^T c m (1 - N), a the acceleration of the last step but for friction. Tension
+and pressure act together: where a pressure accelerates masses alone, and K resists a velocity that is predicted with
+the last pressure, tension lags by dt^3 K m^-1 grad dp/dt, which lets swings grow, the more the finer the particles are.
+Friction acts on what has been accelerated by forces in balance: on a velocity under new forces and the last pressure,
+which is rough, S takes a multiple of what it should. The shape functions N give gradients only, and the velocity
 N v that slips on walls with friction: the stress that acts on a wall reaches the particles next to it, too. Where
 particles move with N v and forces act as N^T f, as printed, a zigzag of the surface does not show: N reduces it to a
 thousandth. What evening out and flips leave of it then hardly ever dies away, and the drop is not at rest where its
@@ -23,19 +27,23 @@ Where walls move, velocities are v = q + w: w what walls prescribe, the velocity
 holds, q what they admit. Images move with their walls (`Ghosts.drift`), friction acts on what slides on them.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
-from reflowshock.arrays import Floats, Indices
+from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.rigid_motions import Riders, wall_velocities
 
+Drive = Callable[[Floats, Floats], Floats]
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
 MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
@@ -72,9 +80,10 @@ class GalerkinEquations:
         space: shape functions and volumes.
         fluid: its density, viscosity and smoothing.
         admitted: `(n, 3, 3)` projections of the particles' velocities onto those that walls admit.
-        surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
+        stiffness: `(3 s, 3 s)` of the surface tension by particle, those of the surface are the first s [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
+        inertia: masses and implicit surface tension of velocities, by particle.
         walls: `(n, 3)` velocities that walls prescribe at the particles on them [m/s], zero elsewhere.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
@@ -84,9 +93,10 @@ class GalerkinEquations:
     space: Galerkin
     fluid: Flow
     admitted: Floats
-    surface: tuple[Indices, Floats]
+    stiffness: sparse.spmatrix
     rigid: Floats
     drag: Floats
+    inertia: StiffMass
     walls: Floats
     unbalanced: Floats
     spacing: float
@@ -111,31 +121,28 @@ class GalerkinEquations:
         """Kinetic energy [J]."""
         return 0.5 * float((field * self.momentum(field)).sum())
 
-    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
-        """Velocity v* [m/s] under the last pressure.
+    def rubbed(self, velocity: Floats, force: Floats) -> Floats:
+        """Velocity [m/s] under friction: of viscosity, walls and smoothing.
 
         Args:
             velocity: that the step starts with, `(n, 3)` [m/s].
-            force: on the particles at the end of the step, were they at rest, `(n, 3)` [N].
-            pressure: at the particles, `(n,)` [Pa].
+            force: on the particles besides, `(n, 3)` [N].
 
         Raises:
             SolveFailed: the linear solve failed.
         """
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force - self._carried_along()
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        implicit = (self.surface, self.rigid, self.masses, self.time_step)
-        parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
-        operator: Apply = partial(kernels.momentum_operator, *parts)
+        load = self.momentum(velocity) / self.time_step + force - self._carried_along()
+        parts = (self.space.rows, self.space.images)
+        operator: Apply = partial(kernels.friction_operator, *parts, (inertia, self.factors, self.admitted))
         right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given
         if (riders := self.space.riders) is not None:
             unheld = np.broadcast_to(np.eye(3), self.admitted.shape).copy()
-            parts = (self.space.rows, self.space.images, (inertia, self.factors, unheld), implicit)
-            operator = self._ridden(riders, partial(kernels.momentum_operator, *parts))
-            on_images = riders.loads + self._image_rates(riders) @ pressure
-            right, begun = self._admitted_load(riders, load, on_images), begun + riders.along(velocity)
+            operator = self._ridden(riders, partial(kernels.friction_operator, *parts, (inertia, self.factors, unheld)))
+            right = self._admitted_load(riders, load, np.zeros(len(riders.loads)))
+            begun = begun + riders.along(velocity)
         solution, _ = conjugate_gradients(
             operator,
             right,
@@ -145,39 +152,70 @@ class GalerkinEquations:
         )
         return solution
 
-    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
-        """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa].
+    def driver(self) -> Drive:
+        """How forces `(n, 3)` [N], and more on plates that float `(k,)`, move masses and surface in a step from rest.
+
+        The velocity `(n, 3)` [m/s] is one that walls admit, with those of plates that float.
+        """
+
+        def admitted(force: Floats) -> Floats:
+            return self.inertia.solve(kernels.projected(self.admitted, force).ravel()).reshape(-1, 3)
+
+        riders = self.space.riders
+        if riders is None:
+            return lambda force, _: admitted(force)
+        pulls = self.time_step * np.array([self.tension(field) for field in riders.fields])
+        taken = np.array([admitted(pull) for pull in pulls])
+        resisting = np.tensordot(pulls, riders.fields - taken, ((1, 2), (1, 2))) + np.eye(len(pulls)) / self.time_step
+
+        def drive(force: Floats, on_plates: Floats) -> Floats:
+            field = admitted(force)
+            load = np.tensordot(riders.fields, force, 2) + on_plates - np.tensordot(pulls, field, 2)
+            return field + np.tensordot(np.linalg.solve(resisting, load), riders.fields - taken, 1)
+
+        return drive
+
+    def beyond_given(self, load: Floats) -> Floats:
+        """Forces `(n, 3)` [N] less what velocities that walls prescribe take of them."""
+        given = self.given
+        return load - self.momentum(given) / self.time_step - self.time_step * self.tension(given)
+
+    def on_images(self, pressure: Floats) -> Floats:
+        """What pressures `(n,)` [Pa] on images add to the forces on plates that float `(k,)`."""
+        return self._image_rates() @ pressure
+
+    def on_plates(self, pressure: Floats) -> Floats:
+        """The same with the loads on them."""
+        return self.on_images(pressure) + (0.0 if self.space.riders is None else self.space.riders.loads)
+
+    def project(self, start: Floats, rate: float, factors: LaggedCholesky, drive: Drive) -> Floats:
+        """Pressure `(n,)` [Pa] that takes the divergence away from a velocity.
 
         Args:
-            start: predicted velocity v*, `(n, 3)` [m/s].
+            start: the velocity, `(n, 3)` [m/s].
             rate: of the body's volume [m^3/s].
             factors: of an earlier pressure equation.
+            drive: of `driver`.
 
         Raises:
             SolveFailed: the linear solve failed.
         """
-        space, divergence = self.space, self.constraint(start)
-        mobility = (self.time_step / self.masses)[:, None, None] * self.admitted
-        roots = np.sqrt(self.time_step / self.masses)[:, None, None] * self.admitted
-        missing = rate * space.volumes / space.volumes.sum() - divergence
-        enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        parts = (space.rows, space.images, self._parts, mobility)
-        ridden = np.zeros((0, len(missing)))
-        if (riders := space.riders) is not None:
-            carried = [kernels.rates_of_volume(*parts[:3], field) for field in riders.fields]
-            ridden = np.array(carried) + self._image_rates(riders)
-        potential = factors.solve(
-            lambda pressure: (
-                kernels.pressure_operator(*parts, pressure) + self.time_step * (ridden @ pressure) @ ridden
-            ),
-            lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
+        volumes = self.space.volumes
+        missing = rate * volumes / volumes.sum() - self.constraint(start)
+        enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
+        images = self._image_rates()
+        return factors.solve(
+            lambda pressure: self._admitted_rates(drive(self.push(pressure), images @ pressure), images),
+            self.pressure_matrix,
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
-        velocity = start + kernels.projected(mobility, self.push(potential))
-        if riders is not None:
-            velocity += self.time_step * np.tensordot(ridden @ potential, riders.fields, 1)
-        return velocity, potential - self.fluid.viscosity * divergence / space.volumes
+
+    def _admitted_rates(self, field: Floats, images: Floats) -> Floats:
+        """Rates of volume `(n,)` of a velocity that walls admit, with those of images `(k, n)` of plates that float."""
+        rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        riders = self.space.riders
+        return rates if riders is None else rates + riders.rates(field) @ images
 
     def _ridden(self, riders: Riders, operator: Apply) -> Apply:
         """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
@@ -203,10 +241,12 @@ class GalerkinEquations:
         on_plates = np.tensordot(riders.fields, force, 2) + on_images
         return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)
 
-    def _image_rates(self, riders: Riders) -> Floats:
+    def _image_rates(self) -> Floats:
         """Rates of volume `(k, n)` that images of plates that float make."""
-        still = np.zeros_like(self.walls)
-        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in riders.drifts])
+        if self.space.riders is None:
+            return np.zeros((0, len(self.walls)))
+        still, drifts = np.zeros_like(self.walls), self.space.riders.drifts
+        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in drifts])
 
     def _rates_of_images(self, images: Floats) -> Floats:
         """Rates of volume `(n,)` of velocities of images alone `(n + g, 3)`, none in all."""
@@ -219,9 +259,15 @@ class GalerkinEquations:
         found = np.tensordot(riders.rates(velocity), riders.twists, 1)
         return {wall: found[wall] for wall in floating}
 
-    def pulled(self, start: Floats, _end: Floats) -> Floats:
-        """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
-        return start
+    def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
+        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal.
+
+        Returns the lower triangle of S A S `(n, n)`, whose diagonal is about one, and S `(n,)`.
+        """
+        space, stiff = self.space, np.repeat(self.masses / self.time_step, 3)
+        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
+        roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
+        return kernels.pressure_matrix(space.rows, space.images, space.volumes, roots)
 
     @property
     def given(self) -> Floats:
@@ -243,7 +289,11 @@ class GalerkinEquations:
 
         K alone resists turning, which a surface does not: a drop would be left turning on its wall.
         """
-        return kernels.pull_back(self.surface, self.rigid, self.masses, field)
+        size, count = self.stiffness.shape[0], len(self.rigid)
+        rigid, pull = self.rigid.reshape(count, field.size), np.zeros(field.size)
+        moving = (rigid @ self.momentum(field).ravel()) @ rigid
+        pull[:size] = self.stiffness @ (field.ravel() - moving)[:size]
+        return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
@@ -259,7 +309,7 @@ class GalerkinEquations:
         return kernels.pressure_forces(self.space.rows, self.space.images, self._parts, pressure)
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
-        """What a velocity loses to forces that the prediction v* has set."""
+        """What a velocity loses to the friction on v1, the start."""
         space = self.space
         before, after = space.rough(start), space.rough(field)
         inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
@@ -275,8 +325,8 @@ class GalerkinEquations:
         Their power in the velocity of a wall there, `Ghosts.drift` at the images, is what it gives the liquid.
 
         Args:
-            velocities: that the step started with, the predicted and the projected one, `(n, 3)` [m/s].
-            force: as `predict` had it.
+            velocities: that the step started with, that friction acted on, and the projected one, `(n, 3)` [m/s].
+            force: with that of the surface tension in the prediction, `(n, 3)` [N].
             pressure: that has acted, `(n,)` [Pa].
         """
         (before, start, now), space, count = velocities, self.space, len(force)
@@ -285,7 +335,7 @@ class GalerkinEquations:
         stress = kernels.resistance(*rows, space.with_images(start), self.factors)
         stress -= space.shape.T @ (self.drag[:, None] * self.walls)
         inertia = self.momentum(now - before) / self.time_step
-        pull = force - self.time_step * self.tension(self.pulled(start, now)) + self.push(pressure)
+        pull = force - self.time_step * self.tension(now) + self.push(pressure)
         missing = inertia + kernels.folded(stress, *space.images) - pull
         thrust = np.zeros_like(stress)
         kernels.divergence_transposed(*rows, self._balanced(volumes * pressure), thrust)
@@ -305,3 +355,10 @@ class GalerkinEquations:
     def _friction(self, rough: Floats) -> Floats:
         """Resistance to velocities `(n, 3)` that the shape functions do not show [N]."""
         return (self.fluid.smoothing * self.masses)[:, None] * rough
+
+
+def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
+    """Stiffness `(3 s, 3 s)` by particle to velocities of the first s that walls admit by projections `(n, 3, 3)`."""
+    rows = np.repeat(np.arange(len(stiffness.indptr) - 1), np.diff(stiffness.indptr))
+    blocks = admitted[rows] @ stiffness.data @ admitted[stiffness.indices]
+    return sparse.bsr_matrix((blocks, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

@@ -1,4 +1,4 @@
-"""ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, with BDF2 in time.
+"""ISPG that holds: the paper's particles, MLS and pressure correction in a Galerkin form, by a one-leg method in time.
 
 Particles move with their own velocities v, which the shape functions N differentiate; nothing is interpolated from step
 to step. What evening out and the shift of particles below the surface displace takes the velocity there. The smoothing
@@ -21,15 +21,17 @@ from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.core.surface_measure import cotangents
+from reflowshock.particles.core.surface_measure import area_stiffness
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
-from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
+from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
+from reflowshock.particles.ispg.past import Acting, GalerkinPast, LostEnergy, centre, evening_passes, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
+    PlateSteps,
     Riders,
     admitted_motions,
     edges_turn,
@@ -43,17 +45,19 @@ from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.descent import ARRIVED
+from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
+# Forces are predicted with the velocity of this part of a step before: with later ones modes that resist less than
+# their stiffness K grow (linear analysis: from 0.17 on with RADIUS = 0.5, whatever the share of K).
+GUESS_BEFORE = 0.25
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
 SMOOTHING = 10.0
-# Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
-EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
 # of a surface at rest by 4 % of a spacing, and drops of 5 an edge are 1 % too high with one at the top.
 FLIP_WORTH = 0.1
@@ -142,7 +146,7 @@ class IspgStep:
         """Continue from what `saved` returned."""
         past = saved["past"]
         if past:
-            history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
+            history, losses = OneLeg(**past["history"]), LostEnergy(**past["losses"])
             plates = {int(wall): moved for wall, moved in past["plates"].items()}
             past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
         self.past, self.first_energy = past, saved["first_energy"]
@@ -182,39 +186,49 @@ class PreparedIspgStep:
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
         pace = self._pace(base)
-        given, guessed = self._given_twists(base, time_step), self._guessed_twists(pace)
-        twists = given | guessed
-        guess = self._guess(pace, twists)
-        predicted = body.placed(base.points + base.time_step * guess, self._ways(base, twists))
-        enclosed, slope = predicted.volume()
+        given, guessed = self._given_twists(time_step), self._guessed_twists(pace)
+        guess = self._guess(pace, given | guessed)
+        ways = self._plates.middle_ways(given | guessed, time_step)
+        predicted = body.placed(base.points + base.time_step * guess, ways)
         equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past, base = self._with_momenta(equations, base, motions)
+            past = self._with_momenta(equations, motions)
+            base = past.history.base(body.points, past.velocity, time_step)
         force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
-        start = equations.predict(base.velocity, force, past.pressure)
-        rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
-        velocity, change = equations.project(start, rate, self.solver.factors)
+        expected = equations.momentum(past.acceleration)
+        rubbed = equations.rubbed(base.velocity, expected)
+        load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
+        drive = equations.driver()
+        start = equations.given + drive(equations.beyond_given(load), equations.on_plates(past.pressure))
+        rate = self._rate_of_volume(guess, predicted, given | guessed, (time_step, volume))
+        change = equations.project(start, rate, self.solver.factors, drive)
+        mean = start + drive(equations.push(change), equations.on_images(change))
         pressure = past.pressure + change
-        twists = given | equations.twists(velocity, guessed)
-        ways = self._ways(base, twists)
-        moved = body.placed(base.points + base.time_step * velocity, ways)
-        history = BackwardDifference(moved.points - body.points, velocity - past.velocity, time_step)
+        twists = given | equations.twists(mean, guessed)
+        plates = self._plates.next(twists, time_step)
+        ways = {wall: plate.displacement for wall, plate in plates.items()}
+        history = past.history.followed_by(past.velocity, mean, time_step)
+        velocity = past.velocity + history.velocity_change
+        moved = body.placed(body.points + history.displacement, ways)
+        history = replace(history, displacement=moved.points - body.points)
+        transport = history.displacement / time_step
         volumes = equations.space.volumes
         mean_pressure = float(pressure @ volumes / volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
-        losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
+        way = mean if plates else transport
+        acting = Acting(rubbed, (mean - base.velocity) / base.time_step, way)
+        losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
         potential = self.physics.energy(moved)
-        driving = force - base.time_step * equations.tension(equations.pulled(start, velocity))
+        driving = force - base.time_step * equations.tension(mean)
         loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
-        work = time_step * (float((driving * velocity).sum()) + rate * mean_pressure + loads)
+        work = time_step * (float((driving * way).sum() + pressure @ equations.constraint(way)) + loads)
         done, pull = 0.0, float("nan")
         if given:
-            acting = past.pressure + change + equations.fluid.viscosity * equations.constraint(start) / volumes
-            forces = equations.reaction((base.velocity, start, velocity), force, acting)
+            forces = equations.reaction((base.velocity, rubbed, mean), force, pressure)
             done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
             work += time_step * equations.power(predicted, given, forces) - done
         losses = replace(losses, plates=losses.plates - done)
@@ -228,17 +242,18 @@ class PreparedIspgStep:
             kinetic=equations.kinetic(velocity),
             potential=potential,
             pressure=pressure,
+            acceleration=past.acceleration + (mean - rubbed) / base.time_step,
             volumes=equations.space.carried,
-            evening=_passes(gradient, equations.fluid, time_step),
+            evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
             momenta_change=gain,
             history=history,
             losses=replace(losses, integration=losses.integration + self.energy - potential - work),
-            plates={wall: np.stack((ways[wall], twist)) for wall, twist in twists.items()},
+            plates=self._plates.kept(plates),
         )
         return Motion(
             velocity=velocity,
-            transport=history.displacement / time_step,
+            transport=transport,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
             twists={wall: way / time_step for wall, way in ways.items()},
@@ -256,8 +271,8 @@ class PreparedIspgStep:
         done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
         return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
-    def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
-        """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
+    def _with_momenta(self, equations: GalerkinEquations, motions: Floats) -> GalerkinPast:
+        """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
@@ -273,9 +288,20 @@ class PreparedIspgStep:
             return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
 
         if not kept.any():
-            return past, base
-        start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
-        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+            return past
+        change = corrected(past.history.velocity_change, past.momenta_change)
+        history = replace(past.history, velocity_change=change)
+        return replace(past, velocity=corrected(past.velocity, past.momenta), history=history)
+
+    def _rate_of_volume(
+        self, guess: Floats, predicted: Body, twists: Mapping[int, Floats], end: tuple[float, float]
+    ) -> float:
+        """Rate [m^3/s] with which a step [s] ends at a volume [m^3], both in `end`; slopes are those predicted."""
+        (time_step, volume), past = end, self.past
+        way = past.history.followed_by(past.velocity, guess, time_step).displacement
+        ways = {wall: plate.displacement for wall, plate in self._plates.next(twists, time_step).items()}
+        enclosed = self.body.placed(self.body.points + way, ways).volume()[0]
+        return (volume - enclosed) / past.history.leg(time_step) + float((predicted.volume()[1] * guess).sum())
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
@@ -284,34 +310,36 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _carried(self, base: Base, wall: int) -> Floats:
-        """How far the last step carries a plate on, `(6,)` [m, rad]."""
-        return base.weight * self.past.ways.get(wall, np.zeros(6))
+    @property
+    def _plates(self) -> PlateSteps:
+        return PlateSteps(self.past.plates, self.past.history.time_step)
 
-    def _given_twists(self, base: Base, time_step: float) -> dict[int, Floats]:
-        """Twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+    def _given_twists(self, time_step: float) -> dict[int, Floats]:
+        """Mean twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
         moved = [motion for motion in self.physics.motions if not len(motion.directions)]
         ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
-        return {wall: (way - self._carried(base, wall)) / base.time_step for wall, way in ways.items()}
+        return {wall: self._plates.last(wall).mean_along(way, time_step) for wall, way in ways.items()}
 
     def _guessed_twists(self, pace: float) -> dict[int, Floats]:
         """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
         walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
         return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
 
-    def _ways(self, base: Base, twists: Mapping[int, Floats]) -> dict[int, Floats]:
-        """Displacements and rotations of plates in the whole step `(6,)` [m, rad]."""
-        return {wall: self._carried(base, wall) + base.time_step * twist for wall, twist in twists.items()}
-
     def _pace(self, base: Base) -> float:
         """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
-        way = base.time_step * float(np.sqrt((self.body.velocity**2).sum(axis=1).max()))
+        way = base.time_step * float(np.sqrt((self._before() ** 2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
         return 1.0 if way <= bound else bound / way
 
+    def _before(self) -> Floats:
+        """Velocity of a part of a step ago `(n, 3)` [m/s]."""
+        if not self.physics.momenta:
+            return np.zeros_like(self.body.points)
+        return self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+
     def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, at a share of its pace, and that of plates."""
-        velocity = pace * self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
+        """Velocity of the prediction `(n, 3)` [m/s]: that before, at a share of its pace, and that of plates."""
+        velocity = pace * self._before()
         if not twists:
             return velocity
         return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
@@ -337,18 +365,21 @@ class PreparedIspgStep:
         space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
         masses, motions = fluid.density * space.carried, self.physics.motions
         space = replace(space, riders=Riders.of(motions, body, self.projections, masses, space.drift_of))
-        rigid = rigid_motions(body.points)[self.admitted]
+        rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
+        stiffness = self.tension * area_stiffness(body.points, body.triangles, body.cloud.surface_count)
+        free = admitted_stiffness(stiffness, self.projections)
         return GalerkinEquations(
             space=space,
             fluid=fluid,
             admitted=self.projections,
-            surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
+            stiffness=stiffness,
             spacing=spacing,
-            rigid=orthonormal(rigid, masses),
+            rigid=rigid,
             walls=wall_velocities(body, twists),
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
+            inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), 3 * len(masses)), time_step),
         )
 
     def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:
@@ -358,17 +389,3 @@ class PreparedIspgStep:
         evening = past.potential - self.energy
         losses = past.losses
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
-
-
-def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
-    """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
-
-    Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a
-    swing each time that it strains them: 5 % in two periods, with 309 particles.
-    """
-    strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
-    return min(
-        1.0,
-        EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
-        + EVENING_RATE * time_step * fluid.smoothing / SMOOTHING,
-    )

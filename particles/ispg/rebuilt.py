@@ -86,7 +86,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
             momenta=rigid_momenta(motions, here.masses, velocity),
             volumes=here.space.carried,
             centre=centre(part.body) + behind,
-            plates={wall: np.stack((np.zeros(6), twist)) for wall, twist in its.items()},
+            plates={wall: np.stack((np.zeros(6), twist, np.zeros(6))) for wall, twist in its.items()},
         )
         part.solver.first_energy = 0.0
         energy += own + here.kinetic(velocity)

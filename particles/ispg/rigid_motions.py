@@ -12,6 +12,7 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
+from reflowshock.particles.steps.one_leg import OneLeg
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
@@ -63,6 +64,42 @@ def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
 def held(projections: Floats, field: Floats) -> Floats:
     """The part of a field `(n, 3)` that walls do not admit, by their projections `(n, 3, 3)`."""
     return field - projected(projections, field)
+
+
+@dataclass(frozen=True, slots=True)
+class PlateSteps:
+    """The last step of plates, and the next one by the method of the particles.
+
+    Attributes:
+        plates: `(3, 6)` displacement in it, twist at its end and change of that, of each that moved, by its index.
+        time_step: its size [s].
+    """
+
+    plates: Mapping[int, Floats]
+    time_step: float
+
+    def twist(self, wall: int) -> Floats:
+        """Twist `(6,)` of a plate now [m/s, rad/s]."""
+        return self.plates[wall][1] if wall in self.plates else np.zeros(6)
+
+    def last(self, wall: int) -> OneLeg:
+        """The last step of a plate."""
+        way, _, change = self.plates.get(wall, np.zeros((3, 6)))
+        return OneLeg(way, change, self.time_step)
+
+    def middle_ways(self, twists: Mapping[int, Floats], time_step: float) -> dict[int, Floats]:
+        """Displacements `(6,)` [m, rad] of plates with mean twists to where the equations of a step [s] hold."""
+        bases = {wall: self.last(wall).base(np.zeros(6), twist, time_step) for wall, twist in twists.items()}
+        return {wall: base.points + base.time_step * twists[wall] for wall, base in bases.items()}
+
+    def next(self, twists: Mapping[int, Floats], time_step: float) -> dict[int, OneLeg]:
+        """The next step [s] of plates with mean twists `(6,)`."""
+        return {wall: self.last(wall).followed_by(self.twist(wall), twist, time_step) for wall, twist in twists.items()}
+
+    def kept(self, steps: Mapping[int, OneLeg]) -> dict[int, Floats]:
+        """What is remembered of the next steps, `(3, 6)` each."""
+        ends = {wall: self.twist(wall) + step.velocity_change for wall, step in steps.items()}
+        return {wall: np.stack((step.displacement, ends[wall], step.velocity_change)) for wall, step in steps.items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ as in `galerkin_kernels`.
 import numpy as np
 from numba import njit, prange
 
-from reflowshock.particles.core.surface_measure import laplacian_product
 from reflowshock.particles.ispg.galerkin_kernels import (
     divergence,
     divergence_transposed,
@@ -50,47 +49,17 @@ def pressure_forces(rows, images, parts, pressure):
 
 
 @njit(cache=True)
-def pressure_operator(rows, images, parts, mobility, pressure):
-    """Rates of volume `(n,)` that pressures `(n,)` make with a mobility of each particle `(n, 3, 3)`."""
-    return rates_of_volume(rows, images, parts, projected(mobility, pressure_forces(rows, images, parts, pressure)))
+def friction_operator(rows, images, resisted, field):
+    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia and friction.
 
-
-@njit(cache=True)
-def pull_back(surface, rigid, masses, field):
-    """Force `(n, 3)` that a surface `(triangles, weights)` resists velocities with, but for rigid motions `(k, n, 3)`.
-
-    These, orthonormal by the masses `(n,)`, meet none, and the force moves nothing along them.
+    ``resisted``: masses over the time step `(n,)` [kg/s], factors of `resistance`, projections of the particles
+    `(n, 3, 3)`.
     """
-    moving = field.copy()
-    for motion in rigid:
-        share = 0.0
-        for i in range(masses.shape[0]):
-            for c in range(3):
-                share += motion[i, c] * masses[i] * field[i, c]
-        moving -= share * motion
-    force = laplacian_product(*surface, moving)
-    result = force.copy()
-    for motion in rigid:
-        share = (motion * force).sum()
-        for i in range(masses.shape[0]):
-            for c in range(3):
-                result[i, c] -= share * masses[i] * motion[i, c]
-    return result
-
-
-@njit(cache=True)
-def momentum_operator(rows, images, resisted, implicit, field):
-    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia, resistance and implicit surface tension.
-
-    ``resisted``: masses over the time step `(n,)` [kg/s], factors of
-    `resistance`, projections of the particles `(n, 3, 3)`; ``implicit``: what `pull_back` takes, and the time step [s].
-    """
-    (inertia, factors, admitted), (surface, rigid, masses, time_step) = resisted, implicit
+    inertia, factors, admitted = resisted
     force = folded(resistance(*rows, reflected(field, *images), factors), *images)
-    pull = pull_back(surface, rigid, masses, field)
     for i in range(field.shape[0]):
         for c in range(3):
-            force[i, c] += inertia[i] * field[i, c] + time_step * pull[i, c]
+            force[i, c] += inertia[i] * field[i, c]
     return projected(admitted, force)
 
 
@@ -145,10 +114,10 @@ def _by_particle(starts, particle, entries):
 
 @njit(cache=True, parallel=True)
 def pressure_matrix(rows, images, volumes, roots):
-    """Lower triangle of the matrix A of `pressure_operator` in single precision, but for what is unbalanced.
+    """Lower triangle, in single precision, of the matrix A of rates of volume under pressures.
 
-    ``roots``: of the mobilities, `(n, 3, 3)`. Returns S A S `(n, n)`, whose diagonal is about one, zero above it, and S
-    `(n,)`.
+    Without what is unbalanced. ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S `(n, n)`,
+    whose diagonal is about one, zero above it, and S `(n,)`.
     """
     starts = rows[0]
     count = starts.shape[0] - 1

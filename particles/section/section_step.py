@@ -12,18 +12,18 @@ from typing import ClassVar, cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
-    VOLUME_TOLERANCE,
+    Drive,
     GalerkinEquations,
 )
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
@@ -41,67 +41,25 @@ from reflowshock.particles.surface.surface_quality import SMOOTHING as EVENING
 
 
 @dataclass(frozen=True, slots=True)
-class StiffMass:
-    """Masses and implicit surface tension of d admissible velocities, m / dt + dt P^T K P, factored.
-
-    P takes out the rigid motions R, orthonormal by the masses: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
-
-    Attributes:
-        factors: of m / dt + dt K.
-        across: `(d, 2 k)` columns m R^T and K R^T.
-        moved: `(d, 2 k)` these, solved for.
-        core: `(2 k, 2 k)` of Woodbury's formula.
-    """
-
-    factors: SuperLU
-    across: Floats
-    moved: Floats
-    core: Floats
-
-    @classmethod
-    def of(cls, masses: Floats, stiffness: sparse.csr_matrix, rigid: Floats, time_step: float) -> "StiffMass":
-        """Factor masses `(d,)` [kg] and stiffness `(d, d)` [N/m] with rigid motions `(k, d)`, for a time step [s]."""
-        factors = splu((sparse.diags(masses / time_step) + time_step * stiffness).tocsc())
-        count, pull = len(rigid), rigid @ stiffness
-        across = np.concatenate((masses * rigid, pull)).T
-        moved, unit = factors.solve(across), np.eye(count)
-        inner = np.block([[np.zeros((count, count)), -unit], [-unit, -pull @ rigid.T]]) / time_step
-        return cls(factors, across, moved, np.linalg.inv(inner + across.T @ moved))
-
-    def solve(self, load: Floats) -> Floats:
-        """Velocities `(d,)` or `(d, l)` that loads reach in a time step."""
-        first = self.factors.solve(load)
-        return first - self.moved @ (self.core @ (self.across.T @ first))
-
-
-@dataclass(frozen=True, slots=True)
 class SectionEquations(GalerkinEquations):
     """The equations of a section, by matrices.
-
-    The projection, too, has the implicit surface tension: where pressures accelerate masses alone, what tension resists
-    is taken back a step later. That error, dt^3 gamma K m^-1 grad dp/dt, lets swings grow, the more the finer particles
-    are: with 25 steps a period 10 of them along the radius no longer decay.
 
     Attributes:
         matrices: shape functions and volumes.
         basis: `(3 n, d)` admissible velocities, by particle.
-        stiffness: `(3 n, 3 n)` of the surface tension [N/m].
-        inertia: masses and surface tension.
     """
 
     matrices: SectionSpace
     basis: sparse.csr_matrix
-    stiffness: sparse.csr_matrix
-    inertia: StiffMass
 
-    def predict(self, velocity: Floats, force: Floats, pressure: Floats) -> Floats:
-        """Velocity v* [m/s] under the last pressure, as in space."""
+    def rubbed(self, velocity: Floats, force: Floats) -> Floats:
+        """Velocity [m/s] under friction, as in space."""
         basis, across = self.basis, self.basis.T
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        load = self.momentum(velocity) / self.time_step + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inverse = self.time_step / (across @ np.repeat(self.masses, 3))
         solution, _ = conjugate_gradients(
-            lambda free: across @ self.operator((basis @ free).reshape(-1, 3)).ravel(),
+            lambda free: across @ self.friction((basis @ free).reshape(-1, 3)).ravel(),
             across @ load.ravel(),
             across @ velocity.ravel(),
             lambda residual: inverse * residual,
@@ -109,30 +67,17 @@ class SectionEquations(GalerkinEquations):
         )
         return (basis @ solution).reshape(-1, 3)
 
-    def project(self, start: Floats, rate: float, factors: LaggedCholesky) -> tuple[Floats, Floats]:
-        """Velocity v [m/s] without divergence, and the change of the pressure `(n,)` [Pa], as in space."""
-        volumes, divergence = self.matrices.volumes, self.constraint(start)
-        missing = rate * volumes / volumes.sum() - divergence
-        enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        potential = factors.solve(
-            lambda pressure: self.constraint(self.accelerated(pressure)),
-            self.pressure_matrix,
-            missing,
-            Tolerance(VOLUME_TOLERANCE, enough),
-        )
-        return start + self.accelerated(potential), potential - self.fluid.viscosity * divergence / volumes
+    def friction(self, field: Floats) -> Floats:
+        """m/dt + V + S of a velocity, [N]."""
+        return self.momentum(field) / self.time_step + self.matrices.resistance(field, self.factors)
 
-    def operator(self, field: Floats) -> Floats:
-        """m/dt + V + S + dt K of a velocity, [N]."""
-        direct = self.momentum(field) / self.time_step + self.time_step * self.tension(field)
-        return direct + self.matrices.resistance(field, self.factors)
+    def driver(self) -> Drive:
+        """How forces `(n, 3)` [N] move masses and surface in a step, as in space."""
+        basis, across = self.basis, self.basis.T
+        return lambda force, _: (basis @ self.inertia.solve(across @ force.ravel())).reshape(-1, 3)
 
-    def tension(self, field: Floats) -> Floats:
-        """Change of the surface tension's force with a displacement, `(n, 3)`: none of a rigid motion, no moment."""
-        rigid = self.rigid.reshape(len(self.rigid), field.size)
-        moving = (rigid @ self.momentum(field).ravel()) @ rigid
-        pull = self.stiffness @ (field.ravel() - moving)
-        return pull.reshape(-1, 3) - self.momentum(((rigid @ pull) @ rigid).reshape(-1, 3))
+    def _admitted_rates(self, field: Floats, _images: Floats) -> Floats:
+        return self.constraint(field)
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -144,16 +89,8 @@ class SectionEquations(GalerkinEquations):
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
 
-    def pulled(self, _start: Floats, end: Floats) -> Floats:
-        """The projected velocity is what the implicit surface tension has resisted."""
-        return end
-
-    def accelerated(self, pressure: Floats) -> Floats:
-        """Change of the velocity in a step under a pressure `(n,)` [Pa]."""
-        return (self.basis @ self.inertia.solve(self.basis.T @ self.push(pressure).ravel())).reshape(-1, 3)
-
     def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
-        """Rates of volume under such changes, A, but for what nodal integration misses.
+        """Rates of volume under pressures, A, but for what nodal integration misses.
 
         Returns the lower triangle of S A S `(n, n)`, whose diagonal is one, and S `(n,)`.
         """
@@ -189,7 +126,6 @@ class PreparedSectionStep(PreparedIspgStep):
             space=cast(Galerkin, space),  # what a step asks of either is the same
             matrices=space,
             admitted=self.projections,
-            surface=(body.triangles, np.zeros((0, 3))),
             fluid=fluid,
             basis=basis,
             stiffness=stiffness,

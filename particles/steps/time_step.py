@@ -15,8 +15,8 @@ SAFETY = 0.8
 AIM = 0.9
 # Share of the largest step below which no smaller one is tried.
 SMALLEST_SHARE = 1e-9
-# Longest step of the scheme ispg, in periods of the drop's swing: with a quarter of one a swing hardly dies away.
-LONGEST_OF_SWING = 1.0 / 16.0
+# Longest step of the scheme ispg, in periods of the drop's swing: it keeps the decay of 1 mm^3 of real solder to 5 %.
+LONGEST_OF_SWING = 1.0 / 30.0
 # Steps to rest, where a case does not say how many at most; with ispg, besides, those in which a free drop's swing
 # would decay by exp(-40).
 MOST_STEPS, DECAYS = 1000, 40.0

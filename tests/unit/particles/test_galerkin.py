@@ -21,7 +21,7 @@ from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import centre
 from reflowshock.particles.ispg.rigid_motions import Riders, rigid_momenta, rigid_motions
-from reflowshock.particles.ispg.step_kernels import pressure_matrix, pressure_operator, projected
+from reflowshock.particles.ispg.step_kernels import pressure_matrix, projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
@@ -107,15 +107,19 @@ def test_linear_velocities_have_the_energy_of_the_body(body):
 
 
 def test_the_projection_keeps_the_volumes(ball):
-    """B v is met, the change of momentum is dt B^T phi, and no pressure moves or turns the whole."""
+    """B v is met, pressures push masses and surface, and none moves or turns the whole."""
     body = shaken_inside(ball)
-    equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
+    equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 0.1)
     start = np.random.default_rng(4).normal(size=body.points.shape)
-    field, potential = equations.project(start, 0.0, LaggedCholesky())
-    assert equations.constraint(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.constraint(start)).max())
-    push = equations.time_step * equations.push(potential)
-    assert equations.momentum(field - start) == pytest.approx(push, abs=1e-12 * np.abs(push).max())
-    lost = rigid_momenta(rigid_motions(body.points), equations.masses, field - start)
+    drive, none = equations.driver(), np.zeros(0)
+    push = equations.push(equations.project(start, 0.0, LaggedCholesky(), drive))
+    change = drive(push, none)
+    scale = np.abs(equations.constraint(start)).max()
+    assert equations.constraint(start + change) == pytest.approx(0.0, abs=1e-4 * scale)
+    resisted = equations.momentum(change) / 0.1 + 0.1 * equations.tension(change)
+    assert resisted == pytest.approx(push, abs=1e-11 * np.abs(push).max())
+    assert np.abs(0.1 * equations.tension(change)).max() > 0.1 * np.abs(push).max()
+    lost = rigid_momenta(rigid_motions(body.points), equations.masses, change)
     assert lost == pytest.approx(0.0, abs=1e-10 * np.abs(push).sum())
 
 
@@ -140,22 +144,22 @@ def test_walls_that_move_change_the_volume(between_plates):
 
 
 def test_plates_do_the_work_that_liquid_gains(between_plates):
-    """Of a step without surface tension: what its momentum takes, less what viscosity and smoothing do."""
+    """What the momentum of a step takes, less what the surface, viscosity and smoothing do."""
     joint, twists, equations = between_plates
     before = np.random.default_rng(7).normal(size=joint.points.shape)
     before = projected(equations.admitted, before) + equations.given
-    equations = replace(
-        equations, fluid=Flow(1.0, 0.1, 3.0), surface=(joint.triangles, np.zeros(joint.triangles.shape))
-    )
-    still = np.zeros_like(before)
-    start = equations.predict(before, still, np.zeros(len(still)))
+    equations = replace(equations, fluid=Flow(1.0, 0.1, 3.0))
+    still, drive, none = np.zeros_like(before), equations.driver(), np.zeros(0)
+    rubbed = equations.rubbed(before, still)
+    start = equations.given + drive(equations.beyond_given(equations.momentum(rubbed) / 1e-3), none)
     rate = float((joint.volume()[1] * start).sum())
-    now, change = equations.project(start, rate, LaggedCholesky())
-    acting = change + 0.1 * equations.constraint(start) / equations.space.volumes
-    power = equations.power(joint, twists, equations.reaction((before, start, now), still, acting))
-    lost, inertia = equations.losses(start, now), (now * equations.momentum(now - before)).sum() / 1e-3
-    expansion = rate * float(acting @ equations.space.volumes) / equations.space.volumes.sum()
-    assert power + expansion == pytest.approx(inertia + lost.viscous + lost.smoothing, rel=1e-4)
+    pressure = equations.project(start, rate, LaggedCholesky(), drive)
+    now = start + drive(equations.push(pressure), none)
+    power = equations.power(joint, twists, equations.reaction((before, rubbed, now), still, pressure))
+    lost, inertia = equations.losses(rubbed, now), (now * equations.momentum(now - before)).sum() / 1e-3
+    expansion = rate * float(pressure @ equations.space.volumes) / equations.space.volumes.sum()
+    resisted = 1e-3 * float((now * equations.tension(now)).sum())
+    assert power + expansion == pytest.approx(inertia + resisted + lost.viscous + lost.smoothing, rel=1e-4)
 
 
 def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
@@ -191,10 +195,8 @@ def test_the_pressure_matrix_is_that_of_its_operator(body, space):
     """In single precision, scaled; walls admit no velocity across them."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     roots = np.sqrt(1e-3 / equations.masses)[:, None, None] * equations.admitted
-    balanced = (space.volumes, np.zeros_like(body.points))
-    columns = [
-        pressure_operator(space.rows, space.images, balanced, roots @ roots, unit) for unit in np.eye(len(roots))
-    ]
+    balanced = replace(equations, unbalanced=np.zeros_like(body.points))
+    columns = [balanced.constraint(projected(roots @ roots, balanced.push(unit))) for unit in np.eye(len(roots))]
     matrix, scale = pressure_matrix(space.rows, space.images, space.volumes, roots)
     assert np.diag(matrix) == pytest.approx(1.0, abs=0.8)
     assert matrix / np.outer(scale, scale) == pytest.approx(np.tril(columns), abs=1e-6 * np.abs(columns).max())

@@ -128,10 +128,12 @@ def test_the_projection_keeps_volumes_and_momenta(body):
     """The implicit tension resists pressures, too, and the change of momentum is what pressures and tension push."""
     equations = equations_of(body)
     start = equations.basis @ np.random.default_rng(4).normal(size=equations.basis.shape[1])
-    field, potential = equations.project(start.reshape(-1, 3), 0.0, SectionStep().factors)
-    change = field - start.reshape(-1, 3)
-    assert equations.constraint(field) == pytest.approx(
-        0.0, abs=1e-4 * np.abs(equations.constraint(start.reshape(-1, 3))).max()
+    start = start.reshape(-1, 3)
+    drive = equations.driver()
+    potential = equations.project(start, 0.0, SectionStep().factors, drive)
+    change = drive(equations.push(potential), np.zeros(0))
+    assert equations.constraint(start + change) == pytest.approx(
+        0.0, abs=1e-4 * np.abs(equations.constraint(start)).max()
     )
     pushed = equations.momentum(change) / equations.time_step + equations.time_step * equations.tension(change)
     free = equations.basis.T
@@ -168,9 +170,9 @@ def test_a_free_drop_swings_in_time(chain):
 
 @pytest.mark.parametrize("chain", [MERIDIAN, RING], ids=["meridian", "plane"])
 def test_long_steps_damp_a_swing(chain):
-    """With tension in the prediction alone, as in space, it grows with 16 steps a period: pressures run after it."""
+    """By little more than viscosity; with tension in a prediction alone it grew."""
     _, decay, flow = swung(chain, 8, 16, 2)
-    assert decay > 1.0
+    assert 0.9 < decay < 1.5
     assert flow.solver.past.losses.integration > 0.0
 
 

@@ -2,14 +2,13 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.cloud import box_cloud, joint_cloud
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import (
     area_gradient,
+    area_stiffness,
     cotangent_laplacian,
-    cotangents,
     enclosed_volume,
-    laplacian_product,
     ring_area,
     ring_area_gradient,
     surface_area,
@@ -120,9 +119,19 @@ def test_the_gradient_of_the_area_is_that_of_the_stiffness():
     assert np.isfinite(area_gradient(points, triangles)).all()
 
 
-def test_the_stiffness_times_a_field_needs_no_matrix():
-    cloud = box_cloud(1.0, 6)
-    field = np.random.default_rng(6).normal(size=cloud.points.shape)
-    matrix = cotangent_laplacian(cloud.points, cloud.triangles, len(cloud.points))
-    weights = 0.5 * cotangents(cloud.points, cloud.triangles)
-    assert laplacian_product(cloud.triangles, weights, field) == pytest.approx(matrix @ field, abs=1e-12)
+def test_the_stiffness_of_the_area_is_nearly_its_second_derivative():
+    """Of a ball that is stretched at its volume; a flat sheet resists what moves it across, and some along it."""
+    cloud = sphere_cloud(1.0, 6)
+    points, triangles, count = cloud.points, cloud.triangles, cloud.surface_count
+    stretch = np.array([-1.0, -1.0, 2.0])
+    areas = [surface_area(points * np.exp(step * stretch), triangles) for step in (-1e-3, 0.0, 1e-3)]
+    field = (points * stretch)[:count].ravel()
+    second = (areas[0] - 2.0 * areas[1] + areas[2]) / 1e-6
+    assert field @ area_stiffness(points, triangles, count) @ field == pytest.approx(second, rel=0.05)
+    sheet = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.2, 1.1, 0.0], [-0.5, 0.4, 0.0]])
+    flat = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]], np.int32)
+    across = cotangent_laplacian(sheet, flat, 5).toarray()
+    whole = area_stiffness(sheet, flat, 5).toarray().reshape(5, 3, 5, 3)
+    assert whole[:, 2, :, 2] == pytest.approx(across)
+    assert whole[:, 0, :, 0] == pytest.approx(0.7 * across)
+    assert np.abs(whole[:, 0, :, 1:]).max() == 0.0
