@@ -154,6 +154,21 @@ class GalerkinEquations:
         change = potential - self.fluid.viscosity * divergence / space.volumes
         return start + kernels.projected(mobility, self.push(potential)), change
 
+    def holding(self, base: Floats, force: Floats, velocity: Floats, pressure: Floats) -> Floats:
+        """Force `(n, 3)` [N] that walls and edges hold the particles with at the end of a step.
+
+        Args:
+            base: velocity that the step started with, `(n, 3)` [m/s].
+            force: as in `predict`.
+            velocity: at its end, `(n, 3)` [m/s].
+            pressure: at its end, `(n,)` [Pa].
+        """
+        rows, images = self.space.rows, self.space.images
+        free = np.broadcast_to(np.eye(3), self.admitted.shape)
+        resisted, implicit = (self.masses / self.time_step, self.factors, free), (self.surface, self.rigid, self.masses)
+        taken = kernels.momentum_operator(rows, images, resisted, (*implicit, self.time_step), velocity)
+        return taken - self.momentum(base) / self.time_step - self.push(pressure) - force
+
     def pulled(self, start: Floats, _end: Floats) -> Floats:
         """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
         return start

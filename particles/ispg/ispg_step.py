@@ -36,12 +36,14 @@ from reflowshock.particles.ispg.rigid_motions import (
     rigid_momenta,
     rigid_motions,
 )
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
+from reflowshock.particles.surface.contact_line import RubbingLine
 
 SUPPORT = 1.5
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
@@ -164,11 +166,38 @@ class PreparedIspgStep:
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
 
+        Where contact lines rub on a wall, again until those vertices stand that its friction holds. Only the first time
+        are any let go, so that this ends: others wait for the next step.
+
         Raises:
             SolveFailed: a linear solve failed.
             DegenerateStencil: a particle has too few neighbours.
             NoVolumes: the particles do not fill the body.
         """
+        releases = True
+        while True:
+            motion = (self._held() if self._rubbing else self)._attempt(time_step, volume, releases)
+            if motion is not None:
+                return motion
+            releases = False
+
+    @property
+    def _rubbing(self) -> list[RubbingLine]:
+        return [line for line in self.physics.lines if isinstance(line, RubbingLine)]
+
+    def _held(self) -> "PreparedIspgStep":
+        """The step with what its contact lines hold now."""
+        projections = self.physics.projections(self.body)
+        return replace(
+            self,
+            body=replace(self.body, velocity=projected(projections, self.body.velocity)),
+            past=self.past.held(self.body, self.physics, projections),
+            projections=projections,
+            admitted=admitted_motions(self.body.points, projections),
+        )
+
+    def _attempt(self, time_step: float, volume: float, releases: bool) -> Motion | None:
+        """The motion with the vertices held that are; None where others are to be, and may be released."""
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
         guess = self._guess(base)
@@ -183,6 +212,12 @@ class PreparedIspgStep:
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
+        if self._rubbing:
+            needed = equations.holding(base.velocity, force, velocity, pressure) / self.tension
+            changed = [line.settle(predicted, velocity, needed, releases) for line in self._rubbing]
+            if any(changed):
+                return None
+        rubbed = time_step * self._line_loss(predicted, velocity)
         points = base.points + base.time_step * velocity
         history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
         mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
@@ -209,7 +244,11 @@ class PreparedIspgStep:
             momenta=momenta,
             momenta_change=gain,
             history=history,
-            losses=replace(losses, integration=losses.integration + self.energy - potential - work),
+            losses=replace(
+                losses,
+                integration=losses.integration + self.energy - potential - work - rubbed,
+                line=losses.line + rubbed,
+            ),
         )
         return Motion(
             velocity=velocity,
@@ -219,6 +258,11 @@ class PreparedIspgStep:
             twists={},
             iterations=self.solver.factors.iterations,
         )
+
+    def _line_loss(self, body: Body, velocity: Floats) -> float:
+        """Power [W] that the friction of contact lines takes from velocities `(n, 3)` [m/s]."""
+        pulls = ((line.friction(body), body.cloud.rings[line.wall]) for line in self._rubbing)
+        return -self.tension * sum(float((friction * velocity[ring]).sum()) for friction, ring in pulls)
 
     def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
         """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.

@@ -26,6 +26,7 @@ class LostEnergy:
         transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
         rebuilding: to bodies made anew, where liquids meet or part.
+        line: to the friction of contact lines on walls with hysteresis.
     """
 
     viscous: float = 0.0
@@ -34,11 +35,12 @@ class LostEnergy:
     transfer: float = 0.0
     evening: float = 0.0
     rebuilding: float = 0.0
+    line: float = 0.0
 
     @property
     def total(self) -> float:
         """All of them."""
-        return self.viscous + self.smoothing + self.integration + self.transfer + self.evening + self.rebuilding
+        return float(sum(getattr(self, entry.name) for entry in fields(self)))
 
 
 def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
@@ -98,9 +100,12 @@ class GalerkinPast:
         """
         change = projected(self.gradient, body.points - self.points)
         body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
-        velocity = projected(projections, self.velocity + change)
+        return replace(self, points=body.points, velocity=self.velocity + change).held(body, physics, projections)
+
+    def held(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
+        """The past as walls and edges admit it, by projections `(n, 3, 3)`: what they hold has not moved."""
         history = self.history.stopped(physics.pinned(body))
-        return replace(self, points=body.points, velocity=velocity, history=history)
+        return replace(self, velocity=projected(projections, self.velocity), history=history)
 
 
 def centre(body: Body) -> Floats:

@@ -19,7 +19,7 @@ MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
 ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-ISPG_EDGES, SECTION_EDGES = (5, 15), (8, 21)
+ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis
 # 5 an edge at 60 degrees with slip was not at rest after 2334 steps; the others were not run.
 FRICTION_EDGES = (7, 11)
 ISPG_PAD_EDGE = 11
@@ -84,12 +84,13 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
     if solder.numerics.scheme != "ispg":
         return []
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
-    fewest, most = ISPG_EDGES if drop.section == "none" else SECTION_EDGES
+    fewest, most = SECTION_EDGES if drop.section != "none" else ISPG_EDGES if drop.hysteresis is None else HELD_EDGES
     rubs, (low, high) = solder.wall != "free-slip", FRICTION_EDGES
+    in_section, between = drop.section != "none", all(_is_between(one) for one in drop.hysteresis or (angle,))
     places = {
         "free drops": drop.is_free,
-        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not _is_between(angle),
-        "hysteresis": drop.hysteresis is not None,
+        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not between,
+        "hysteresis in section": in_section and drop.hysteresis is not None,
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {fewest} to {most} it is)": not fewest <= drop.count <= most,
         f"{drop.count} particles along an edge on a wall with friction (for {low} to {high} it is)": (

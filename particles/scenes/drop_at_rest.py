@@ -19,7 +19,7 @@ from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine
+from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine, RubbingLine
 
 ANGLE_OF_CUBE = 0.5 * np.pi
 
@@ -53,7 +53,8 @@ def drop_to_rest(
     """
     effects = decide_drop(solder, drop.is_free)
     flow, run = flow_to_rest(drop, solder, progress, checkpoint)
-    is_known = drop.is_free or effects["wall_adhesion"]["on"]
+    stands = drop.hysteresis is not None and effects["inertia"]["on"]  # a swing ends anywhere between both angles
+    is_known = drop.is_free or (effects["wall_adhesion"]["on"] and not stands)
     reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
     shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics))
@@ -85,7 +86,8 @@ def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLin
         return ()
     if drop.hysteresis is None:
         return (contact_line(cloud, 0, drop.edge_radius, solder),)
-    return (HystereticLine(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
+    line = RubbingLine if solder.numerics.scheme == "ispg" else HystereticLine
+    return (line(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
 
 
 def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:

@@ -206,7 +206,14 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
-        ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
+        (
+            "drop={volume='1 mm^3',receding_angle='20 deg',advancing_angle='60 deg',particles_per_edge=7}",
+            "contact angles",
+        ),
+        (
+            "drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}",
+            "11 particles along an edge (for 6 to 9",
+        ),
     ],
 )
 def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
