@@ -54,6 +54,8 @@ EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
 # of a surface at rest by 4 % of a spacing, and drops of 5 an edge are 1 % too high with one at the top.
 FLIP_WORTH = 0.1
+# Of the energy of the forces: a rigid motion with less does not count where walls, being smooth, never end it.
+SLIDING = 1e-6
 
 
 @dataclass(slots=True)
@@ -257,7 +259,15 @@ class PreparedIspgStep:
             surface_pressure=mean_pressure,
             twists={},
             iterations=self.solver.factors.iterations,
+            drift=self._drift(equations, velocity),
         )
+
+    def _drift(self, equations: GalerkinEquations, velocity: Floats) -> Floats | None:
+        """The rigid part of a velocity `(n, 3)` [m/s]; None if walls end it or it could change the shape."""
+        shares = rigid_momenta(equations.rigid, equations.masses, velocity)  # of an orthonormal basis
+        if has_friction(self.physics) or 0.5 * float(shares @ shares) > SLIDING * abs(self.energy):
+            return None
+        return np.tensordot(shares, equations.rigid, axes=1)
 
     def _line_loss(self, body: Body, velocity: Floats) -> float:
         """Power [W] that the friction of contact lines takes from velocities `(n, 3)` [m/s]."""

@@ -39,7 +39,8 @@ class StepRecord:
     Attributes:
         step, time, time_step, binding: number, end and size of the step [s], and what bound its size.
         height, volume, energy: of the body after the step [m, m^3, J].
-        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s].
+        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s]; beyond that
+            of a rigid motion that nothing ends.
         displacement: that velocity times the time step, over the spacing.
         flips: edges flipped.
         iterations: conjugate gradient steps of the pressure solve.
@@ -119,7 +120,7 @@ class LiquidFlow:
         self.steps += 1
         self.time += self.time_step.size
         self.pace = (body.points[: len(before)] - before) / self.time_step.size
-        record = self._record(flips, motion.iterations)
+        record = self._record(flips, motion)
         # Where momentum is kept, the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
@@ -225,9 +226,10 @@ class LiquidFlow:
         normal = self.physics.admit(self.body, self.body.volume()[1])[: self.body.cloud.surface_count]
         return normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
 
-    def _record(self, flips: int, iterations: int) -> StepRecord:
+    def _record(self, flips: int, motion: Motion) -> StepRecord:
         body, size = self.body, self.time_step.size
-        speed = float(np.abs((self.pace * self._normals()).sum(axis=1)).max())
+        pace = self.pace if motion.drift is None else self.pace - motion.drift[: len(self.pace)]
+        speed = float(np.abs((pace * self._normals()).sum(axis=1)).max())
         return StepRecord(
             step=self.steps,
             time=self.time,
@@ -239,5 +241,5 @@ class LiquidFlow:
             speed=speed,
             displacement=speed * size / body.cloud.spacing,
             flips=flips,
-            iterations=iterations,
+            iterations=motion.iterations,
         )

@@ -23,6 +23,7 @@ class Motion:
         surface_pressure: pressure that carries the volume constraint [Pa].
         twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
         iterations: of the pressure solve.
+        drift: `(n, 3)` rigid motion that nothing ends, on smooth walls [m/s]; None where there is none.
     """
 
     velocity: Floats
@@ -31,6 +32,7 @@ class Motion:
     surface_pressure: float
     twists: dict[int, Floats]
     iterations: int
+    drift: Floats | None = None
 
     @property
     def top_speed(self) -> float:

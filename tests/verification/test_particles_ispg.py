@@ -22,7 +22,6 @@ from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.particles.steps.relaxation import Relaxation
-from reflowshock.particles.steps.rest import NoRest
 from reflowshock.particles.steps.time_step import TimeStep
 
 PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
@@ -120,16 +119,17 @@ def test_a_joint_swings_and_comes_to_rest(gap):
     assert abs(metrics["axial_force_error"]) < 0.005
 
 
-@pytest.mark.xfail(raises=NoRest, strict=True, reason="slides on: an edge catches one vertex for four steps")
 def test_a_squeezed_joint_comes_to_rest_on_the_mask():
     """Edges that held vertices left it turning about its axis, 3.7e-3 spacings in 20 capillary limits, for ever.
 
-    It does not turn any more, and its shape rests, but nothing on smooth masks ends a uniform motion.
+    It does not turn any more, but slides on at the speed that an edge has left it, which nothing on smooth masks ends:
+    its shape rests.
     """
     metrics, verdict = joint_at_rest(JointGeometry(0.22e-3, 0.24e-3, 0.24e-3))
     assert verdict == "overflow"
     assert abs(metrics["width_error"]) < 0.005
     assert abs(metrics["axial_force_error"]) < 0.03
+    assert metrics["slide_speed"] < 2e-3  # 0.8 mm/s; above 3 mm/s it would not be found at rest
 
 
 @pytest.mark.parametrize(
