@@ -64,7 +64,7 @@ class IspgStep:
 
     Attributes:
         past: what the last step left, None before the first.
-        first_energy: of the forces before the first step [J].
+        first_energy: of the forces and the motion before the first step [J].
         factors: of the pressure equation.
     """
 
@@ -344,6 +344,8 @@ class PreparedIspgStep:
     def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:
         """Losses up to this step, which starts with new masses and a velocity `(n, 3)` [m/s]."""
         past, kinetic = self.past, equations.kinetic(velocity)
+        if past.kinetic is None and kinetic:  # it starts in motion
+            self.solver.first_energy = self.energy + kinetic
         transfer = 0.0 if past.kinetic is None else past.kinetic - kinetic
         evening = past.potential - self.energy
         losses = past.losses
