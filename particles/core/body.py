@@ -1,5 +1,6 @@
 """The liquid body while it flows: positions, velocities, pressures and the current triangles."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,16 +60,24 @@ class Body:
 
     def move(self, time_step: float, velocity: Floats, twists: dict[int, Floats]) -> None:
         """Displace particles by a velocity `(n, 3)` [m/s], plates by their twists `(6,)` with what they carry."""
-        moved = self.points + time_step * velocity
-        plates = list(self.plates)
-        for wall, twist in twists.items():
-            plate, plates[wall] = plates[wall], plates[wall].moved(time_step * twist)
+        ways = {wall: time_step * twist for wall, twist in twists.items()}
+        placed = self.placed(self.points + time_step * velocity, ways)
+        self.points, self.plates = placed.points, placed.plates
+
+    def placed(self, points: Floats, ways: Mapping[int, Floats]) -> "Body":
+        """The body with its particles at points `(n, 3)` [m], those on plates that have moved on their planes.
+
+        Args:
+            points: where the particles have gone.
+            ways: `(6,)` displacement and rotation of plates, by their index [m, rad].
+        """
+        points, plates = points.copy(), list(self.plates)
+        for wall, way in ways.items():
+            plate, plates[wall] = plates[wall], plates[wall].moved(way)
             on_plate = self.cloud.wall == wall
-            points = self.points[on_plate]
-            slip = velocity[on_plate] - plate.rigid_velocity(twist, points)
-            local = plate.local(points + time_step * slip)
-            moved[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
-        self.points, self.plates = moved, tuple(plates)
+            local = plate.local(points[on_plate] - plate.rigid_velocity(way, self.points[on_plate]))
+            points[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
+        return replace(self, points=points, plates=tuple(plates))
 
     def surface(self) -> "Body":
         """The free surface alone: a body without the particles below it."""

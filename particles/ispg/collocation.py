@@ -6,7 +6,7 @@ sees images of the particles behind it: a scalar is even there and has no slope 
 component along the wall is even, the other one odd (free slip).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -32,11 +32,37 @@ class Ghosts:
         points: `(g, 3)` [m].
         source: `(g,)` the particle that each is the image of.
         reflection: `(g, 3, 3)` matrices that map the source's vectors to the image's; orthogonal without friction.
+        parent: `(g,)` what each is mirrored from: a particle or, from n on, an image of another plate.
+        wall: `(g,)` the plate that mirrors it.
+        flip: `(g, 3, 3)` the matrices of that plate alone.
     """
 
     points: Floats
     source: NDArray[np.int64]
     reflection: Floats
+    parent: NDArray[np.int64]
+    wall: NDArray[np.int64]
+    flip: Floats
+
+    def drift(self, points: Floats, plates: Sequence[Plate], twists: Mapping[int, Floats]) -> Floats:
+        """Velocities `(g, 3)` [m/s] that plates which move give the images of particles `(n, 3)` [m] at rest.
+
+        An image moves as its particle does, seen from the plate: w' + R (v - w), w and w' the plate's velocity at the
+        particle and at its image.
+
+        Args:
+            points: the particles.
+            plates: walls, as `mirror` had them.
+            twists: `(6,)` of plates that move, by their index.
+        """
+        count, everything = len(points), np.concatenate((points, self.points))
+        result = np.zeros_like(everything)
+        for wall, plate in enumerate(plates):
+            own = np.flatnonzero(self.wall == wall)
+            parent, image = self.parent[own], count + own
+            carried = plate.rigid_velocity(twists.get(wall, np.zeros(6)), everything)
+            result[image] = carried[image] + np.einsum("gcd,gd->gc", self.flip[own], result[parent] - carried[parent])
+        return result[count:]
 
     def even(self, count: int) -> sparse.csr_matrix:
         """Extension of a scalar from n particles to them and their images, `(n + g, n)`."""
@@ -75,9 +101,10 @@ def mirror(
         reach: of the images [m].
         slip_lengths: of the plates [m], 0 without slip; free slip where none are given.
     """
-    all_points, source = points, np.arange(len(points))
+    all_points, source, nothing = points, np.arange(len(points)), np.zeros(0, np.int64)
     reflection = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-    for plate, slip in zip(plates, slip_lengths or [np.inf] * len(plates), strict=True):
+    parents, walls, flips = [nothing], [nothing], [np.zeros((0, 3, 3))]
+    for wall, (plate, slip) in enumerate(zip(plates, slip_lengths or [np.inf] * len(plates), strict=True)):
         height = -plate.side * plate.local(all_points)[:, 2]
         near = np.flatnonzero((height > ON_PLATE * reach) & (height < reach))
         along, across = 1.0 - 2.0 * height[near] / (slip + height[near]), np.outer(plate.normal, plate.normal)
@@ -86,8 +113,18 @@ def mirror(
         all_points = np.concatenate((all_points, images))
         source = np.concatenate((source, source[near]))
         reflection = np.concatenate((reflection, flip @ reflection[near]))
+        parents.append(near)
+        walls.append(np.full(len(near), wall))
+        flips.append(flip)
     count = len(points)
-    return Ghosts(all_points[count:], source[count:], reflection[count:])
+    return Ghosts(
+        points=all_points[count:],
+        source=source[count:],
+        reflection=reflection[count:],
+        parent=np.concatenate(parents),
+        wall=np.concatenate(walls),
+        flip=np.concatenate(flips),
+    )
 
 
 @dataclass(frozen=True, slots=True)

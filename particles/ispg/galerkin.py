@@ -5,7 +5,9 @@ slip, between the two with Navier slip (`mirror`). The operators act without bei
 made of the same weights, so that what a force or stress does to the particles is its virtual power, to rounding.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes, 
 
 # Reach of the search for neighbours in spacings, and that of particles with too few of them.
 REACH, WIDEST = 2.6, 4.4
+AT_REST: Mapping[int, Floats] = MappingProxyType({})  # no plate moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,9 @@ class Galerkin:
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
+        drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
+        riding: momenta `(k, n, 3)` of motions of plates that float, and the velocities `(k, g, 3)` that these give
+            images.
     """
 
     volumes: Floats
@@ -44,10 +50,12 @@ class Galerkin:
     weights: Floats
     shape: sparse.csr_matrix
     ghosts: Ghosts
+    drift: Floats
+    riding: tuple[Floats, Floats] | None = None
 
     @classmethod
-    def of(cls, body: Body, slip_length: float = np.inf) -> "Galerkin":
-        """Fit the shape functions at the particles of a body, on plates with a slip length [m].
+    def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "Galerkin":
+        """Fit the shape functions at the particles of a body, on plates with a slip length [m] and some twists `(6,)`.
 
         Raises:
             DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
@@ -75,7 +83,8 @@ class Galerkin:
         spread = shape.T @ volumes
         of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
         carried = with_moments(body, volumes + of_shapes)
-        return cls(volumes, carried, starts, columns, weights, shape, ghosts)
+        drift = ghosts.drift(body.points, (*body.plates, *planes), twists)
+        return cls(volumes, carried, starts, columns, weights, shape, ghosts, drift)
 
     @property
     def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:
@@ -93,15 +102,15 @@ class Galerkin:
 
     def rough(self, field: Floats) -> Floats:
         """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
-        return field - self.shape @ self._with_images(field)
+        return field - self.shape @ self.with_images(field)
 
     def load_rough(self, force: Floats) -> Floats:
         """The transposed of `rough`: forces on the particles `(n, 3)` [N]."""
-        return force - self._folded(self.shape.T @ force)
+        return force - self.shown(force)
 
     def gradient(self, field: Floats) -> Floats:
         """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
-        return kernels.velocity_gradient(self.starts, self.columns, self.weights, self._with_images(field))
+        return kernels.velocity_gradient(self.starts, self.columns, self.weights, self.with_images(field))
 
     def load(self, stress: Floats) -> Floats:
         """The transposed of `gradient`: forces on particles `(n, 3)` [N] of stresses times volume `(n, 3, 3)` [N m]."""
@@ -117,12 +126,12 @@ class Galerkin:
             factors: `(n, 3)` of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], each with a force
                 on what it resists, as `load_rough` and `load` have it.
         """
-        images = self._with_images(field)
+        images = self.with_images(field)
         return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))
 
     def divergence(self, field: Floats) -> Floats:
         """Divergence of a velocity at the particles `(n,)` [1/s]."""
-        return kernels.divergence(self.starts, self.columns, self.weights, self._with_images(field))
+        return kernels.divergence(self.starts, self.columns, self.weights, self.with_images(field))
 
     def divergence_load(self, factor: Floats) -> Floats:
         """The transposed of `divergence`: forces on the particles `(n, 3)` [N] of factors `(n,)` [N m]."""
@@ -130,8 +139,26 @@ class Galerkin:
         kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
         return self._folded(result)
 
-    def _with_images(self, field: Floats) -> Floats:
-        return kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
+    def with_images(self, field: Floats) -> Floats:
+        """A velocity `(n, 3)` with that of the images, `(n + g, 3)` [m/s]."""
+        images = kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
+        images[len(field) :] += self.driven(field)
+        return images
+
+    def driven(self, field: Floats) -> Floats:
+        """Velocities that plates which move give the images `(g, 3)` [m/s]: as prescribed, or with a field `(n, 3)`."""
+        if self.riding is None:
+            return self.drift
+        momenta, drifts = self.riding
+        return self.drift + np.tensordot(np.tensordot(momenta, field, 2), drifts, 1)
+
+    def shown(self, force: Floats) -> Floats:
+        """Forces on particles `(n, 3)` [N] of those on N v."""
+        return self._folded(self.shape.T @ force)
+
+    def drift_of(self, body: Body, twists: Mapping[int, Floats]) -> Floats:
+        """Velocities of the images `(g, 3)` [m/s] of resting particles of a body whose plates have some twists."""
+        return self.ghosts.drift(body.points, (*body.plates, *symmetry_planes(body.cloud)), twists)
 
     def _folded(self, forces: Floats) -> Floats:
         return kernels.folded(forces, self.ghosts.source, self.ghosts.reflection)

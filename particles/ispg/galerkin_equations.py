@@ -18,16 +18,24 @@ They add up to the rate of the enclosed volume: what nodal integration misses of
 uniform pressure balances a surface at rest exactly. B^T is the pressure gradient integrated by parts: with forces of an
 energy of the particles, no mode of the linearised scheme grows. The gradient that is collocated, as printed, has modes
 that do.
+
+Where walls move, velocities are v = q + w: w what walls prescribe, the velocity of a wall across it and of what it
+holds, q what they admit. Images move with their walls (`Ghosts.drift`), friction acts on what slides on them.
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCholesky, Tolerance, conjugate_gradients
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.rigid_motions import Riders, wall_velocities
 
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
 NEGLIGIBLE = 1e-9
@@ -68,6 +76,8 @@ class GalerkinEquations:
         surface: triangles `(t, 3)` and the half cotangents of their corners times the surface tension `(t, 3)` [N/m].
         rigid: `(k, n, 3)` rigid motions that walls admit, orthonormal by the masses [1/sqrt(kg)].
         drag: `(n,)` friction on the particles on walls [kg/s].
+        walls: `(n, 3)` velocities that walls prescribe at the particles on them [m/s], zero elsewhere.
+        riders: motions of plates that float.
         unbalanced: `(n, 3)` gradient of the body's volume, less that of all volumes of particles [m^2].
         spacing: of the particles [m].
         time_step: [s].
@@ -79,6 +89,8 @@ class GalerkinEquations:
     surface: tuple[Indices, Floats]
     rigid: Floats
     drag: Floats
+    walls: Floats
+    riders: Riders | None
     unbalanced: Floats
     spacing: float
     time_step: float
@@ -113,16 +125,24 @@ class GalerkinEquations:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force
+        load = self.momentum(velocity) / self.time_step + self.push(pressure) + force - self._carried_along()
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
         implicit = (self.surface, self.rigid, self.masses, self.time_step)
         parts = (self.space.rows, self.space.images, (inertia, self.factors, self.admitted), implicit)
+        operator: Apply = partial(kernels.momentum_operator, *parts)
+        right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given
+        if self.riders is not None:
+            unheld = np.broadcast_to(np.eye(3), self.admitted.shape).copy()
+            parts = (self.space.rows, self.space.images, (inertia, self.factors, unheld), implicit)
+            operator = self._ridden(partial(kernels.momentum_operator, *parts))
+            on_images = self.riders.loads + self._image_rates() @ pressure
+            right, begun = self._admitted_load(load, on_images), begun + self.riders.along(velocity)
         solution, _ = conjugate_gradients(
-            lambda field: kernels.momentum_operator(*parts, field),
-            kernels.projected(self.admitted, load),
-            kernels.projected(self.admitted, velocity),
+            operator,
+            right,
+            begun,
             lambda residual: inverse * residual,
             Tolerance(MOMENTUM_TOLERANCE, mean * np.sqrt(len(force))),
         )
@@ -145,33 +165,78 @@ class GalerkinEquations:
         missing = rate * space.volumes / space.volumes.sum() - divergence
         enough = NEGLIGIBLE * float(space.volumes.mean()) / self.time_step * np.sqrt(len(missing))
         parts = (space.rows, space.images, self._parts, mobility)
+        ridden = np.zeros((0, len(missing)))
+        if self.riders is not None:
+            carried = [kernels.rates_of_volume(*parts[:3], field) for field in self.riders.fields]
+            ridden = np.array(carried) + self._image_rates()
         potential = factors.solve(
-            lambda pressure: kernels.pressure_operator(*parts, pressure),
+            lambda pressure: (
+                kernels.pressure_operator(*parts, pressure) + self.time_step * (ridden @ pressure) @ ridden
+            ),
             lambda: kernels.pressure_matrix(space.rows, space.images, space.volumes, roots),
             missing,
             Tolerance(VOLUME_TOLERANCE, enough),
         )
-        change = potential - self.fluid.viscosity * divergence / space.volumes
-        return start + kernels.projected(mobility, self.push(potential)), change
+        velocity = start + kernels.projected(mobility, self.push(potential))
+        if self.riders is not None:
+            velocity += self.time_step * np.tensordot(ridden @ potential, self.riders.fields, 1)
+        return velocity, potential - self.fluid.viscosity * divergence / space.volumes
 
-    def holding(self, base: Floats, force: Floats, velocity: Floats, pressure: Floats) -> Floats:
-        """Force `(n, 3)` [N] that walls and edges hold the particles with at the end of a step.
+    def _ridden(self, operator: Apply) -> Apply:
+        """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
 
-        Args:
-            base: velocity that the step started with, `(n, 3)` [m/s].
-            force: as in `predict`.
-            velocity: at its end, `(n, 3)` [m/s].
-            pressure: at its end, `(n,)` [Pa].
+        The forces on images that a motion of a plate makes have a power in the others, and on the particles.
         """
-        rows, images = self.space.rows, self.space.images
-        free = np.broadcast_to(np.eye(3), self.admitted.shape)
-        resisted, implicit = (self.masses / self.time_step, self.factors, free), (self.surface, self.rigid, self.masses)
-        taken = kernels.momentum_operator(rows, images, resisted, (*implicit, self.time_step), velocity)
-        return taken - self.momentum(base) / self.time_step - self.push(pressure) - force
+        riders, drifts = cast(Riders, self.riders), cast(tuple, self.space.riding)[1]
+        still = np.zeros_like(self.walls)
+        stresses = [
+            kernels.resistance(*self.space.rows, np.concatenate((still, drift)), self.factors) for drift in drifts
+        ]
+        forces = np.array([kernels.folded(stress, *self.space.images) for stress in stresses])
+        among = np.tensordot(np.array(stresses)[:, len(still) :], drifts, ((1, 2), (1, 2)))
+
+        def ridden(field: Floats) -> Floats:
+            rates = riders.rates(field)
+            force = operator(field) + np.tensordot(rates, forces, 1)
+            return self._admitted_load(force, np.tensordot(forces, field, 2) + among @ rates)
+
+        return ridden
+
+    def _admitted_load(self, force: Floats, on_images: Floats) -> Floats:
+        """Forces `(n, 3)` that walls admit; on plates that float by these, and by more `(k,)` on images and plates."""
+        riders = cast(Riders, self.riders)
+        on_plates = np.tensordot(riders.fields, force, 2) + on_images
+        return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)
+
+    def _image_rates(self) -> Floats:
+        """Rates of volume `(k, n)` that images of plates that float make."""
+        drifts, still = cast(tuple, self.space.riding)[1], np.zeros_like(self.walls)
+        return np.array([self._rates_of_images(np.concatenate((still, drift))) for drift in drifts])
+
+    def _rates_of_images(self, images: Floats) -> Floats:
+        """Rates of volume `(n,)` of velocities of images alone `(n + g, 3)`, none in all."""
+        return self._balanced(self.space.volumes * kernels.divergence(*self.space.rows, images))
+
+    def twists(self, velocity: Floats, floating: Collection[int]) -> dict[int, Floats]:
+        """Twists `(6,)` of the plates that float, of a velocity `(n, 3)` [m/s]."""
+        if self.riders is None:
+            return {}
+        found = np.tensordot(self.riders.rates(velocity), self.riders.twists, 1)
+        return {wall: found[wall] for wall in floating}
 
     def pulled(self, start: Floats, _end: Floats) -> Floats:
         """Which of the predicted and the projected velocity the implicit surface tension has resisted."""
         return start
+
+    @property
+    def given(self) -> Floats:
+        """Velocities `(n, 3)` that walls prescribe [m/s]."""
+        return self.walls - kernels.projected(self.admitted, self.walls)
+
+    def _carried_along(self) -> Floats:
+        """What resists particles at rest next to walls that move `(n, 3)` [N]."""
+        still = np.zeros_like(self.walls)
+        return self.space.resistance(still, self.factors) - self.space.shown(self.drag[:, None] * self.walls)
 
     @property
     def _parts(self) -> tuple[Floats, Floats]:
@@ -186,8 +251,13 @@ class GalerkinEquations:
         return kernels.pull_back(self.surface, self.rigid, self.masses, field)
 
     def constraint(self, field: Floats) -> Floats:
-        """B v: rates of volume `(n,)` [m^3/s]."""
-        return kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
+        rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
+        return rates + self._rates_of_images(np.concatenate((np.zeros_like(field), self.space.driven(field))))
+
+    def _balanced(self, rates: Floats) -> Floats:
+        """Rates `(n,)` less their sum, which is shared out by the volumes."""
+        return rates - rates.sum() / self.space.volumes.sum() * self.space.volumes
 
     def push(self, pressure: Floats) -> Floats:
         """B^T p, [N]."""
@@ -198,8 +268,39 @@ class GalerkinEquations:
         space = self.space
         before, after = space.rough(start), space.rough(field)
         inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
-        on_walls = float((self.drag[:, None] * (start - before) * (field - after)).sum())
+        sliding = (start - before - self.walls) * (field - after - self.walls)
+        on_walls = float((self.drag[:, None] * sliding).sum())
         return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
+
+    def reaction(
+        self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
+    ) -> tuple[Floats, Floats]:
+        """Forces of walls that hold or rub the liquid: at particles `(n, 3)` and, by stress, at images `(g, 3)` [N].
+
+        Their power in the velocity of a wall there, `Ghosts.drift` at the images, is what it gives the liquid.
+
+        Args:
+            velocities: that the step started with, the predicted and the projected one, `(n, 3)` [m/s].
+            force: as `predict` had it.
+            pressure: that has acted, `(n,)` [Pa].
+        """
+        (before, start, now), space, count = velocities, self.space, len(force)
+        rows, volumes = space.rows, space.volumes
+        rub = self.drag[:, None] * (start - space.rough(start) - self.walls)
+        stress = kernels.resistance(*rows, space.with_images(start), self.factors)
+        stress -= space.shape.T @ (self.drag[:, None] * self.walls)
+        inertia = self.momentum(now - before) / self.time_step
+        pull = force - self.time_step * self.tension(self.pulled(start, now)) + self.push(pressure)
+        missing = inertia + kernels.folded(stress, *space.images) - pull
+        thrust = np.zeros_like(stress)
+        kernels.divergence_transposed(*rows, self._balanced(volumes * pressure), thrust)
+        return missing - kernels.projected(self.admitted, missing) - rub, (stress - thrust)[count:]
+
+    def power(self, body: Body, twists: Mapping[int, Floats], forces: tuple[Floats, Floats]) -> float:
+        """Power [W] of the forces of `reaction` where the plates of the body have some twists `(6,)`."""
+        on_walls, on_images = forces
+        at_walls, at_images = wall_velocities(body, twists), self.space.drift_of(body, twists)
+        return float((on_walls * at_walls).sum() + (on_images * at_images).sum())
 
     def _stress(self, gradient: Floats) -> Floats:
         """Viscous stress times volume `(n, 3, 3)` [N m]."""

@@ -9,7 +9,7 @@ As in `inertial_step`, forces and operators are taken at predicted positions, an
 the change of the velocity only.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -23,24 +23,30 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import cotangents
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, with_step
+from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, centre, evening_passes, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
+    Riders,
     admitted_motions,
     edges_turn,
+    held,
     orthonormal,
     rigid_momenta,
     rigid_motions,
+    rigid_part,
+    wall_velocities,
+    with_momenta,
 )
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+from reflowshock.particles.steps.descent import ARRIVED
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 from reflowshock.particles.surface.contact_line import RubbingLine
@@ -49,8 +55,6 @@ SUPPORT = 1.5
 # Of the frequency sqrt(gamma / (rho h^3)): what is rough follows what drives it, and the less the larger this rate is.
 # At one frequency a swing loses three to five times as much; at twenty a zigzag of the surface dies away slowly.
 SMOOTHING = 10.0
-# Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
-EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
 # of a surface at rest by 4 % of a spacing, and drops of 5 an edge are 1 % too high with one at the top.
 FLIP_WORTH = 0.1
@@ -130,7 +134,11 @@ class IspgStep:
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
         past = self.past
-        kept = past and fields_of(past) | {"history": fields_of(past.history), "losses": fields_of(past.losses)}
+        kept = past and fields_of(past) | {
+            "history": fields_of(past.history),
+            "losses": fields_of(past.losses),
+            "plates": {str(wall): moved for wall, moved in past.plates.items()},
+        }
         return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -138,7 +146,8 @@ class IspgStep:
         past = saved["past"]
         if past:
             history, losses = BackwardDifference(**past["history"]), LostEnergy(**past["losses"])
-            past = GalerkinPast(**{**past, "history": history, "losses": losses})
+            plates = {int(wall): moved for wall, moved in past["plates"].items()}
+            past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
         self.past, self.first_energy = past, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
@@ -168,24 +177,19 @@ class PreparedIspgStep:
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
 
-        Where contact lines rub on a wall, again until those vertices stand that its friction holds. Only the first time
-        are any let go, so that this ends: others wait for the next step.
+        Again until those vertices stand that the friction of a wall holds; only the first time are any let go.
 
         Raises:
             SolveFailed: a linear solve failed.
             DegenerateStencil: a particle has too few neighbours.
             NoVolumes: the particles do not fill the body.
         """
-        releases = True
+        rubbing, releases = [line for line in self.physics.lines if isinstance(line, RubbingLine)], True
         while True:
-            motion = (self._held() if self._rubbing else self)._attempt(time_step, volume, releases)
+            motion = (self._held() if rubbing else self)._attempt(time_step, volume, rubbing, releases)
             if motion is not None:
                 return motion
             releases = False
-
-    @property
-    def _rubbing(self) -> list[RubbingLine]:
-        return [line for line in self.physics.lines if isinstance(line, RubbingLine)]
 
     def _held(self) -> "PreparedIspgStep":
         """The step with what its contact lines hold now."""
@@ -193,19 +197,24 @@ class PreparedIspgStep:
         return replace(
             self,
             body=replace(self.body, velocity=projected(projections, self.body.velocity)),
-            past=self.past.held(self.body, self.physics, projections),
+            past=self.past.stopped(self.body, self.physics, projections),
             projections=projections,
             admitted=admitted_motions(self.body.points, projections),
         )
 
-    def _attempt(self, time_step: float, volume: float, releases: bool) -> Motion | None:
+    def _attempt(
+        self, time_step: float, volume: float, rubbing: Sequence[RubbingLine], releases: bool
+    ) -> Motion | None:
         """The motion with the vertices held that are; None where others are to be, and may be released."""
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
-        guess = self._guess(base)
-        predicted = replace(body, points=base.points + base.time_step * guess)
+        pace = self._pace(base)
+        given, guessed = self._given_twists(base, time_step), self._guessed_twists(pace)
+        twists = given | guessed
+        guess = self._guess(pace, twists)
+        predicted = body.placed(base.points + base.time_step * guess, self._ways(base, twists))
         enclosed, slope = predicted.volume()
-        equations = self.equations(predicted, base.time_step)
+        equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
             past, base = self._with_momenta(equations, base, motions)
@@ -214,27 +223,38 @@ class PreparedIspgStep:
         rate = (volume - enclosed) / base.time_step + float((slope * guess).sum())
         velocity, change = equations.project(start, rate, self.solver.factors)
         pressure = past.pressure + change
-        if self._rubbing:
-            needed = equations.holding(base.velocity, force, velocity, pressure) / self.tension
-            changed = [line.settle(predicted, velocity, needed, releases) for line in self._rubbing]
+        volumes = equations.space.volumes
+        if given or rubbing:
+            acting = pressure + equations.fluid.viscosity * equations.constraint(start) / volumes
+            forces = equations.reaction((base.velocity, start, velocity), force, acting)
+            changed = [line.settle(predicted, velocity, forces[0] / self.tension, releases) for line in rubbing]
             if any(changed):
                 return None
-        rubbed = time_step * self._line_loss(predicted, velocity)
-        points = base.points + base.time_step * velocity
-        history = BackwardDifference(points - body.points, velocity - past.velocity, time_step)
-        mean_pressure = float(pressure @ equations.space.volumes / equations.space.volumes.sum())
+        rubbed = time_step * self.tension * sum(line.rubbed(predicted, velocity) for line in rubbing)
+        twists = given | equations.twists(velocity, guessed)
+        ways = self._ways(base, twists)
+        moved = body.placed(base.points + base.time_step * velocity, ways)
+        history = BackwardDifference(moved.points - body.points, velocity - past.velocity, time_step)
+        mean_pressure = float(pressure @ volumes / volumes.sum())
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
         losses = self._carried_losses(equations, past.velocity)
         losses = with_step(losses, equations, base, (past.velocity, start, velocity), time_step)
-        potential = self.physics.energy(replace(body, points=points))
-        pull = force - base.time_step * equations.tension(equations.pulled(start, velocity))
-        work = time_step * (float((pull * velocity).sum()) + rate * mean_pressure)
+        potential = self.physics.energy(moved)
+        driving = force - base.time_step * equations.tension(equations.pulled(start, velocity))
+        loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
+        work = time_step * (float((driving * velocity).sum()) + rate * mean_pressure + loads)
+        done, pull = 0.0, float("nan")
+        if given:
+            done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
+            work += time_step * equations.power(predicted, given, forces) - done
+        integration = losses.integration + self.energy - potential - work - rubbed
+        losses = replace(losses, integration=integration, plates=losses.plates - done, line=losses.line + rubbed)
         gradient = equations.space.gradient(velocity)
         gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
-            points=points,
+            points=moved.points,
             centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
             velocity=velocity,
             gradient=gradient,
@@ -242,37 +262,39 @@ class PreparedIspgStep:
             potential=potential,
             pressure=pressure,
             volumes=equations.space.carried,
-            evening=_passes(gradient, equations.fluid, time_step),
+            evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
             momenta_change=gain,
             history=history,
-            losses=replace(
-                losses,
-                integration=losses.integration + self.energy - potential - work - rubbed,
-                line=losses.line + rubbed,
-            ),
+            losses=losses,
+            plates={wall: np.stack((ways[wall], twist)) for wall, twist in twists.items()},
         )
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
             pressure=equations.space.averages(pressure),
             surface_pressure=mean_pressure,
-            twists={},
+            twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
+            pull=pull,
             drift=self._drift(equations, velocity),
         )
 
     def _drift(self, equations: GalerkinEquations, velocity: Floats) -> Floats | None:
         """The rigid part of a velocity `(n, 3)` [m/s]; None if walls end it or it could change the shape."""
-        shares = rigid_momenta(equations.rigid, equations.masses, velocity)  # of an orthonormal basis
-        if has_friction(self.physics) or 0.5 * float(shares @ shares) > SLIDING * abs(self.energy):
-            return None
-        return np.tensordot(shares, equations.rigid, axes=1)
+        drift = rigid_part(equations.rigid, equations.masses, velocity)
+        is_free = not has_friction(self.physics) and equations.kinetic(drift) <= SLIDING * abs(self.energy)
+        return drift if is_free else None
 
-    def _line_loss(self, body: Body, velocity: Floats) -> float:
-        """Power [W] that the friction of contact lines takes from velocities `(n, 3)` [m/s]."""
-        pulls = ((line.friction(body), body.cloud.rings[line.wall]) for line in self._rubbing)
-        return -self.tension * sum(float((friction * velocity[ring]).sum()) for friction, ring in pulls)
+    def _plate_work(
+        self, body: Body, equations: GalerkinEquations, ways: dict[int, Floats], forces: tuple[Floats, Floats]
+    ) -> tuple[float, float]:
+        """Work of plates on their ways `(6,)` [J] by the forces of `GalerkinEquations.reaction`, mean force along them.
+
+        There is no such force where they have arrived.
+        """
+        done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
+        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _with_momenta(self, equations: GalerkinEquations, base: Base, motions: Floats) -> tuple[GalerkinPast, Base]:
         """The last velocity, and that of the base, with the momenta of the last steps along rigid motions `(6, n, 3)`.
@@ -282,18 +304,13 @@ class PreparedIspgStep:
         drop would be left turning.
         """
         past, kept, masses, basis = self.past, self.admitted, equations.masses, equations.rigid
-        motions = motions[kept]
-        # Momenta along the motions of the basis, by columns.
-        moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T
-
-        def corrected(velocity: Floats, momenta: Floats) -> Floats:
-            missing = momenta[kept] - rigid_momenta(motions, masses, velocity)
-            return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
-
         if not kept.any():
             return past, base
-        start = corrected(base.velocity, past.momenta + base.weight * past.momenta_change)
-        return replace(past, velocity=corrected(past.velocity, past.momenta)), replace(base, velocity=start)
+        along, carried = (motions[kept], masses, basis), past.momenta + base.weight * past.momenta_change
+        velocity = with_momenta(*along, past.velocity, past.momenta[kept])
+        return replace(past, velocity=velocity), replace(
+            base, velocity=with_momenta(*along, base.velocity, carried[kept])
+        )
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
@@ -302,12 +319,37 @@ class PreparedIspgStep:
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
-    def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
-        velocity = self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+    def _carried(self, base: Base, wall: int) -> Floats:
+        """How far the last step carries a plate on, `(6,)` [m, rad]."""
+        return base.weight * self.past.ways.get(wall, np.zeros(6))
+
+    def _given_twists(self, base: Base, time_step: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+        moved = [motion for motion in self.physics.motions if not len(motion.directions)]
+        ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
+        return {wall: (way - self._carried(base, wall)) / base.time_step for wall, way in ways.items()}
+
+    def _guessed_twists(self, pace: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
+        walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
+        return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
+
+    def _ways(self, base: Base, twists: Mapping[int, Floats]) -> dict[int, Floats]:
+        """Displacements and rotations of plates in the whole step `(6,)` [m, rad]."""
+        return {wall: self._carried(base, wall) + base.time_step * twist for wall, twist in twists.items()}
+
+    def _pace(self, base: Base) -> float:
+        """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
+        way = base.time_step * float(np.sqrt((self.body.velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        return velocity if way <= bound else bound / way * velocity
+        return 1.0 if way <= bound else bound / way
+
+    def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
+        """Velocity of the prediction `(n, 3)` [m/s]: the last one, at a share of its pace, and that of plates."""
+        velocity = pace * self.body.velocity if self.physics.momenta else np.zeros_like(self.body.points)
+        if not twists:
+            return velocity
+        return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
 
     def fluid(self, spacing: float) -> Flow:
         """What the liquid is made of, of particles at a spacing [m]."""
@@ -321,13 +363,17 @@ class PreparedIspgStep:
         """Surface tension of the liquid [N/m]."""
         return sum(part.coefficient for part in self.physics.operators if isinstance(part, SurfaceTension))
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a body at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a body at other positions, for a time step [s]; its plates move with twists `(6,)`."""
         fluid = self.fluid(body.cloud.spacing)
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
-        held = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
+        clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
-        space, spacing = Galerkin.of(body, 0.0 if held else slip), body.cloud.spacing
+        space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
+        riders = Riders.of(self.physics.motions, body, self.projections, fluid.density * space.carried)
+        if riders is not None:
+            drifts = np.array([space.drift_of(body, dict(enumerate(twist))) for twist in riders.twists])
+            space = replace(space, riding=(riders.momenta, drifts))
         rigid = rigid_motions(body.points)[self.admitted]
         return GalerkinEquations(
             space=space,
@@ -336,6 +382,8 @@ class PreparedIspgStep:
             surface=(body.triangles, 0.5 * self.tension * cotangents(body.points, body.triangles)),
             spacing=spacing,
             rigid=orthonormal(rigid, fluid.density * space.carried),
+            walls=wall_velocities(body, twists),
+            riders=riders,
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
@@ -350,17 +398,3 @@ class PreparedIspgStep:
         evening = past.potential - self.energy
         losses = past.losses
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
-
-
-def _passes(gradient: Floats, fluid: Flow, time_step: float) -> float:
-    """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
-
-    Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a
-    swing each time that it strains them: 5 % in two periods, with 309 particles.
-    """
-    strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
-    return min(
-        1.0,
-        EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
-        + EVENING_RATE * time_step * fluid.smoothing / SMOOTHING,
-    )

@@ -1,7 +1,7 @@
 """What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,13 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import body_moments
+from reflowshock.particles.ispg.rigid_motions import held, wall_velocities
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base
+
+# Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
+EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,7 @@ class LostEnergy:
         evening: to what keeps triangles well shaped, at the volume.
         rebuilding: to bodies made anew, where liquids meet or part.
         line: to the friction of contact lines on walls with hysteresis.
+        plates: to plates that are moved; negative where they give work to the liquid.
     """
 
     viscous: float = 0.0
@@ -36,6 +41,7 @@ class LostEnergy:
     evening: float = 0.0
     rebuilding: float = 0.0
     line: float = 0.0
+    plates: float = 0.0
 
     @property
     def total(self) -> float:
@@ -65,6 +71,7 @@ class GalerkinPast:
         momenta_change: of these in it, `(6,)`.
         history: its displacement and change of the velocity.
         losses: of all steps.
+        plates: `(2, 6)` displacement in the last step and twist at its end of each plate that moved, by its index.
     """
 
     points: Floats
@@ -80,6 +87,17 @@ class GalerkinPast:
     momenta_change: Floats
     history: BackwardDifference
     losses: LostEnergy
+    plates: Mapping[int, Floats] = field(default_factory=dict)
+
+    @property
+    def ways(self) -> dict[int, Floats]:
+        """Displacement and rotation of plates in the last step, `(6,)` [m, rad]."""
+        return {wall: moved[0] for wall, moved in self.plates.items()}
+
+    @property
+    def twists(self) -> dict[int, Floats]:
+        """Twists of plates at the end of the last step, `(6,)` [m/s, rad/s]."""
+        return {wall: moved[1] for wall, moved in self.plates.items()}
 
     @classmethod
     def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
@@ -100,11 +118,14 @@ class GalerkinPast:
         """
         change = projected(self.gradient, body.points - self.points)
         body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
-        return replace(self, points=body.points, velocity=self.velocity + change).held(body, physics, projections)
+        with_plates = held(projections, wall_velocities(body, self.twists))
+        velocity = projected(projections, self.velocity + change) + with_plates
+        history = self.history.stopped(physics.pinned(body), wall_velocities(body, self.ways))
+        return replace(self, points=body.points, velocity=velocity, history=history)
 
-    def held(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
-        """The past as walls and edges admit it, by projections `(n, 3, 3)`: what they hold has not moved."""
-        history = self.history.stopped(physics.pinned(body))
+    def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
+        """The past of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
+        history = self.history.stopped(physics.pinned(body), np.zeros_like(body.points))
         return replace(self, velocity=projected(projections, self.velocity), history=history)
 
 
@@ -136,4 +157,17 @@ def with_step(
         viscous=losses.viscous + time_step * power.viscous,
         smoothing=losses.smoothing + time_step * power.smoothing,
         integration=losses.integration + change - gain,
+    )
+
+
+def evening_passes(gradient: Floats, frequency: float, time_step: float) -> float:
+    """Passes that even out triangles after a step [s]; the waves' frequency [1/s], velocity gradient `(n, 3, 3)` [1/s].
+
+    Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a
+    swing each time that it strains them: 5 % in two periods, with 309 particles.
+    """
+    strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
+    return min(
+        1.0,
+        EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean())) + EVENING_RATE * time_step * frequency,
     )

@@ -6,7 +6,7 @@ with its gradient, so that motions that are linear in space come over as they ar
 rigid one, makes up for what is missing of the momenta. The time integration starts anew.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.galerkin import AT_REST
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
 from reflowshock.particles.ispg.past import GalerkinPast, centre, total_losses
@@ -48,13 +49,13 @@ class Moving:
         """Energy of the forces before its first step [J]."""
         return self.physics.energy(self.body) if self.solver.past is None else self.solver.first_energy
 
-    def equations(self) -> GalerkinEquations:
-        """Its masses and shape functions where it is."""
+    def equations(self, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """Its masses and shape functions where it is, on plates with some twists `(6,)`."""
         past = self.solver.past or GalerkinPast.start(self.body, 0.0)
         body, projections = self.body, self.physics.projections(self.body)
         admitted = admitted_motions(body.points, projections)
         step = PreparedIspgStep(self.solver, body, self.physics, past, 0.0, projections, admitted)
-        return step.equations(body, 1.0)
+        return step.equations(body, 1.0, twists)
 
 
 def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
@@ -66,12 +67,16 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
         new: not moved yet.
         old: what they were made of, as a whole.
     """
-    pasts, equations = [part.past for part in old], [part.equations() for part in new]
-    velocities = [part.physics.admit(part.body, carried(part.body.points, old, pasts)) for part in new]
+    pasts, twists = [part.past for part in old], [_twists(part.body, old) for part in new]
+    equations = [part.equations(its) for part, its in zip(new, twists, strict=True)]
+    velocities = [
+        here.given + part.physics.admit(part.body, carried(part.body.points, old, pasts))
+        for part, here in zip(new, equations, strict=True)
+    ]
     momenta = sum((past.momenta for past in pasts), np.zeros(6))
     velocities = _with_momenta(new, equations, velocities, momenta)
     energy, behind = 0.0, _behind(old, pasts)
-    for part, here, velocity in zip(new, equations, velocities, strict=True):
+    for part, here, velocity, its in zip(new, equations, velocities, twists, strict=True):
         part.body.velocity = velocity
         own, motions = part.physics.energy(part.body), rigid_motions(part.body.points)
         part.solver.past = replace(
@@ -81,6 +86,7 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
             momenta=rigid_momenta(motions, here.masses, velocity),
             volumes=here.space.carried,
             centre=centre(part.body) + behind,
+            plates={wall: np.stack((np.zeros(6), twist)) for wall, twist in its.items()},
         )
         part.solver.first_energy = 0.0
         energy += own + here.kinetic(velocity)
@@ -91,6 +97,12 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
     losses = replace(losses, evening=losses.evening + evened, rebuilding=losses.rebuilding + before - energy)
     first.first_energy = sum(part.first_energy for part in old)
     first.past = replace(first.past, losses=losses) if first.past else None
+
+
+def _twists(body: Body, old: Sequence[Moving]) -> dict[int, Floats]:
+    """Twists of the plates of a body, those on the same side of old ones."""
+    moved = {part.body.plates[wall].side: twist for part in old for wall, twist in part.past.twists.items()}
+    return {wall: moved[plate.side] for wall, plate in enumerate(body.plates) if plate.side in moved}
 
 
 def _behind(old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:

@@ -1,7 +1,7 @@
 """Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import PlateMotion
 
 # Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
 ROUNDING = 1e-9
@@ -50,6 +51,68 @@ def rigid_motions(points: Floats) -> Floats:
     return motions
 
 
+def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
+    """Velocities of plates at the particles on them `(n, 3)` [m/s], zero elsewhere; twists `(6,)` by the plate."""
+    field = np.zeros_like(body.points)
+    for wall, twist in twists.items():
+        on_plate = body.cloud.wall == wall
+        field[on_plate] = body.plates[wall].rigid_velocity(twist, body.points[on_plate])
+    return field
+
+
+def held(projections: Floats, field: Floats) -> Floats:
+    """The part of a field `(n, 3)` that walls do not admit, by their projections `(n, 3, 3)`."""
+    return field - projected(projections, field)
+
+
+@dataclass(frozen=True, slots=True)
+class Riders:
+    """How plates that float take liquid along: k motions across what walls admit, orthonormal by the masses.
+
+    Attributes:
+        twists: `(k, p, 6)` of the p plates, over the root of a mass.
+        fields: `(k, n, 3)` velocities of the particles.
+        momenta: `(k, n, 3)` these times the masses.
+        loads: `(k,)` power of the loads on the plates.
+    """
+
+    twists: Floats
+    fields: Floats
+    momenta: Floats
+    loads: Floats
+
+    @classmethod
+    def of(cls, motions: Sequence[PlateMotion], body: Body, projections: Floats, masses: Floats) -> "Riders | None":
+        """Make them of the directions in which plates are free; None where there are none.
+
+        Args:
+            motions: of plates; each free direction must take particles along.
+            body: the liquid body.
+            projections: `(n, 3, 3)` of velocities onto those that walls admit.
+            masses: of the particles, `(n,)` [kg].
+        """
+        ways = [(motion, way) for motion in motions for way in motion.directions]
+        if not ways:
+            return None
+        twists = np.zeros((len(ways), len(body.plates), 6))
+        for twist, (motion, way) in zip(twists, ways, strict=True):
+            twist[motion.wall] = way
+        taken = [held(projections, wall_velocities(body, dict(enumerate(twist)))) for twist in twists]
+        fields = np.array(taken).reshape(len(ways), *body.points.shape)
+        momenta = masses[:, None] * fields
+        loads = np.array([way[:3] @ motion.load for motion, way in ways])
+        basis = np.linalg.inv(np.linalg.cholesky(np.tensordot(fields, momenta, ((1, 2), (1, 2)))))
+        return cls(*(np.tensordot(basis, part, 1) for part in (twists, fields, momenta, loads)))
+
+    def rates(self, field: Floats) -> Floats:
+        """How fast a velocity `(n, 3)` has each motion, `(k,)`."""
+        return np.tensordot(self.momenta, field, 2)
+
+    def along(self, field: Floats) -> Floats:
+        """The part of a velocity `(n, 3)` that is made of these motions."""
+        return np.tensordot(self.rates(field), self.fields, 1)
+
+
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
     return motions.reshape(len(motions), velocity.size) @ (masses[:, None] * velocity).ravel()
@@ -60,3 +123,15 @@ def orthonormal(motions: Floats, masses: Floats) -> Floats:
     flat = motions.reshape(len(motions), 3 * len(masses))
     basis = np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
     return basis.reshape(motions.shape)
+
+
+def rigid_part(basis: Floats, masses: Floats, velocity: Floats) -> Floats:
+    """The part of a velocity `(n, 3)` [m/s] that is a sum of rigid motions, a basis as `orthonormal` gives it."""
+    return np.tensordot(rigid_momenta(basis, masses, velocity), basis, axes=1)
+
+
+def with_momenta(motions: Floats, masses: Floats, basis: Floats, velocity: Floats, momenta: Floats) -> Floats:
+    """A velocity `(n, 3)` [m/s] with momenta `(k,)` along k rigid motions, corrected by a basis of as many others."""
+    moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T  # by columns
+    missing = momenta - rigid_momenta(motions, masses, velocity)
+    return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)

@@ -13,6 +13,8 @@ SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0
 SPACINGS_IN_RADIUS = 2.0
 LARGEST_EXPLICIT = 1.0
+MOST_PARTICLES = 200_000
+ROUNDING = 1e-9
 
 
 def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
@@ -152,3 +154,27 @@ def mm(length: float) -> str:
 def mm3(volume: float) -> str:
     """Write a volume [m^3]."""
     return f"{1e9 * volume:.3g} mm^3"
+
+
+def mn(force: float) -> str:
+    """Write a force [N]."""
+    return f"{1e3 * force:.4g} mN"
+
+
+def deg(angle: float) -> str:
+    """Write an angle [rad]."""
+    return f"{degrees(angle):.4g} deg"
+
+
+def mm_per_s(speed: float) -> str:
+    """Write a speed [m/s]."""
+    return f"{1e3 * speed:.4g} mm/s"
+
+
+def too_many(scene: str, spacing: float, count: int) -> list[Problem]:
+    """Find a scene of so many particles at a spacing [m] that no memory holds them."""
+    if count <= MOST_PARTICLES:
+        return []
+    limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
+    message = f"needs {count} particles, more than {MOST_PARTICLES}: the volume does not fit, or spacing too fine"
+    return [Problem(f"{scene}.spacing", message, mm(spacing), f">= {mm(limit)}")]

@@ -1,23 +1,21 @@
-"""Parameters of a scene that are each allowed but make no drop or joint together. Loads neither numba nor PETSc."""
+"""Parameters of a scene that are each allowed but make no drops together. Loads neither numba nor PETSc."""
 
-from dataclasses import replace
-from math import asin, degrees, inf, pi, radians, sin
+from math import degrees, pi, radians
 from typing import Protocol
 
+from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
-from reflowshock.particles.parameters.checks import mm, mm3
-from reflowshock.particles.parameters.effects import acting_weight, decide_drop, decide_effects
-from reflowshock.particles.parameters.estimate import particle_count
+from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
+from reflowshock.particles.parameters.effects import acting_weight, decide_drop
+from reflowshock.particles.parameters.joint_checks import ispg_joint_problems
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
-from reflowshock.particles.reference.young_laplace import NoMeridian, cap_angle, joint_meridian, sessile_meridian
+from reflowshock.particles.reference.young_laplace import cap_angle, sessile_meridian
 from reflowshock.problem import Problem
 
 FEWEST_PER_EDGE = 5
-MOST_PARTICLES = 200_000
 SPACINGS_IN_PAD = 2.0
-ROUNDING = 1e-9
 ISPG_ANGLES = (radians(30.0), radians(148.0))
 ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis
 # 5 an edge at 30 degrees without slip was not at rest after 1600 steps; more than 11 were not run.
@@ -25,11 +23,6 @@ FRICTION_EDGES, FRICTION_PAD_EDGES = (6, 11), (7, 9)
 ISPG_PAD_EDGE = 11
 IMPACT_EDGES, IMPACT_WEBER, IMPACT_REYNOLDS = (7, 11), 50.0, 300.0
 ISPG_PAIR = 2000
-KEYS = {
-    "solder.volume": "joint.volume",
-    "solder.pad_contact_angle": "joint.pad_contact_angle",
-    "solder.numerics.spacing": "joint.spacing",
-}
 
 
 class HasWall(Protocol):
@@ -38,6 +31,20 @@ class HasWall(Protocol):
     @property
     def is_free(self) -> bool:
         """Whether there is no wall."""
+
+
+def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
+    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy."""
+    ispg = changed(solder, "numerics.scheme", "ispg")
+    if isinstance(scene, Drop):
+        found = [] if scene.section != "none" else _ispg_problems(scene, ispg)
+    elif isinstance(scene, Joint):
+        found = ispg_joint_problems(scene, ispg)
+    else:
+        found = _ispg_pair_problems(scene, ispg)
+    if found:
+        return solder, found[0].message
+    return ispg, "with inertia ISPG costs less than tetrahedra"
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
@@ -138,17 +145,6 @@ def _impact_problems(drop: Drop, solder: Solder) -> list[Problem]:
     return []
 
 
-def _ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find joints that the scheme ispg is not verified for."""
-    inertia = decide_effects(joint.geometry, solder)["inertia"]
-    places = {
-        "packages that float": joint.package is not None,
-        "packages that are moved": joint.path is not None,
-        f"joints without inertia ({inertia['why']})": not inertia["on"],
-    }
-    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
-
-
 def _ispg_pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find pairs of drops that the scheme ispg is not verified for."""
     inertia = decide_drop(solder, pair.is_free)["inertia"]
@@ -179,7 +175,7 @@ def _pair_resolution(pair: Drops) -> list[Problem]:
     if pair.spacing > limit:
         message = f"too coarse for the smaller drop, of {mm3(min(pair.volumes))}"
         return [Problem("drops.spacing", message, mm(pair.spacing), f"<= {mm(limit)}")]
-    return _too_many("drops", pair.spacing, pair.particles)
+    return too_many("drops", pair.spacing, pair.particles)
 
 
 def _distance_problems(pair: Drops, solder: Solder) -> list[Problem]:
@@ -228,91 +224,6 @@ def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     return [Problem(key, message, switch, "auto, off") for key, switch in switches.items() if switch == "on"]
 
 
-def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find what cannot work before a joint runs: those of an array without neighbours, under the joint's own keys."""
-    if joint.offset >= joint.pad_bottom + joint.pad_top:
-        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
-        return [Problem("joint.offset", "the pads do not overlap", mm(joint.offset), allowed)]
-    found = checks.problems(solder, {"of the case": joint.geometry}, inf)
-    if found:
-        return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
-    found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = (
-        found or _ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
-    )
-    return found or _too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
-
-
-def _tilt_problems(joint: Joint) -> list[Problem]:
-    """The edge of the tilted pad must stay above the lower plate, by a spacing at least."""
-    for key, place in (("joint.tilt", joint.geometry), *(("joint.path", place) for place in joint.places)):
-        drop, tilt, room = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1], place.gap - joint.spacing
-        if tilt and drop >= room:
-            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(place.gap)}"
-            return [Problem(key, message, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}")]
-    return []
-
-
-def _path_problems(joint: Joint) -> list[Problem]:
-    if joint.path is None:
-        return []
-    if joint.package is not None:
-        message = "a package floats or is moved, not both"
-        return [Problem("joint.path", message, None, "joint.package or joint.path")]
-    if joint.places[-1] == joint.geometry:
-        message = "the path ends where it starts"
-        return [Problem("joint.path", message, None, "another standoff, offset or tilt")]
-    end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
-    if end.gap < (1.0 - ROUNDING) * lowest:
-        message = f"too low for particles {mm(joint.spacing)} apart"
-        return [Problem("joint.path.standoff", message, mm(end.gap), f">= {mm(lowest)}")]
-    if end.offset[0] >= joint.pad_bottom + joint.pad_top:
-        allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
-        return [Problem("joint.path.offset", "the pads do not overlap", mm(end.offset[0]), allowed)]
-    return []
-
-
-def _package_problems(joint: Joint) -> list[Problem]:
-    if joint.package is None or not {"shift", "turn"} <= set(joint.package.free):
-        return []
-    message = "a package that is free to shift and to turn rolls off a single joint"
-    return [Problem("joint.package.free", message, ", ".join(joint.package.free), "lift with shift, or lift with turn")]
-
-
-def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """The solder must bear the package at a gap that particles can fill."""
-    if joint.package is None or "lift" not in joint.package.free:
-        return []
-    lowest, limits = checks.SPACINGS_IN_GAP * joint.spacing, (joint.pad_contact_angle, joint.mask_contact_angle)
-    weight = acting_weight(solder, decide_effects(joint.geometry, solder))
-    discs = (joint.pad_bottom, joint.pad_top, lowest)
-    try:
-        largest = joint_meridian(joint.volume, *discs, solder.surface_tension, weight, angle_limits=limits).axial_force
-    except NoMeridian:
-        return []
-    if joint.package.load < largest:
-        return []
-    place = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
-    if largest <= 0.0:
-        allowed = "more solder, or a smaller joint.spacing"
-        return [Problem("joint.volume", f"the solder alone pulls {place}", mm3(joint.volume), allowed)]
-    message = f"presses {place}"
-    return [Problem("joint.package.load", message, mn(joint.package.load), f"< {mn(largest)}")]
-
-
-def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find what does not go with a package that moves."""
-    if joint.package is None and joint.path is None:
-        return []
-    if solder.numerics.scheme == "gripc":
-        return [Problem("solder.numerics.scheme", "the scheme gripc needs plates at rest", "gripc", "energy")]
-    inertia = decide_effects(joint.geometry, solder)["inertia"]
-    if joint.path is not None and inertia["on"]:
-        message = f"a package follows its path from rest to rest, at no particular speed; {inertia['why']}"
-        return [Problem("solder.effects.inertia", message, solder.effects.inertia, "off")]
-    return []
-
-
 def _resolution_problems(drop: Drop) -> list[Problem]:
     if drop.spacing is None:
         return []
@@ -323,7 +234,7 @@ def _resolution_problems(drop: Drop) -> list[Problem]:
     if drop.count < FEWEST_PER_EDGE:
         message = f"too coarse for a drop that starts as a cube of {mm(drop.edge)}"
         return [Problem("drop.spacing", message, mm(drop.spacing), f"<= {mm(limit)}")]
-    return _too_many("drop", drop.spacing, drop.particles)
+    return too_many("drop", drop.spacing, drop.particles)
 
 
 def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
@@ -374,21 +285,3 @@ def _pad_problems(drop: Drop) -> list[Problem]:
         message = f"too small for a particle spacing of {mm(drop.resolution)} with a volume of {mm3(drop.volume)}"
         return [Problem("drop.pad_radius", message, mm(drop.pad_radius), f">= {mm(limit)}")]
     return []
-
-
-def _too_many(scene: str, spacing: float, count: int) -> list[Problem]:
-    if count <= MOST_PARTICLES:
-        return []
-    limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)
-    message = f"needs {count} particles, more than {MOST_PARTICLES}: the volume does not fit, or spacing too fine"
-    return [Problem(f"{scene}.spacing", message, mm(spacing), f">= {mm(limit)}")]
-
-
-def mn(force: float) -> str:
-    """Write a force [N]."""
-    return f"{1e3 * force:.4g} mN"
-
-
-def deg(angle: float) -> str:
-    """Write an angle [rad]."""
-    return f"{degrees(angle):.4g} deg"

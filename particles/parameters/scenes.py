@@ -25,7 +25,7 @@ from reflowshock.quantity import Quantity
 
 PI = 3.14159265
 Direction = Literal["lift", "shift", "turn"]
-DEFAULT_PER_EDGE = 11
+DEFAULT_PER_EDGE, DEFAULT_PLACES = 11, 10
 # Hu et al. print 10 times the surface tension and 100 times the viscosity of molten SAC solder.
 PROPERTIES = {
     "physical": {"density": 8930.0, "surface_tension": 0.4985, "viscosity": 2.27e-3},
@@ -45,15 +45,17 @@ class FloatingPackage(Parameters):
 
 
 class PackagePath(Parameters):
-    """A package that is moved slowly from where the joint reflows to another place; the joint comes to rest each step.
+    """A package that is moved from where the joint reflows to another place; what is not given stays as it was.
 
-    What is not given stays as it was at the start.
+    It is moved slowly, and the joint comes to rest in each of 10 steps or as many as are given; or, where inertia acts
+    and with the scheme ispg, in one go at a speed: that of the pad's centre, or of its edge where it is turned.
     """
 
     standoff: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     offset: Annotated[float | None, Quantity("mm")] = Field(None, ge=0)
     tilt: Annotated[float | None, Quantity("deg")] = Field(None, gt=-PI / 6.0, lt=PI / 6.0)
-    steps: int = Field(10, ge=1, le=200)
+    steps: int | None = Field(None, ge=1, le=200)
+    speed: Annotated[float | None, Quantity("mm/s")] = Field(None, gt=0)
 
 
 class Drop(Parameters):
@@ -169,14 +171,24 @@ class Joint(Parameters):
 
     @property
     def places(self) -> list[JointGeometry]:
-        """Where the path leads, step by step; empty without one."""
+        """Where the path leads, step by step, in one at a speed; empty without a path."""
         if self.path is None:
             return []
         start = (self.standoff, self.offset, self.tilt)
         given = (self.path.standoff, self.path.offset, self.path.tilt)
         ways = [(a, a if b is None else b) for a, b in zip(start, given, strict=True)]
-        shares = [number / self.path.steps for number in range(1, self.path.steps + 1)]
+        steps = self.path.steps or (DEFAULT_PLACES if self.path.speed is None else 1)
+        shares = [number / steps for number in range(1, steps + 1)]
         return [self.place(*(a + share * (b - a) for a, b in ways)) for share in shares]
+
+    @property
+    def way(self) -> float:
+        """Length of the path [m], a rotation counted at the edge of the upper pad; zero without one."""
+        if not self.places:
+            return 0.0
+        end = self.places[-1]
+        turn = self.pad_top * (end.tilt[1] - self.tilt)
+        return math.hypot(end.gap - self.standoff, end.offset[0] - self.offset, turn)
 
     @property
     def resolution(self) -> float:
@@ -236,10 +248,15 @@ class Fluid(Liquid, Walls):
     def resolve(self, scene: Scene, gravity: Switch) -> Solder:
         """Return the solder of a scene, with the set's properties where none are given.
 
+        The scheme auto is energy here; `scene_checks.with_scheme` may take another.
+
         Args:
             scene: volume and contact angles.
             gravity: whether gravity acts.
         """
+        numerics = self.numerics.model_dump()
+        if self.numerics.scheme == "auto":
+            del numerics["scheme"]
         return Solder(
             volume=scene.volume,
             gravity=self.gravity,
@@ -247,7 +264,7 @@ class Fluid(Liquid, Walls):
             wall=self.wall,
             slip_length=self.slip_length,
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
-            numerics=SolderNumerics(spacing=scene.resolution, **self.numerics.model_dump()),
+            numerics=SolderNumerics(spacing=scene.resolution, **numerics),
             **scene.contact_angles,
             **self.properties,
         )

@@ -16,14 +16,16 @@ from reflowshock.quantity import Quantity
 class FlowNumerics(Parameters):
     """How a reflow is computed, apart from its resolution.
 
-    The scheme energy moves to the least energy of the tracked surface at exactly the volume. The scheme ispg is the
-    paper's method in a form that holds, for drops on a wall or that merge and one joint, with inertia. The scheme gripc
-    is what Hu et al. print, for comparison: time steps end at the capillary limit, and drops break up.
+    The scheme energy moves to the least energy of the tracked surface at exactly the volume, on tetrahedra where
+    inertia or viscosity acts. The scheme ispg is the paper's method in a form that holds, for drops on a wall or that
+    merge and one joint, with inertia. The scheme auto is ispg where that is verified, which costs less than
+    tetrahedra, else energy. The scheme gripc is what Hu et al. print, for comparison: time steps end at the capillary
+    limit, and drops break up.
 
     Where max_steps is not given, it is 1000; with ispg as many more as the slowest swing of the solder dies away in.
     """
 
-    scheme: Literal["energy", "ispg", "gripc"] = "energy"
+    scheme: Literal["auto", "energy", "ispg", "gripc"] = "auto"
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)
@@ -31,8 +33,9 @@ class FlowNumerics(Parameters):
 
 
 class SolderNumerics(FlowNumerics):
-    """How the reflow is computed."""
+    """How the reflow is computed, by a scheme that is decided."""
 
+    scheme: Literal["energy", "ispg", "gripc"] = "energy"
     spacing: Annotated[float, Quantity("mm")] = Field(4.0e-5, gt=0)
 
 

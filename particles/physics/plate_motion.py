@@ -60,9 +60,12 @@ class Travel:
 
     def given(self, plate: Plate, time_step: float) -> Floats:
         """Twist towards the target, `(6,)`."""
-        way = plate.motion_to(self.target)
-        length = float(np.linalg.norm(way * np.repeat((1.0, self.lever), 3)))
-        return way / max(time_step, length / self.speed)
+        return plate.motion_to(self.target) / max(time_step, self.duration(plate))
+
+    def duration(self, plate: Plate) -> float:
+        """Time that the way to the target takes [s]."""
+        way = plate.motion_to(self.target) * np.repeat((1.0, self.lever), 3)
+        return float(np.linalg.norm(way)) / self.speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -64,8 +64,10 @@ def joint_to_rest(
         geometries = [joint.geometry, *joint.places][: len(shapes)]
         references = [reference_meridian(geometry, solder, weight) for geometry in geometries]
         places = [_record(*place) for place in zip(geometries, shapes, references, strict=True)]
-        states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
-        shape = replace(shapes[-1], snapshots=states, metrics=shapes[-1].metrics | _worst(shapes))
+        shape = replace(shapes[-1], metrics=shapes[-1].metrics | _worst(shapes))
+        if joint.path.speed is None:
+            states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
+            shape = replace(shape, snapshots=states)
         return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
     first = None if checkpoints is None else checkpoints(0)
     if joint.package is None:
@@ -94,7 +96,8 @@ def _along(
 ) -> list[JointShape]:
     """The joint at rest at the start and in each place of the path, as far as the neck holds."""
     shapes = []
-    for shape in follow_path(joint.geometry, solder, joint.places, checkpoints):
+    speed = joint.path.speed if joint.path else None
+    for shape in follow_path(joint.geometry, solder, joint.places, checkpoints, speed):
         shapes.append(shape)
         if progress is not None:
             progress(len(shapes) / (1 + len(joint.places)))
@@ -134,17 +137,22 @@ def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) ->
 
 def _record(geometry: JointGeometry, shape: JointShape, reference: Meridian | None) -> dict:
     """Place, verdict, main metrics and the exact force, SI values; None where there is none."""
-    values = {name: shape.metrics[name][0] for name in OF_A_PLACE}
+    values = {name: _value(shape, name) for name in OF_A_PLACE}
     exact = {"axial_force_exact": float("nan") if reference is None else reference.axial_force}
     known = {name: value if np.isfinite(value) else None for name, value in (values | exact).items()}
     place = {"standoff": geometry.gap, "offset": geometry.offset[0], "tilt": geometry.tilt[1]}
     return place | {"verdict": shape.verdict} | known
 
 
+def _value(shape: JointShape, name: str) -> float:
+    """Value of a metric; nan where a shape has none, as a joint that has broken has no waist."""
+    return shape.metrics.get(name, (float("nan"), ""))[0]
+
+
 def _worst(shapes: Sequence[JointShape]) -> Metrics:
     """The largest errors of all places that have a reference, and how many places were reached."""
     worst: Metrics = {"places": (float(len(shapes)), "")}
     for name in ERRORS:
-        known = [shape.metrics[name][0] for shape in shapes if np.isfinite(shape.metrics[name][0])]
+        known = [value for shape in shapes if np.isfinite(value := _value(shape, name))]
         worst[name] = (max(known, key=abs, default=float("nan")), "")
     return worst

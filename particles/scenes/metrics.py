@@ -107,6 +107,22 @@ def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Me
     return contact
 
 
+def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
+    """Errors of a drop on one pad, in height and shape, against the exact one of its volume.
+
+    None where its weight pulls it off an upper plate: such drops have no reference.
+    """
+    body, plate, pad = flow.body, flow.body.plates[0], flow.physics.lines[0].pads[0]
+    volume, weight = body.volume()[0], _weight(flow)
+    if weight and plate.side > 0.0:
+        return {}
+    exact = reference_drop(solder.model_copy(update={"volume": volume}), pad.radius, weight)
+    upright = plate.local(body.points[: body.cloud.surface_count]) * np.array([1.0, 1.0, -plate.side])
+    error = shape_error(upright, body.triangles, exact) / float(np.cbrt(volume))
+    height = run.records[-1].height / exact.height - 1.0
+    return {"drop_height_error": (height, ""), "drop_shape_error": (error, "")}
+
+
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Collect the numbers of a joint whose solder is a drop on the board: those of the drop, under a joint's names."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)

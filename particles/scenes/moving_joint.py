@@ -1,15 +1,16 @@
-"""A joint whose package floats on the solder, or is moved slowly from place to place."""
+"""A joint whose package floats on the solder, or is moved: slowly from place to place, or at a speed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from math import degrees, hypot
+from math import ceil, degrees, hypot
 
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import joint_plates, placed_geometry
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import PlateMotion, Travel
-from reflowshock.particles.scenes.reflow import joint_shape, start_joint
+from reflowshock.particles.scenes.metrics import Metrics
+from reflowshock.particles.scenes.reflow import joint_shape, parted, start_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import run_to_rest
 from reflowshock.particles.steps.shape import JointShape
@@ -58,31 +59,49 @@ def follow_path(
     solder: Solder,
     path: Sequence[JointGeometry],
     checkpoints: Callable[[int], Checkpoint] | None = None,
+    speed: float | None = None,
 ) -> Iterator[JointShape]:
     """Move the package along a path and yield the joint at rest, at the start and in each place.
 
-    The path ends early where the neck ruptures. Call it in the quasi-static mode: the speed between the places has no
-    meaning, the plate goes a fifth of a spacing in the longest time step.
+    The path ends early where the neck ruptures. In the quasi-static mode the speed between the places has no meaning,
+    the plate goes a fifth of a spacing in the longest time step. With inertia it has, and where the neck breaks the
+    package takes its part of the solder along to where it goes; both parts come to rest there.
 
     Args:
         geometry: where the joint reflows.
         solder: volume, fluid and numerics; `max_steps` holds for each place.
         path: places of the package (gap, offset and tilt) one after the other.
         checkpoints: gives the checkpoint of each place by its number, that of the start is 0.
+        speed: of the package where inertia acts [m/s].
 
     Raises: as `solve_joint`.
     """
     flow, rule = start_joint(geometry, solder)
     for number, place in enumerate((geometry, *path)):
-        flow.physics = replace(flow.physics, motions=(travel(place, flow),))
+        motion, begun = travel(place, flow, speed), flow.time
+        steps = ceil(motion.duration(flow.body.plates[1]) / flow.time_step.largest)
+        flow.physics = replace(flow.physics, motions=(motion,))
         checkpoint = checkpoints(number) if checkpoints else None
-        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), checkpoint=checkpoint)
-        yield joint_shape(place, solder, flow, run)
+        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + steps + rule.max_steps), checkpoint=checkpoint)
+        shape = joint_shape(place, solder, flow, run)
         if run.ruptured:
+            yield _broken(shape, place, solder, flow, begun)
             return
+        yield shape
 
 
-def travel(place: JointGeometry, flow: LiquidFlow) -> Travel:
-    """Motion of a package to a place, quasi-static: a fifth of a spacing in the longest time step."""
-    speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
+def _broken(shape: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, begun: float) -> JointShape:
+    """The shape of a joint that breaks on the way to a place, with the standoff there and the time since it began."""
+    standoff = placed_geometry(place, flow.body.plates).gap
+    found: Metrics = {"standoff_at_break": (standoff, "m")}
+    if flow.physics.momenta:
+        found["time_at_break"] = (flow.time - begun, "s")
+        shape = parted(place, solder, flow, shape)
+    return replace(shape, metrics=shape.metrics | found)
+
+
+def travel(place: JointGeometry, flow: LiquidFlow, speed: float | None = None) -> Travel:
+    """Motion of a package to a place; without a speed [m/s] a fifth of a spacing in the longest time step."""
+    if speed is None:
+        speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
     return Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)

@@ -19,7 +19,8 @@ from reflowshock.particles.ispg.adaptation import restore_moments
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.rebuilt import Moving, take_over
-from reflowshock.particles.scenes.metrics import Metrics, ledger, particle_pressure, particles_lost
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
@@ -227,11 +228,12 @@ def _cut(body: Body, walls: tuple[Plate, ...], neck: float, below: float) -> tup
     )
 
 
-def parted_shape(joint: JointShape, drops: Sequence[Flowed]) -> JointShape:
+def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> JointShape:
     """The shape of an open joint: both drops at rest, with the history of the joint until its neck collapsed.
 
     Args:
         joint: when its neck collapsed.
+        solder: contact angles and fluid.
         drops: what `split_to_rest` returned.
     """
     bodies = [flow.body for flow, _ in drops]
@@ -246,12 +248,12 @@ def parted_shape(joint: JointShape, drops: Sequence[Flowed]) -> JointShape:
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(numbered_on([body.triangles for body in bodies], counts)),
         rings=tuple(numbered_on([body.cloud.rings[0] for body in bodies], counts)),
-        metrics=kept | _drop_metrics(drops),
+        metrics=kept | _drop_metrics(solder, drops),
     )
 
 
-def _drop_metrics(drops: Sequence[Flowed]) -> Metrics:
-    """Volume and height of each drop, and what an array is judged by."""
+def _drop_metrics(solder: Solder, drops: Sequence[Flowed]) -> Metrics:
+    """Volume and height of each drop with their errors, and what an array is judged by."""
     metrics: Metrics = ledger([flow for flow, _ in drops]) | {
         "max_width": (max(run.profiles[-1].max_width for _, run in drops), "m"),
         "axial_force": (0.0, "N"),
@@ -262,5 +264,6 @@ def _drop_metrics(drops: Sequence[Flowed]) -> Metrics:
     }
     for name, (flow, run) in zip(("board", "package"), drops, strict=True):
         metrics[f"volume_{name}"] = (flow.body.volume()[0], "m^3")
-        metrics[f"drop_height_{name}"] = (run.records[-1].height, "m")
+        errors = {"drop_height": (run.records[-1].height, "m")} | drop_errors(solder, flow, run)
+        metrics |= {f"{error}_{name}": number for error, number in errors.items()}
     return metrics

@@ -25,6 +25,7 @@ from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, de
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Acting, Physics
+from reflowshock.particles.physics.plate_motion import Travel
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -85,10 +86,19 @@ def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: Joi
         effects |= AT_REST
 
     def start(body: Body) -> LiquidFlow:
-        return start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
+        drop = start_flow(body.cloud, solder, effects, pad_lines(body.cloud, solder))
+        drop.physics = replace(drop.physics, motions=_taken_along(body, flow))
+        return drop
 
     drops = split_to_rest(flow, stop_rule(flow.body.cloud, solder, effects), start)
-    return parted_shape(shape, drops) if drops else shape
+    return parted_shape(shape, solder, drops) if drops else shape
+
+
+def _taken_along(drop: Body, flow: LiquidFlow) -> tuple[Travel, ...]:
+    """Motions of the plate of a drop that a joint has left on it."""
+    side, plates = drop.plates[0].side, flow.body.plates
+    moved = (motion for motion in flow.physics.motions if isinstance(motion, Travel))
+    return tuple(replace(motion, wall=0) for motion in moved if plates[motion.wall].side == side)
 
 
 def _start_on_board(geometry: JointGeometry, solder: Solder) -> tuple[LiquidFlow, StopRule]:

@@ -4,6 +4,7 @@ The vertices of the chain are spaced evenly at the rate at which triangles are e
 shifted as in space.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import ceil
 from typing import ClassVar, cast
@@ -18,7 +19,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance, conjugate_gradients
-from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
@@ -174,8 +175,8 @@ class SectionStep(IspgStep):
 class PreparedSectionStep(PreparedIspgStep):
     """A step from the section's current positions."""
 
-    def equations(self, body: Body, time_step: float) -> GalerkinEquations:
-        """The equations of a section at other positions, for a time step [s]."""
+    def equations(self, body: Body, time_step: float, _twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
+        """The equations of a section at other positions, for a time step [s]; its wall rests."""
         section, fluid = as_section(body), self.fluid(body.cloud.spacing)
         tensions = [part for part in self.physics.operators if isinstance(part, ChainTension)]
         space, basis = SectionSpace.of(section), admissible(body)
@@ -194,6 +195,8 @@ class PreparedSectionStep(PreparedIspgStep):
             stiffness=stiffness,
             rigid=rigid,
             drag=np.zeros(len(masses)),
+            walls=np.zeros_like(body.points),
+            riders=None,
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             spacing=body.cloud.spacing,
             time_step=time_step,

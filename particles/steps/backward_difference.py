@@ -50,10 +50,10 @@ class BackwardDifference:
         """Start a body of `count` particles."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
 
-    def stopped(self, held: NDArray[np.bool_]) -> "BackwardDifference":
-        """The last step without the motion of particles `(n,)` that something has caught since."""
+    def stopped(self, held: NDArray[np.bool_], carried: Floats) -> "BackwardDifference":
+        """The last step where particles `(n,)` that something has caught since went with it, by `(n, 3)` [m]."""
         still = held[:, None]
-        displacement, change = (np.where(still, 0.0, field) for field in (self.displacement, self.velocity_change))
+        displacement, change = np.where(still, carried, self.displacement), np.where(still, 0.0, self.velocity_change)
         return BackwardDifference(displacement, change, self.time_step)
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:

@@ -94,16 +94,17 @@ class Evening:
 def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: float) -> float:
     """Energy [J] that a step [s] must not exceed: that before it, where nothing but the energy drives the body.
 
-    Infinite where momentum is kept, a plate is moved, or friction holds a contact line, which no energy describes.
+    Infinite where momentum is kept, a plate is moved (its work is not known), or friction holds a contact line, which
+    no energy describes.
     """
     relaxes = solver.descends and not physics.momenta and all(line.has_energy for line in physics.lines)
-    if not relaxes or _is_driven(body, physics, time_step):
+    if not relaxes or is_driven(body, physics, time_step):
         return np.inf
     return physics.energy(body) + ROUNDING * sum(abs(force.energy(body)) for force in physics.forces)
 
 
-def _is_driven(body: Body, physics: Physics, time_step: float) -> bool:
-    """Whether a plate is moved in a step [s]: its work is not known."""
+def is_driven(body: Body, physics: Physics, time_step: float) -> bool:
+    """Whether a plate is moved in a step [s]."""
     for motion in physics.motions:
         plate, line = body.plates[motion.wall], body.points[body.cloud.rings[motion.wall]]
         way = time_step * plate.rigid_velocity(motion.given(plate, time_step), line)

@@ -44,6 +44,8 @@ class StepRecord:
         displacement: that velocity times the time step, over the spacing.
         flips: edges flipped.
         iterations: conjugate gradient steps of the pressure solve.
+        standoff: height of the second plate's origin above the first plate [m]; not a number with fewer plates.
+        pull: mean force that has moved a plate, along its way [N]; not a number where none was moved.
     """
 
     step: int
@@ -57,6 +59,8 @@ class StepRecord:
     displacement: float
     flips: int
     iterations: int
+    standoff: float
+    pull: float
 
 
 class LiquidFlow:
@@ -221,6 +225,11 @@ class LiquidFlow:
             where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
             raise StepCollapsed(f"{where}: {error}") from error
 
+    def _standoff(self) -> float:
+        """Height of the second plate above the first one [m]."""
+        first, *others = self.body.plates or (None,)
+        return float(first.local(others[0].origin[None])[0, 2]) if first and others else float("nan")
+
     def _normals(self) -> Floats:
         """Unit normals of the surface `(s, 3)`, along the walls on contact lines; zero where an edge holds a vertex."""
         normal = self.physics.admit(self.body, self.body.volume()[1])[: self.body.cloud.surface_count]
@@ -242,4 +251,6 @@ class LiquidFlow:
             displacement=speed * size / body.cloud.spacing,
             flips=flips,
             iterations=motion.iterations,
+            standoff=self._standoff(),
+            pull=motion.pull,
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import log
+from math import isfinite, log
 from time import perf_counter
 from typing import Any
 
@@ -14,6 +14,7 @@ from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
+from reflowshock.particles.steps.descent import is_driven
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow, StepRecord
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.time_step import StepCollapsed
@@ -99,8 +100,23 @@ class Run:
         return self.calm >= CALM_STEPS
 
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
-        """Columns of the records, with width and capillary number mu v / gamma."""
-        names = ("step", "time", "time_step", "binding", "height", "volume", "energy", "displacement", "iterations")
+        """Columns of the records, with width and capillary number mu v / gamma.
+
+        Where a plate was moved by a known force they have this, too, and the standoff.
+        """
+        names: tuple[str, ...] = (
+            "step",
+            "time",
+            "time_step",
+            "binding",
+            "height",
+            "volume",
+            "energy",
+            "displacement",
+            "iterations",
+        )
+        if any(isfinite(record.pull) for record in self.records):
+            names = (*names, "standoff", "pull")
         columns = {name: np.array([getattr(record, name) for record in self.records]) for name in names}
         if self.profiles:
             columns["width"] = np.array([profile.max_width for profile in self.profiles])
@@ -188,7 +204,8 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     run.records.append(record)
     run.profiles.append(flow.profile())
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
-    run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
+    calm = is_calm(run.records, rule) and not is_driven(flow.body, flow.physics, record.time_step)
+    run.calm = run.calm + 1 if calm else 0
     run.moved += record.displacement
     run.seconds += perf_counter() - start
 

@@ -311,7 +311,7 @@ class HystereticLine(ContactLine):
         super().__init__(
             wall, (Pad((0.0, 0.0), np.inf, receding_angle),), advancing_angle, local, np.array([len(local)])
         )
-        self.state[:] = PINNED
+        self.state[:], self._mean_cosine = PINNED, 0.5 * float(np.cos(receding_angle) + np.cos(advancing_angle))
 
     @property
     def has_energy(self) -> bool:
@@ -331,10 +331,6 @@ class HystereticLine(ContactLine):
         """The wetted area times the mean of both cosines, about which friction acts either way [m^2]."""
         points, _ = whole_points(body.cloud, body.points, self.wall)
         return self._mean_cosine * float(_sectors(body.plates[self.wall].local(points)[:, :2]).sum())
-
-    @property
-    def _mean_cosine(self) -> float:
-        return 0.5 * float(self._pad_cosine[0] + self._mask_cosine)
 
     def _area_gradient(self, body: Body) -> Floats:
         """Gradient of the wetted area by the vertices of the line, `(k, 3)` [m]."""
@@ -373,6 +369,10 @@ class RubbingLine(HystereticLine):
         """Force on the vertices that move, over the surface tension, beyond that of the energy, `(k, 3)` [m]."""
         beyond = np.where(self.state == PINNED, 0.0, self.cosine() - self._mean_cosine)
         return beyond[:, None] * self._area_gradient(body)
+
+    def rubbed(self, body: Body, velocity: Floats) -> float:
+        """Power that friction takes from velocities `(n, 3)` [m/s], over the surface tension [m^2/s]."""
+        return -float((self.friction(body) * velocity[body.cloud.rings[self.wall]]).sum())
 
     def settle(self, body: Body, velocity: Floats, needed: Floats, releases: bool) -> bool:
         """Hold vertices that moved against their sense, let those go that the wall cannot hold.

@@ -25,7 +25,18 @@ class SolderCase(Case):
     @property
     def molten(self) -> Solder:
         """The solder as the solver takes it."""
-        return self.solder.resolve(getattr(self, self.kind), self.gravity)
+        return self.decided[0]
+
+    @property
+    def decided(self) -> tuple[Solder, str]:
+        """The solder as the solver takes it, and why it has its scheme; no words where the case says it."""
+        scene = getattr(self, self.kind)
+        solder = self.solder.resolve(scene, self.gravity)
+        if self.solder.numerics.scheme != "auto":
+            return solder, ""
+        from reflowshock.particles.parameters.scene_checks import with_scheme
+
+        return with_scheme(scene, solder)
 
 
 class DropCase(SolderCase):
@@ -79,7 +90,7 @@ def of_drop(case: DropCase) -> list[Problem]:
 
 def of_joint(case: JointCase) -> list[Problem]:
     """Find parameters that make no possible joint together."""
-    from reflowshock.particles.parameters.scene_checks import joint_problems
+    from reflowshock.particles.parameters.joint_checks import joint_problems
 
     return joint_problems(case.joint, case.molten)
 

@@ -1,7 +1,7 @@
 """Effects, size and cost of the reflow of solder alone, and its table of the plan."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any
 
@@ -32,6 +32,7 @@ class SolderForecast:
         effects: effect -> {"on", "why"}.
         particles: number of particles.
         scheme: how steps are solved.
+        why: why so, where the case leaves it open.
         spacing: their distance at the start [m].
         capillary_limit: largest stable time step of an explicit surface tension [s].
         largest_step: largest time step that will be taken [s].
@@ -45,6 +46,7 @@ class SolderForecast:
     capillary_limit: float
     largest_step: float
     seconds: dict[str, float]
+    why: str = ""
 
 
 def forecast_solder(case: Case) -> SolderForecast:
@@ -65,12 +67,16 @@ def _of_drop(case: DropCase) -> SolderForecast:
 
 def _of_joint(case: JointCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_effects
-    from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
+    from reflowshock.particles.parameters.estimate import ispg_seconds, particle_count, reflow_seconds
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
     seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
-    return _towards_rest(case, decide_effects(geometry, solder), particles, seconds)
+    found, path = _towards_rest(case, decide_effects(geometry, solder), particles, seconds), case.joint.path
+    if path is None or path.speed is None:
+        return found
+    on_the_way = ispg_seconds(particles, ceil(case.joint.way / path.speed / found.largest_step))
+    return replace(found, seconds={"reflow": 2.0 * found.seconds["reflow"] + on_the_way})  # at rest before and after
 
 
 def _of_drops(case: DropsCase) -> SolderForecast:
@@ -105,7 +111,8 @@ def _towards_rest(
     if scheme == "ispg":
         seconds = (of_ispg or ispg_seconds)(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
-    return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost)
+    why = case.decided[1] if effects["inertia"]["on"] else ""
+    return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost, why)
 
 
 def _of_oscillation(case: OscillationCase) -> SolderForecast:
@@ -147,7 +154,7 @@ def solder_tables(case: Case, outlook: SolderForecast) -> Iterator[RenderableTyp
     """Yield particles, scheme and time steps; then what the costs assume."""
     table = new_table("\nReflow", "what", "value", "remark")
     table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} µm spacing at the start")
-    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme])
+    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme] + (f"; {outlook.why}" if outlook.why else ""))
     table.add_row(
         "capillary limit", short(outlook.capillary_limit), "largest stable time step of explicit surface tension"
     )

@@ -60,7 +60,7 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> list[Chart
 
 
 def history_curve(history: dict) -> list[Chart]:
-    """Return height and width, energy, capillary number and time step against the steps."""
+    """Return height and width, energy, capillary number and time step against the steps; the force of a pull first."""
     step, steps = history["step"], Axis("step")
     sizes = [
         Series(name, step, history[name] / MILLI, colour)
@@ -69,12 +69,16 @@ def history_curve(history: dict) -> list[Chart]:
     ]
     energy = [Series("energy", step, history["energy"] / MICRO)]
     capillary = [Series("capillary number", step, history["capillary_number"])]
-    return [
+    charts = [
         Chart(steps, Axis("size [mm]"), sizes),
         Chart(steps, Axis("energy [µJ]"), energy),
         Chart(steps, Axis("capillary number", log=True), capillary),
         Chart(steps, Axis("time step [µs]", log=True), [Series("time step", step, history["time_step"] / MICRO)]),
     ]
+    if "pull" in history:
+        force = Series("package", history["standoff"] / MILLI, history["pull"] / MILLI)
+        charts.insert(0, Chart(Axis("standoff [mm]"), Axis("force along the way [mN]"), [force]))
+    return charts
 
 
 def path_curve(places: Sequence[Mapping]) -> list[Chart]:
@@ -84,13 +88,15 @@ def path_curve(places: Sequence[Mapping]) -> list[Chart]:
     label, scale = axis_of[name]
     ordered = sorted(places, key=lambda place: place[name])
     way = [place[name] / scale for place in ordered]
-    force = [Series("particles", way, [place["axial_force"] / MILLI for place in ordered], line="none", marks=True)]
-    exact = [place["axial_force_exact"] for place in ordered]
-    if any(value is not None for value in exact):
-        values = [np.nan if value is None else value / MILLI for value in exact]
-        force.append(Series("Young-Laplace", way, values, RED, marks=True))
+
+    def values(key: str) -> list[float]:
+        return [np.nan if place[key] is None else place[key] / MILLI for place in ordered]
+
+    force = [Series("particles", way, values("axial_force"), line="none", marks=True)]
+    if not np.isnan(exact := values("axial_force_exact")).all():
+        force.append(Series("Young-Laplace", way, exact, RED, marks=True))
     widths = [
-        Series(shown, way, [place[key] / MILLI for place in ordered], colour, marks=True)
+        Series(shown, way, values(key), colour, marks=True)
         for key, shown, colour in (("waist", "waist", BLUE), ("max_width", "width", ORANGE))
     ]
     return [

@@ -103,7 +103,7 @@ def drop(parameters: DropTrial) -> dict[str, Measured]:
 
 def joint(parameters: JointTrial) -> dict[str, Measured]:
     """Bring a joint to rest, along its path if it has one."""
-    from reflowshock.particles.parameters.scene_checks import joint_problems
+    from reflowshock.particles.parameters.joint_checks import joint_problems
     from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
 
     solder = parameters.molten(parameters.joint)

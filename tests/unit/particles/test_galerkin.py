@@ -7,19 +7,21 @@ import pytest
 from scipy.linalg import null_space
 
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
+from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
+from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
+from reflowshock.particles.ispg.galerkin_equations import Flow
 from reflowshock.particles.ispg.gripc_step import force_pressure
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import centre
 from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motions
-from reflowshock.particles.ispg.step_kernels import pressure_matrix, pressure_operator
+from reflowshock.particles.ispg.step_kernels import pressure_matrix, pressure_operator, projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
@@ -114,6 +116,45 @@ def test_the_projection_keeps_the_volumes(ball):
     assert equations.momentum(field - start) == pytest.approx(push, abs=1e-12 * np.abs(push).max())
     lost = rigid_momenta(rigid_motions(body.points), equations.masses, field - start)
     assert lost == pytest.approx(0.0, abs=1e-10 * np.abs(push).sum())
+
+
+@pytest.fixture(scope="module")
+def between_plates():
+    """A joint whose plates move: the lower one along its normal, the upper one lifts and leans; its equations."""
+    joint = shaken(joint_cloud(JointGeometry(1.0, 1.0, 1.0), 3.0, 0.3))
+    twists = {0: np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]), 1: np.array([0.0, 0.0, -0.3, 0.1, 0.2, 0.0])}
+    return joint, twists, IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, twists)
+
+
+def test_walls_that_move_change_the_volume(between_plates):
+    """Rates of volume add up to that of the body; together with the liquid plates change none."""
+    joint, twists, equations = between_plates
+    field = equations.given + np.random.default_rng(6).normal(size=joint.points.shape) * (joint.cloud.wall < 0)[:, None]
+    assert equations.constraint(field).sum() == pytest.approx((joint.volume()[1] * field).sum())
+    together = dict.fromkeys(twists, np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]))
+    equations = IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, together)
+    uniform = np.broadcast_to(together[0][:3], joint.points.shape).copy()
+    assert equations.constraint(uniform) == pytest.approx(0.0, abs=1e-12)
+    assert equations.losses(uniform, uniform).viscous == pytest.approx(0.0, abs=1e-20)
+
+
+def test_plates_do_the_work_that_liquid_gains(between_plates):
+    """Of a step without surface tension: what its momentum takes, less what viscosity and smoothing do."""
+    joint, twists, equations = between_plates
+    before = np.random.default_rng(7).normal(size=joint.points.shape)
+    before = projected(equations.admitted, before) + equations.given
+    equations = replace(
+        equations, fluid=Flow(1.0, 0.1, 3.0), surface=(joint.triangles, np.zeros(joint.triangles.shape))
+    )
+    still = np.zeros_like(before)
+    start = equations.predict(before, still, np.zeros(len(still)))
+    rate = float((joint.volume()[1] * start).sum())
+    now, change = equations.project(start, rate, LaggedCholesky())
+    acting = change + 0.1 * equations.constraint(start) / equations.space.volumes
+    power = equations.power(joint, twists, equations.reaction((before, start, now), still, acting))
+    lost, inertia = equations.losses(start, now), (now * equations.momentum(now - before)).sum() / 1e-3
+    expansion = rate * float(acting @ equations.space.volumes) / equations.space.volumes.sum()
+    assert power + expansion == pytest.approx(inertia + lost.viscous + lost.smoothing, rel=1e-4)
 
 
 def test_the_pressure_matrix_is_that_of_its_operator(body, space):

@@ -48,6 +48,28 @@ def test_an_edge_between_two_walls_has_images_of_both():
     assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *found.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
 
 
+@pytest.mark.parametrize("slip", [np.inf, 0.1, 0.0])
+def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
+    """Rigid motion of plate and liquid: that of the images, those of images at a second plate included."""
+    points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
+    plates = (tilted(), Plate.horizontal(0.4, side=1.0))
+    twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
+    found = mirror(points, plates, REACH, [slip, slip])
+    other = np.concatenate((twist[:3] + np.cross(twist[3:], plates[1].origin - plates[0].origin), twist[3:]))
+    moving = plates[0].rigid_velocity(twist, points)
+    images = np.einsum("gcd,gd->gc", found.reflection, moving[found.source])
+    images += found.drift(points, plates, {0: twist, 1: other})
+    assert set(found.parent) - set(range(30))
+    assert images == pytest.approx(plates[0].rigid_velocity(twist, found.points))
+
+
+def test_a_plate_that_slides_takes_nothing_along_without_friction():
+    points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
+    plates = (Plate.horizontal(0.0),)
+    drift = mirror(points, plates, REACH).drift(points, plates, {0: np.array([1.0, 2.0, 0.0, 0.0, 0.0, 3.0])})
+    assert drift == pytest.approx(0.0, abs=1e-12)
+
+
 def gradients(basis):
     """Gradients at the particles of a wall, of an even and of a mirrored vector field."""
     axis = np.linspace(0.0, 1.0, 7)

@@ -11,9 +11,10 @@ from scipy import sparse
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.plate import joint_plates
 from reflowshock.particles.parameters.scenes import Drop, Drops
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.physics.plate_motion import LIFT, Floating
+from reflowshock.particles.physics.plate_motion import LIFT, Floating, Travel
 from reflowshock.particles.scenes.carried_joint import carried_shape, carry_joint
 from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
 from reflowshock.particles.scenes.drop_pair import pair_to_rest
@@ -66,6 +67,27 @@ def follow(checkpoint):
         return BreakingCheckpoint(path, checkpoint.left if number == 1 else -1)
 
     return points_of(follow_path(JOINT, SOLDER, path, at if checkpoint else None))
+
+
+def pull(checkpoint):
+    """A package that is pulled up and aside by the scheme ispg, for the time of some steps."""
+    end = joint_plates(JointGeometry(0.34e-3, RADIUS, RADIUS, (1e-5, 0.0), (0.0, 0.01)))[1]
+    return moved_in_galerkin_form(Travel(1, end, 0.2, RADIUS), checkpoint)
+
+
+def float_on(checkpoint):
+    """A package that floats, by the scheme ispg, for the time of some steps."""
+    return moved_in_galerkin_form(Floating(1, LIFT, np.array([0.0, 0.0, 1e-4])), checkpoint)
+
+
+def moved_in_galerkin_form(motion, checkpoint):
+    effects = SolderEffects(inertia="on", viscosity="on")
+    numerics = SolderNumerics(spacing=8e-5, scheme="ispg", time_step_limit=100)
+    fluid = {"surface_tension": 4.985, "viscosity": 0.227, "process_time": 2e-4}
+    solder = SOLDER.model_copy(update={"effects": effects, "numerics": numerics, **fluid})
+    shape = settle_joint(JOINT, solder, (motion,), checkpoint=checkpoint)
+    assert len(shape.history["time"]) > 8
+    return [shape.points, shape.velocity, shape.history["energy"], np.array(shape.metrics["offset"][0])]
 
 
 def carry(checkpoint):
@@ -154,7 +176,7 @@ def merge_with_inertia(checkpoint):
 
 
 FLOWS = [flow_as_printed, flow_in_galerkin_form, flow_in_section]
-RUNS = [settle, follow, carry, stand, stand_with_inertia, *FLOWS, swing, merge, merge_with_inertia]
+RUNS = [settle, follow, pull, float_on, carry, stand, stand_with_inertia, *FLOWS, swing, merge, merge_with_inertia]
 
 
 @pytest.mark.parametrize("run", RUNS)

@@ -49,9 +49,9 @@ def schemes_of(name, *settings):
 
 def test_schemes_of_a_drop_are_compared_at_the_same_spacings():
     found, refused = schemes_of("sessile_drop", "solder.effects.inertia=on", "solder.parameters=paper")
-    names = ["particle spacing", "particle spacing, relaxation", "particle spacing, ISPG"]
+    names = ["particle spacing", "particle spacing, relaxation", "particle spacing, tetrahedra"]
     assert list(found) == names and not refused
-    for name, inertia, scheme in zip(names, (True, False, True), ("energy", "energy", "ispg"), strict=True):
+    for name, inertia, scheme in zip(names, (True, False, True), ("ispg", "energy", "energy"), strict=True):
         cases = found[name].values()
         assert [case.drop.particles_per_edge for case in cases] == [5, 7, 9]
         assert {case.molten.numerics.scheme for case in cases} == {scheme}

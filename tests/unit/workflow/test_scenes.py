@@ -50,7 +50,11 @@ BAD_VALUES = {
     "unknown set": (DROP, "solder.parameters=papre", ["one of physical, paper", "did you mean paper?"]),
     "unknown key": (DROP, "drop.angle=60 deg", ["drop.angle", "unknown key", "contact_angle"]),
     "unknown switch": (DROP, "gravity=of", ['gravity = "of"', "one of auto, on, off", "did you mean off?"]),
-    "unknown scheme": (DROP, "solder.numerics.scheme=gripk", ["one of energy, ispg, gripc", "did you mean gripc?"]),
+    "unknown scheme": (
+        DROP,
+        "solder.numerics.scheme=gripk",
+        ["of auto, energy, ispg, gripc", "did you mean gripc?"],
+    ),
     "explicit step": (DROP, "solder.numerics.scheme=gripc", ["solder.numerics.time_step_limit", '"100"', "<= 1"]),
     "basis without its scheme": (DROP, "solder.numerics.basis=linear", ['basis = "linear"', 'scheme = "gripc"']),
     "ispg without inertia": (DROP, "solder.numerics.scheme=ispg", ['scheme = "ispg"', "without inertia", "energy"]),
@@ -120,6 +124,58 @@ def test_a_package_floats_or_is_moved():
 )
 def test_a_path_goes_from_rest_to_rest_at_least_energy(setting, key):
     assert key in problems_of(JOINT, "joint.path.standoff=0.3 mm", setting)
+
+
+SPEED = "joint.path={standoff='0.5 mm',speed='100 mm/s'}"
+GALERKIN = "solder.numerics.scheme=ispg"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ([SPEED], ['joint.path.speed = "100 mm/s"', "without inertia", 'inertia = "on"']),
+        (
+            [SPEED, "solder.effects.inertia=on", "solder.numerics.scheme=energy"],
+            ["solder.numerics.scheme", "at a speed (100 mm/s)", "ispg"],
+        ),
+        (["joint.path.standoff=0.5 mm", GALERKIN, "solder.effects.inertia=on"], ["or joint.path.speed with"]),
+        (["joint.path={speed='100 mm/s'}", GALERKIN, "solder.effects.inertia=on"], ["ends where it starts"]),
+        (["joint.path={standoff='0.5 mm',speed='0 mm/s'}"], ["joint.path.speed", "> 0"]),
+        (
+            ["joint.path={standoff='0.5 mm',speed='100 mm/s',steps=4}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.steps = 4", "in one go"],
+        ),
+        (
+            ["joint.path={standoff='0.5 mm',speed='1000 mm/s'}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.speed", "Weber number", "0.0025 mm/s to 482.3 mm/s"],
+        ),
+        (
+            ["joint.path={standoff='0.5 mm',speed='0.001 mm/s'}", GALERKIN, "solder.effects.inertia=on"],
+            ["joint.path.speed", "solder.process_time"],
+        ),
+        (
+            ["joint.package.load=1 mN", GALERKIN, "solder.effects.inertia=on", "solder.wall=no-slip"],
+            ["solder.numerics.scheme", "packages that float, on walls with friction"],
+        ),
+    ],
+)
+def test_a_package_at_a_speed_needs_inertia_and_the_scheme_ispg(settings, words):
+    text = problems_of(JOINT, *settings)
+    assert [word for word in words if word not in text] == [], text
+
+
+def test_a_slow_package_is_predicted_to_take_longer():
+    asked = [GALERKIN, "solder.effects.inertia=on"]
+    slow, fast = (
+        forecast_solder(read_case(JOINT, [f"joint.path={{standoff='0.5 mm',speed='{speed} mm/s'}}", *asked]))
+        for speed in (1, 100)
+    )
+    assert slow.seconds["reflow"] > fast.seconds["reflow"] > forecast_solder(read_case(JOINT, asked)).seconds["reflow"]
+
+
+@pytest.mark.parametrize("table", [SPEED, "joint.package.load=1 mN"])
+def test_packages_move_by_the_scheme_ispg(table):
+    assert of_joint(read_case(JOINT, [table, GALERKIN, "solder.effects.inertia=on"])) == []
 
 
 def test_too_little_solder_pulls_its_package_down():
@@ -273,24 +329,29 @@ def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, messag
     assert message in problems_of(DROP, *asked, setting)
 
 
+def test_the_scheme_ispg_takes_planes_of_symmetry():
+    """Tetrahedra do not."""
+    asked = ["solder.effects.inertia=on", *ISPG, "drop.symmetry=half"]
+    assert "or the scheme ispg" in problems_of(DROP, *asked, "solder.numerics.scheme=energy")
+    assert read_case(DROP, asked).molten.numerics.scheme == "ispg"
+
+
 @pytest.mark.parametrize(
-    ("setting", "place"),
+    ("case", "setting", "scheme", "why"),
     [
-        ("joint.package.load=0.1 mN", "packages that float"),
-        ("joint.path.standoff=0.4 mm", "packages that are moved"),
+        (DROP, "solder.effects.inertia=on", "ispg", "costs less than tetrahedra"),
+        (DROP, "solder.effects.inertia=off", "energy", "without inertia"),
+        (DROP, "drop.section=axisymmetric", "ispg", "costs less"),
+        (DROP, "drop.particles_per_edge=21", "energy", "(for 5 to 15 it is)"),
+        (PAIR, "drops.spacing=0.07 mm", "energy", "(up to 2000 it is)"),
+        (JOINT, "solder.wall=no-slip", "ispg", "costs less"),
+        (DROP, "solder.numerics.scheme=energy", "energy", ""),
     ],
 )
-def test_the_scheme_ispg_is_refused_for_joints_that_it_is_not_verified_for(setting, place):
-    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
-    assert read_case(JOINT, asked).molten.numerics.scheme == "ispg"
-    assert place in problems_of(JOINT, *asked, setting)
-
-
-def test_the_scheme_ispg_takes_planes_of_symmetry():
-    """The default does with a drop that relaxes, not with one that flows."""
-    asked = ["solder.effects.inertia=on", *ISPG, "drop.symmetry=half"]
-    assert "or the scheme ispg" in problems_of(DROP, *asked)
-    assert read_case(DROP, ["solder.numerics.scheme=ispg", *asked]).molten.numerics.scheme == "ispg"
+def test_with_inertia_the_scheme_that_costs_less_is_taken_where_it_is_verified(case, setting, scheme, why):
+    case = read_case(case, ["solder.effects.inertia=on", setting])
+    assert case.molten.numerics.scheme == scheme
+    assert why in case.decided[1]
 
 
 @pytest.mark.parametrize("setting", ["joint.tilt=3 deg", "solder.wall=no-slip"])
@@ -325,7 +386,9 @@ def test_the_scheme_ispg_is_refused_for_finer_particles_on_a_pad():
 
 
 def test_motion_that_matters_costs_all_steps_allowed():
-    calm, moving = (forecast_solder(read_case(DROP, [f"solder.effects.inertia={on}"])) for on in ("off", "on"))
-    longer = forecast_solder(read_case(DROP, ["solder.effects.inertia=on", "solder.numerics.max_steps=10000"]))
+    calm = forecast_solder(read_case(DROP, ["solder.effects.inertia=off"]))
+    asked = ["solder.effects.inertia=on", "solder.numerics.scheme=energy"]
+    moving = forecast_solder(read_case(DROP, asked))
+    longer = forecast_solder(read_case(DROP, [*asked, "solder.numerics.max_steps=10000"]))
     assert (calm.scheme, moving.scheme) == ("energy", "inertia")
     assert 5.0 * calm.seconds["reflow"] < moving.seconds["reflow"] < 0.2 * longer.seconds["reflow"]
