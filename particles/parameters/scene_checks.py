@@ -21,7 +21,7 @@ ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with h
 # 5 an edge at 30 degrees without slip was not at rest after 1600 steps; more than 11 were not run.
 FRICTION_EDGES, FRICTION_PAD_EDGES = (6, 11), (7, 9)
 ISPG_PAD_EDGE = 11
-IMPACT_EDGES, IMPACT_WEBER, IMPACT_REYNOLDS = (7, 11), 50.0, 300.0
+IMPACT_EDGES, IMPACT_WEBER, IMPACT_REYNOLDS = (7, 9), 50.0, 300.0
 ISPG_PAIR = 2000
 
 

@@ -202,7 +202,7 @@ def test_a_part_of_a_drop_rests_as_the_whole(count, symmetry):
 def test_a_drop_that_strikes_a_wall_spreads_and_comes_to_rest():
     """Weber number 50, Reynolds number 230, no slip, 90 degrees; the width of Pasandideh-Fard et al. (1996).
 
-    With 9 and 11 an edge it is 2 % below that.
+    With 9 an edge it is 2 % below that.
     """
     weber, (scene, solder) = 50.0, cube(7, 90.0, wall="no-slip")
     speed = float(np.sqrt(weber * solder.surface_tension / (solder.density * scene.diameter)))

@@ -299,7 +299,7 @@ IMPACT = ("drop.speed=4.7 m/s", "solder.wall=no-slip", "solder.parameters=paper"
         ("solder.wall=free-slip", "an impact is not verified with a wall that is slid on freely"),
         ("drop.pad_radius=0.4 mm", "an impact is not verified with a pad"),
         ("drop.symmetry=half", "an impact is not verified with planes of symmetry"),
-        ("drop.particles_per_edge=6", "for 6 particles along an edge; allowed: 7 to 11 along an edge"),
+        ("drop.particles_per_edge=6", "for 6 particles along an edge; allowed: 7 to 9 along an edge"),
         ("solder.numerics.scheme=energy", "needs the scheme ispg; or a case with [droplet]"),
     ],
 )
