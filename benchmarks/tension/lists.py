@@ -34,7 +34,7 @@ class Lists:
     def update(self, places: Floats, points: Floats) -> tuple[Indices, Indices]:
         """Return the lists of places `(m, 3)` among points `(n, 3)` [m]."""
         together, skin = np.concatenate((places, points)), SKIN * self.spacing
-        if len(together) != len(self._built_at) or have_moved(together, self._built_at, skin):
+        if len(together) != len(self._built_at) or have_moved(together.T, self._built_at.T, skin):
             self.rows, self._built_at = find_beside(places, points, self.reach + skin), together
         return self.rows
 

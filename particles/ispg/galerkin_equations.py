@@ -41,7 +41,8 @@ from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCh
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.rigid_motions import Riders, wall_velocities
+from reflowshock.particles.ispg.rigid_motions import Riders, rigid_part, wall_velocities
+from reflowshock.particles.steps.descent import ARRIVED
 
 Drive = Callable[[Floats, Floats], Floats]
 # Of a spacing or of a particle's volume in a step: errors of the solves that are not worth an iteration.
@@ -120,6 +121,11 @@ class GalerkinEquations:
     def kinetic(self, field: Floats) -> float:
         """Kinetic energy [J]."""
         return 0.5 * float((field * self.momentum(field)).sum())
+
+    def slide(self, velocity: Floats, most: float) -> Floats | None:
+        """The rigid part of a velocity `(n, 3)` [m/s]; None where its kinetic energy is more than the most [J]."""
+        part = rigid_part(self.rigid, self.masses, velocity)
+        return part if self.kinetic(part) <= most else None
 
     def rubbed(self, velocity: Floats, force: Floats) -> Floats:
         """Velocity [m/s] under friction: of viscosity, walls and smoothing.
@@ -346,6 +352,14 @@ class GalerkinEquations:
         on_walls, on_images = forces
         at_walls, at_images = wall_velocities(body, twists), self.space.drift_of(body, twists)
         return float((on_walls * at_walls).sum() + (on_images * at_images).sum())
+
+    def work(self, body: Body, ways: Mapping[int, Floats], forces: tuple[Floats, Floats]) -> tuple[float, float]:
+        """Work [J] of these forces on plates that go some ways `(6,)` [m, rad], and the mean force along them [N].
+
+        There is no such force where they have arrived.
+        """
+        done, way = self.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
+        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _stress(self, gradient: Floats) -> Floats:
         """Viscous stress times volume `(n, 3, 3)` [N m]."""

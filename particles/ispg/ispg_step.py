@@ -9,7 +9,7 @@ As in `inertial_step`, forces and operators are taken at predicted positions, an
 the change of the velocity only.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -40,16 +40,17 @@ from reflowshock.particles.ispg.rigid_motions import (
     rigid_momenta,
     rigid_motions,
     wall_velocities,
+    with_momenta,
 )
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
-from reflowshock.particles.steps.descent import ARRIVED
 from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
+from reflowshock.particles.surface.contact_line import RubbingLine
 
 SUPPORT = 1.5
 # Forces are predicted with the velocity of this part of a step before: with later ones modes that resist less than
@@ -61,6 +62,8 @@ SMOOTHING = 10.0
 # A cube's vertices have eight and four triangles by turns, which are Delaunay: a vertex that keeps its eight stands out
 # of a surface at rest by 4 % of a spacing, and drops of 5 an edge are 1 % too high with one at the top.
 FLIP_WORTH = 0.1
+# Of the energy of the forces: a rigid motion with less does not count where walls, being smooth, never end it.
+SLIDING = 1e-6
 
 
 @dataclass(slots=True)
@@ -69,7 +72,7 @@ class IspgStep:
 
     Attributes:
         past: what the last step left, None before the first.
-        first_energy: of the forces before the first step [J].
+        first_energy: of the forces and the motion before the first step [J].
         factors: of the pressure equation.
     """
 
@@ -178,11 +181,35 @@ class PreparedIspgStep:
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
 
+        Again until those vertices stand that the friction of a wall holds; only the first time are any let go.
+
         Raises:
             SolveFailed: a linear solve failed.
             DegenerateStencil: a particle has too few neighbours.
             NoVolumes: the particles do not fill the body.
         """
+        rubbing, releases = [line for line in self.physics.lines if isinstance(line, RubbingLine)], True
+        while True:
+            motion = (self._held() if rubbing else self)._attempt(time_step, volume, rubbing, releases)
+            if motion is not None:
+                return motion
+            releases = False
+
+    def _held(self) -> "PreparedIspgStep":
+        """The step with what its contact lines hold now."""
+        projections = self.physics.projections(self.body)
+        return replace(
+            self,
+            body=replace(self.body, velocity=projected(projections, self.body.velocity)),
+            past=self.past.stopped(self.body, self.physics, projections),
+            projections=projections,
+            admitted=admitted_motions(self.body.points, projections),
+        )
+
+    def _attempt(
+        self, time_step: float, volume: float, rubbing: Sequence[RubbingLine], releases: bool
+    ) -> Motion | None:
+        """The motion with the vertices held that are; None where others are to be, and may be released."""
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
         pace = self._pace(base)
@@ -205,6 +232,11 @@ class PreparedIspgStep:
         change = equations.project(start, rate, self.solver.factors, drive)
         mean = start + drive(equations.push(change), equations.on_images(change))
         pressure = past.pressure + change
+        if given or rubbing:
+            forces = equations.reaction((base.velocity, rubbed, mean), force, pressure)
+            changed = [line.settle(predicted, mean, forces[0] / self.tension, releases) for line in rubbing]
+            if any(changed):
+                return None
         twists = given | equations.twists(mean, guessed)
         plates = self._plates.next(twists, time_step)
         ways = {wall: plate.displacement for wall, plate in plates.items()}
@@ -213,12 +245,14 @@ class PreparedIspgStep:
         moved = body.placed(body.points + history.displacement, ways)
         history = replace(history, displacement=moved.points - body.points)
         transport = history.displacement / time_step
-        volumes = equations.space.volumes
-        mean_pressure = float(pressure @ volumes / volumes.sum())
+        mean_pressure = float(np.average(pressure, weights=equations.space.volumes))
         momenta = rigid_momenta(motions, equations.masses, velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
-        losses = self._carried_losses(equations, past.velocity)
+        kinetic = equations.kinetic(past.velocity)
+        if past.kinetic is None and kinetic:  # it starts in motion
+            self.solver.first_energy = self.energy + kinetic
+        losses = past.carried_losses(kinetic, self.energy)
         way = mean if plates else transport
         acting = Acting(rubbed, (mean - base.velocity) / base.time_step, way)
         losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
@@ -228,12 +262,12 @@ class PreparedIspgStep:
         work = time_step * (float((driving * way).sum() + pressure @ equations.constraint(way)) + loads)
         done, pull = 0.0, float("nan")
         if given:
-            forces = equations.reaction((base.velocity, rubbed, mean), force, pressure)
-            done, pull = self._plate_work(predicted, equations, {wall: ways[wall] for wall in given}, forces)
+            done, pull = equations.work(predicted, {wall: ways[wall] for wall in given}, forces)
             work += time_step * equations.power(predicted, given, forces) - done
-        losses = replace(losses, plates=losses.plates - done)
+        slid = time_step * self.tension * sum(line.rubbed(predicted, way) for line in rubbing)
+        integration = losses.integration + self.energy - potential - work - slid
+        losses = replace(losses, integration=integration, plates=losses.plates - done, line=losses.line + slid)
         gradient = equations.space.gradient(velocity)
-        gain = np.zeros(6) if past.kinetic is None else momenta - past.momenta
         self.solver.past = GalerkinPast(
             points=moved.points,
             centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
@@ -246,9 +280,9 @@ class PreparedIspgStep:
             volumes=equations.space.carried,
             evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
-            momenta_change=gain,
+            momenta_change=np.zeros(6) if past.kinetic is None else momenta - past.momenta,
             history=history,
-            losses=replace(losses, integration=losses.integration + self.energy - potential - work),
+            losses=losses,
             plates=self._plates.kept(plates),
         )
         return Motion(
@@ -259,17 +293,8 @@ class PreparedIspgStep:
             twists={wall: way / time_step for wall, way in ways.items()},
             iterations=self.solver.factors.iterations,
             pull=pull,
+            drift=None if has_friction(self.physics) else equations.slide(velocity, SLIDING * abs(self.energy)),
         )
-
-    def _plate_work(
-        self, body: Body, equations: GalerkinEquations, ways: dict[int, Floats], forces: tuple[Floats, Floats]
-    ) -> tuple[float, float]:
-        """Work of plates on their ways `(6,)` [J] by the forces of `GalerkinEquations.reaction`, mean force along them.
-
-        There is no such force where they have arrived.
-        """
-        done, way = equations.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
-        return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
 
     def _with_momenta(self, equations: GalerkinEquations, motions: Floats) -> GalerkinPast:
         """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
@@ -278,20 +303,13 @@ class PreparedIspgStep:
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
         drop would be left turning.
         """
-        past, kept, masses, basis = self.past, self.admitted, equations.masses, equations.rigid
-        motions = motions[kept]
-        # Momenta along the motions of the basis, by columns.
-        moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T
-
-        def corrected(velocity: Floats, momenta: Floats) -> Floats:
-            missing = momenta[kept] - rigid_momenta(motions, masses, velocity)
-            return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)
-
+        past, kept = self.past, self.admitted
         if not kept.any():
             return past
-        change = corrected(past.history.velocity_change, past.momenta_change)
-        history = replace(past.history, velocity_change=change)
-        return replace(past, velocity=corrected(past.velocity, past.momenta), history=history)
+        along = motions[kept], equations.masses, equations.rigid
+        velocity = with_momenta(*along, past.velocity, past.momenta[kept])
+        change = with_momenta(*along, past.history.velocity_change, past.momenta_change[kept])
+        return replace(past, velocity=velocity, history=replace(past.history, velocity_change=change))
 
     def _rate_of_volume(
         self, guess: Floats, predicted: Body, twists: Mapping[int, Floats], end: tuple[float, float]
@@ -333,9 +351,8 @@ class PreparedIspgStep:
 
     def _before(self) -> Floats:
         """Velocity of a part of a step ago `(n, 3)` [m/s]."""
-        if not self.physics.momenta:
-            return np.zeros_like(self.body.points)
-        return self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+        moving = self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+        return moving if self.physics.momenta else np.zeros_like(moving)
 
     def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
         """Velocity of the prediction `(n, 3)` [m/s]: that before, at a share of its pace, and that of plates."""
@@ -381,11 +398,3 @@ class PreparedIspgStep:
             time_step=time_step,
             inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), 3 * len(masses)), time_step),
         )
-
-    def _carried_losses(self, equations: GalerkinEquations, velocity: Floats) -> LostEnergy:
-        """Losses up to this step, which starts with new masses and a velocity `(n, 3)` [m/s]."""
-        past, kinetic = self.past, equations.kinetic(velocity)
-        transfer = 0.0 if past.kinetic is None else past.kinetic - kinetic
-        evening = past.potential - self.energy
-        losses = past.losses
-        return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)

@@ -30,6 +30,7 @@ class LostEnergy:
         transfer: to the shift of particles, which take the velocity where they come, and to new masses.
         evening: to what keeps triangles well shaped, at the volume.
         rebuilding: to bodies made anew, where liquids meet or part.
+        line: to the friction of contact lines on walls with hysteresis.
         plates: to plates that are moved; negative where they give work to the liquid.
     """
 
@@ -39,6 +40,7 @@ class LostEnergy:
     transfer: float = 0.0
     evening: float = 0.0
     rebuilding: float = 0.0
+    line: float = 0.0
     plates: float = 0.0
 
     @property
@@ -109,6 +111,13 @@ class GalerkinPast:
         at_rest = (body.pressure, np.zeros((len(body.points), 3)), unknown, 1.0, still, still)
         return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
 
+    def carried_losses(self, kinetic: float, potential: float) -> LostEnergy:
+        """Losses up to a step that starts with these energies [J], of new masses and of triangles that have moved."""
+        transfer = 0.0 if self.kinetic is None else self.kinetic - kinetic
+        evening = self.potential - potential
+        losses = self.losses
+        return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
+
     def carried_on(
         self, body: Body, physics: Physics, projections: Floats, admitted: NDArray[np.bool_]
     ) -> "GalerkinPast":
@@ -124,6 +133,12 @@ class GalerkinPast:
         history = self.history.stopped(physics.pinned(body), wall_velocities(body, self.ways))
         acceleration = projected(projections, self.acceleration)
         return replace(self, points=body.points, velocity=velocity, acceleration=acceleration, history=history)
+
+    def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
+        """The past of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
+        history = self.history.stopped(physics.pinned(body), np.zeros_like(body.points))
+        velocity, acceleration = (projected(projections, each) for each in (self.velocity, self.acceleration))
+        return replace(self, velocity=velocity, acceleration=acceleration, history=history)
 
 
 def centre(body: Body) -> Floats:

@@ -174,3 +174,15 @@ def orthonormal(motions: Floats, masses: Floats) -> Floats:
     flat = motions.reshape(len(motions), 3 * len(masses))
     basis = np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
     return basis.reshape(motions.shape)
+
+
+def rigid_part(basis: Floats, masses: Floats, velocity: Floats) -> Floats:
+    """The part of a velocity `(n, 3)` [m/s] that is a sum of rigid motions, a basis as `orthonormal` gives it."""
+    return np.tensordot(rigid_momenta(basis, masses, velocity), basis, axes=1)
+
+
+def with_momenta(motions: Floats, masses: Floats, basis: Floats, velocity: Floats, momenta: Floats) -> Floats:
+    """A velocity `(n, 3)` [m/s] with momenta `(k,)` along k rigid motions, corrected by a basis of as many others."""
+    moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T  # by columns
+    missing = momenta - rigid_momenta(motions, masses, velocity)
+    return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)

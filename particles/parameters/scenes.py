@@ -66,6 +66,7 @@ class Drop(Parameters):
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
     With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as the cube.
+    With ``speed`` it strikes the wall, by the scheme ispg: it starts as a sphere with the foot of a cap of 155 degrees.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -74,6 +75,7 @@ class Drop(Parameters):
     advancing_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
     pad_radius: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     mask_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(148.0), gt=0, lt=PI)
+    speed: Annotated[float | None, Quantity("m/s")] = Field(None, gt=0)
     spacing: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
@@ -91,6 +93,11 @@ class Drop(Parameters):
             return self.count * (1 + round((self.count - 1) / pi**0.5))
         cuts = len(self.symmetry_axes)
         return self.count ** (3 - cuts) * ((self.count + 1) // 2) ** cuts
+
+    @property
+    def diameter(self) -> float:
+        """Diameter of the free drop [m]."""
+        return (6.0 * self.volume / pi) ** (1.0 / 3.0)
 
     @property
     def edge(self) -> float:

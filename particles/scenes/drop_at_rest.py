@@ -1,14 +1,17 @@
-"""A drop of its own brought to rest: free, on a uniform wall with or without hysteresis, or on a pad in the mask."""
+"""A drop of its own brought to rest: free, on a uniform wall with or without hysteresis, or on a pad in the mask.
+
+It starts as a cube; or as a sphere that has just touched the wall and flies on.
+"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import Cloud, box_cloud, free_box_cloud
 from reflowshock.particles.core.symmetry import cut
-from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, Decision, acting_weight, decide_drop, switched
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
@@ -19,9 +22,13 @@ from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine
+from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine, RubbingLine
+from reflowshock.particles.surface.profile import width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
+# Of the cap that a drop which strikes a wall starts as: at 160 degrees particles slip out between surface and wall.
+TOUCHING_ANGLE = float(np.radians(155.0))
+TOUCHING_STEP = 100.0  # capillary limits, while it takes this shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +60,11 @@ def drop_to_rest(
     """
     effects = decide_drop(solder, drop.is_free)
     flow, run = flow_to_rest(drop, solder, progress, checkpoint)
-    is_known = drop.is_free or effects["wall_adhesion"]["on"]
+    stands = drop.hysteresis is not None and effects["inertia"]["on"]  # a swing ends anywhere between both angles
+    is_known = drop.is_free or (effects["wall_adhesion"]["on"] and not stands)
     reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
     metrics = body_metrics(solder, reference, flow, run)
-    shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics))
+    shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics) | _spread(drop, run))
     surface = flow.body.narrow() if isinstance(flow.body, Section) else flow.body
     return DropAtRest(with_shape_error(shape, solder, reference, surface), effects, reference)
 
@@ -76,8 +84,32 @@ def flow_to_rest(
         )
     whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
     cloud = cut(whole, drop.symmetry_axes)
+    if drop.speed is not None:
+        cloud = _touching(cloud, solder)
     flow = start_flow(cloud, solder, acting, _contact_lines(drop, solder, cloud))
+    if drop.speed is not None:
+        flight = np.broadcast_to([0.0, 0.0, -drop.speed], cloud.points.shape)
+        flow.body.velocity = flow.physics.admit(flow.body, flight)
     return flow, run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
+
+
+def _touching(cloud: Cloud, solder: Solder) -> Cloud:
+    """The particles of a cube on a wall as a sphere that has just touched it."""
+    numerics = solder.numerics.model_copy(update={"scheme": "energy", "time_step_limit": TOUCHING_STEP})
+    still = solder.model_copy(update={"numerics": numerics, "pad_contact_angle": TOUCHING_ANGLE})
+    acting = {effect.name: effect.name in ("surface_tension", "wall_adhesion") for effect in LIQUID_EFFECTS}
+    flow = start_flow(cloud, still, acting, (contact_line(cloud, 0, np.inf, still),))
+    run_to_rest(flow, stop_rule(cloud, still, acting))
+    return replace(cloud, points=flow.body.points, triangles=flow.body.triangles)
+
+
+def _spread(drop: Drop, run: Run) -> Metrics:
+    """Largest width of a drop that strikes a wall over its diameter, and when it has it."""
+    if drop.speed is None:
+        return {}
+    widths = [width(snapshot.points) for snapshot in run.snapshots]
+    widest = int(np.argmax(widths))
+    return {"spread_max": (widths[widest] / drop.diameter, ""), "time_of_spread_max": (run.snapshots[widest].time, "s")}
 
 
 def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLine, ...]:
@@ -85,7 +117,8 @@ def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLin
         return ()
     if drop.hysteresis is None:
         return (contact_line(cloud, 0, drop.edge_radius, solder),)
-    return (HystereticLine(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
+    line = RubbingLine if solder.numerics.scheme == "ispg" else HystereticLine
+    return (line(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
 
 
 def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:

@@ -20,6 +20,7 @@ from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
+from reflowshock.particles.surface.profile import width
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
@@ -27,8 +28,6 @@ COLUMNS = (
 )  # fmt: skip
 # Share of the radius within which the pressure of a free drop is averaged: the surface is far.
 CORE = 0.5
-# Directions over which the width of the drop is averaged.
-DIRECTIONS = 36
 # In spacings, and over the height: where the profile of a drop on a wall is read. Next to the wall it is rounded.
 FOOT, SHOULDER = 1.5, 0.7
 FEWEST = 12
@@ -168,13 +167,6 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
         simulation.kinetic_energy, surface.energy, surface.volume / scene.volume,
         2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(parts_of(surface.triangles)),
     )  # fmt: skip
-
-
-def width(points: Floats) -> float:
-    """Horizontal width of a surface `(m, 3)` [m], the mean over directions."""
-    angles = pi * np.arange(DIRECTIONS) / DIRECTIONS
-    along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
-    return float(np.ptp(along, axis=0).mean())
 
 
 def _height(scene: Droplet, points: Floats) -> float:

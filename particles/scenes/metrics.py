@@ -288,7 +288,10 @@ def particles_lost(body: Body) -> int:
 
 
 def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
-    """What became of the energy that the scheme ispg started with, in all bodies; over that energy."""
+    """What became of the energy that the scheme ispg started with, in all bodies, over that energy.
+
+    And how fast a body slides, which on smooth walls it may do for ever, as it is.
+    """
     moved = [(flow, flow.solver.past, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     known = [(flow, past, first) for flow, past, first in moved if past is not None]
     if not known:
@@ -297,7 +300,8 @@ def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
     now = sum(flow.physics.energy(flow.body) + (past.kinetic or 0.0) for flow, past, _ in known)
     lost = total_losses([past.losses for _, past, _ in known])
     metrics: Metrics = {f"{entry.name}_loss": (getattr(lost, entry.name) / first, "") for entry in fields(lost)}
-    return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, "")}
+    slides = max(float(np.linalg.norm(past.volumes @ past.velocity)) / past.volumes.sum() for _, past, _ in known)
+    return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, ""), "slide_speed": (slides, "m/s")}
 
 
 def width_change_bound(geometry: JointGeometry) -> float:

@@ -39,7 +39,8 @@ class StepRecord:
     Attributes:
         step, time, time_step, binding: number, end and size of the step [s], and what bound its size.
         height, volume, energy: of the body after the step [m, m^3, J].
-        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s].
+        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s]; beyond that
+            of a rigid motion that nothing ends.
         displacement: that velocity times the time step, over the spacing.
         flips: edges flipped.
         iterations: conjugate gradient steps of the pressure solve.
@@ -236,7 +237,8 @@ class LiquidFlow:
 
     def _record(self, flips: int, motion: Motion) -> StepRecord:
         body, size = self.body, self.time_step.size
-        speed = float(np.abs((self.pace * self._normals()).sum(axis=1)).max())
+        pace = self.pace if motion.drift is None else self.pace - motion.drift[: len(self.pace)]
+        speed = float(np.abs((pace * self._normals()).sum(axis=1)).max())
         return StepRecord(
             step=self.steps,
             time=self.time,

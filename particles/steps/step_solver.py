@@ -23,6 +23,7 @@ class Motion:
         surface_pressure: pressure that carries the volume constraint [Pa].
         twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
         iterations: of the pressure solve.
+        drift: `(n, 3)` rigid motion that nothing ends, on smooth walls [m/s]; None where there is none.
         pull: mean force on a plate that is moved, along its way [N]; not a number where none is, or it is not known.
     """
 
@@ -32,6 +33,7 @@ class Motion:
     surface_pressure: float
     twists: dict[int, Floats]
     iterations: int
+    drift: Floats | None = None
     pull: float = float("nan")
 
     @property

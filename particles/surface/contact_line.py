@@ -311,7 +311,7 @@ class HystereticLine(ContactLine):
         super().__init__(
             wall, (Pad((0.0, 0.0), np.inf, receding_angle),), advancing_angle, local, np.array([len(local)])
         )
-        self.state[:] = PINNED
+        self.state[:], self._mean_cosine = PINNED, 0.5 * float(np.cos(receding_angle) + np.cos(advancing_angle))
 
     @property
     def has_energy(self) -> bool:
@@ -325,9 +325,18 @@ class HystereticLine(ContactLine):
 
     def cosine_area_gradient(self, body: Body) -> Floats:
         """Force over the surface tension: the angle that acts on each vertex times the gradient of the wetted area."""
+        return self.cosine()[:, None] * self._area_gradient(body)
+
+    def _level(self, body: Body) -> float:
+        """The wetted area times the mean of both cosines, about which friction acts either way [m^2]."""
+        points, _ = whole_points(body.cloud, body.points, self.wall)
+        return self._mean_cosine * float(_sectors(body.plates[self.wall].local(points)[:, :2]).sum())
+
+    def _area_gradient(self, body: Body) -> Floats:
+        """Gradient of the wetted area by the vertices of the line, `(k, 3)` [m]."""
         ring, (points, index) = body.cloud.rings[self.wall], whole_points(body.cloud, body.points, self.wall)
         whole = ring_area_gradient(points, np.arange(len(index), dtype=np.int32))[: len(ring)]
-        return (self.cosine() * share(body.cloud)[ring])[:, None] * whole
+        return share(body.cloud)[ring][:, None] * whole
 
     def update(self, body: Body, load: Floats, coefficient: float) -> None:
         """Let vertices stand that moved against their sense, release those whose angle passed one of the two.
@@ -341,3 +350,49 @@ class HystereticLine(ContactLine):
         cosine, standing = self.contact_cosine(body, load, coefficient), self.state == PINNED
         self.state[standing & (cosine > self._pad_cosine[0] + RELEASE_MARGIN)] = RECEDING
         self.state[standing & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ADVANCING
+
+
+class RubbingLine(HystereticLine):
+    """A contact line with hysteresis in a flow with inertia, whose friction is part of the step.
+
+    Coulomb's law at each vertex: the wall pulls with gamma cos(theta) a unit length, theta between both angles, as is
+    needed to hold it; it moves only with the force of one of them, against its motion. Which vertices stand is found
+    with the velocities of the step (`settle`), so that friction never gives energy.
+    """
+
+    @property
+    def has_events(self) -> bool:
+        """None before a step."""
+        return False
+
+    def friction(self, body: Body) -> Floats:
+        """Force on the vertices that move, over the surface tension, beyond that of the energy, `(k, 3)` [m]."""
+        beyond = np.where(self.state == PINNED, 0.0, self.cosine() - self._mean_cosine)
+        return beyond[:, None] * self._area_gradient(body)
+
+    def rubbed(self, body: Body, velocity: Floats) -> float:
+        """Power that friction takes from velocities `(n, 3)` [m/s], over the surface tension [m^2/s]."""
+        return -float((self.friction(body) * velocity[body.cloud.rings[self.wall]]).sum())
+
+    def settle(self, body: Body, velocity: Floats, needed: Floats, releases: bool) -> bool:
+        """Hold vertices that moved against their sense, let those go that the wall cannot hold.
+
+        Args:
+            body: where the forces of a step were taken.
+            velocity: at its end, `(n, 3)` [m/s].
+            needed: force over the surface tension that holds the vertices that stand, `(n, 3)` [m].
+            releases: whether vertices are let go.
+
+        Returns:
+            Whether any vertex has changed: the step is to be solved again.
+        """
+        ring, across = body.cloud.rings[self.wall], self._area_gradient(body)
+        speed, state, standing = (velocity[ring] * across).sum(axis=1), self.state.copy(), self.state == PINNED
+        state[((state == ADVANCING) & (speed < 0.0)) | ((state == RECEDING) & (speed > 0.0))] = PINNED
+        if releases:
+            cosine = (needed[ring] * across).sum(axis=1) / (across**2).sum(axis=1)
+            state[standing & (cosine > self._pad_cosine[0])] = RECEDING
+            state[standing & (cosine < self._mask_cosine)] = ADVANCING
+        changed = bool((state != self.state).any())
+        self.state = state
+        return changed

@@ -17,6 +17,7 @@ NODES = np.polynomial.legendre.leggauss(64)[0]
 DEGREE = 6
 SAMPLES = 401
 APEX_PASSES = 4
+DIRECTIONS = 36  # over which the width is averaged
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,3 +115,10 @@ def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Pro
     """Fit the areas `(k,)` [m^2] of cross-sections at heights `(k,)` between two [m]."""
     heights = 0.5 * (low + high) + 0.5 * (high - low) * NODES
     return Profile.of(Legendre.fit(heights, areas(heights), DEGREE, domain=[low, high]))
+
+
+def width(points: Floats) -> float:
+    """Horizontal width of a surface `(m, 3)` [m], the mean over directions."""
+    angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
+    return float(np.ptp(along, axis=0).mean())

@@ -1,14 +1,19 @@
-"""Contact angle hysteresis: a drop that is filled and emptied on one wall, against spherical caps."""
+"""Contact angle hysteresis: a drop that is filled and emptied on one wall, against spherical caps; with inertia."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.surface_measure import ring_area
-from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.parameters.scenes import Drop
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
+from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
-from reflowshock.particles.surface.contact_line import HystereticLine
+from reflowshock.particles.surface.contact_line import PINNED, HystereticLine, RubbingLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)
@@ -54,3 +59,67 @@ def test_a_drop_that_is_filled_and_emptied(flow):
     radius, _, angle = to_volume(liquid, solder, 0.3 * VOLUME)
     assert angle == pytest.approx(np.degrees(RECEDING), abs=1.0)  # it has receded
     assert radius == pytest.approx(base_radius(0.3 * VOLUME, RECEDING), rel=1e-2)
+
+
+COUNT = 6
+
+
+def moving(viscosity, **kept):
+    """Solder of the paper's tension with inertia, by the scheme ispg."""
+    numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (COUNT - 1), time_step_limit=100.0)
+    effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
+    fluid = {"surface_tension": 4.985, "viscosity": viscosity, "process_time": 0.1}
+    return Solder(volume=VOLUME, effects=effects, numerics=numerics, **fluid, **kept)
+
+
+@pytest.fixture(scope="module")
+def half_sphere():
+    drop = Drop(volume=VOLUME, contact_angle=0.5 * np.pi, particles_per_edge=COUNT)
+    return flow_to_rest(drop, moving(0.227, pad_contact_angle=0.5 * np.pi))[0].body
+
+
+def let_go(half_sphere, receding, advancing, viscosity):
+    """The half sphere at rest on a wall with hysteresis: flow, contact angle and radius of a cap, part of it lost."""
+    points, solder = half_sphere.points.copy(), moving(viscosity)
+    cloud = replace(half_sphere.cloud, points=points, triangles=half_sphere.triangles)
+    line = RubbingLine(0, np.radians(receding), np.radians(advancing), points[cloud.rings[0]])
+    flow = start_flow(cloud, solder, EFFECTS | {"viscosity": True, "inertia": True}, (line,))
+    flow.body.pressure = half_sphere.pressure.copy()
+    before = ring_area(points, cloud.rings[0])
+    assert run_to_rest(flow, stop_rule(cloud, solder, EFFECTS)).at_rest
+    area = ring_area(flow.body.points, flow.body.cloud.rings[0])
+    radius, losses = np.sqrt(area / np.pi), {name: value for name, (value, _) in ledger([flow]).items()}
+    friction = 0.5 * solder.surface_tension * (np.cos(np.radians(receding)) - np.cos(np.radians(advancing)))
+    rubbed = friction * abs(area - before) / flow.solver.first_energy
+    assert flow.body.volume()[0] == pytest.approx(VOLUME, rel=1e-12)
+    assert abs(losses["energy_imbalance"]) < 1e-3
+    assert losses["line_loss"] == pytest.approx(rubbed, rel=0.06, abs=1e-6)  # what friction of that way takes
+    return line, 2.0 * np.degrees(np.arctan(np.ptp(flow.body.points[:, 2]) / radius)), radius
+
+
+@pytest.mark.parametrize(
+    ("receding", "advancing", "angle"), [(60.0, 120.0, 90.0), (100.0, 130.0, 100.0), (50.0, 80.0, 80.0)]
+)
+def test_a_line_creeps_to_the_angle_that_it_has_passed(half_sphere, receding, advancing, angle):
+    """A half sphere stays, or recedes or spreads in a liquid so thick that it does not swing."""
+    _, found, radius = let_go(half_sphere, receding, advancing, 9.0)
+    assert found == pytest.approx(angle, abs=0.7)
+    assert radius == pytest.approx(base_radius(VOLUME, np.radians(angle)), rel=6e-3)
+
+
+def test_a_line_that_swings_stands_between_its_angles(half_sphere):
+    """Inertia takes the half sphere beyond the cap of 100 degrees, from where no force that is left takes it back."""
+    line, found, _ = let_go(half_sphere, 100.0, 130.0, 0.227)
+    assert (line.state == PINNED).all()
+    assert found == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 an edge, 105.2 at 7 with steps a quarter as long
+
+
+def test_a_cube_comes_to_rest_between_both_angles():
+    drop = Drop(volume=VOLUME, receding_angle=RECEDING, advancing_angle=ADVANCING, particles_per_edge=COUNT)
+    metrics = {name: value for name, (value, _) in drop_to_rest(drop, moving(0.227)).shape.metrics.items()}
+    assert metrics["at_rest"] == 1.0
+    assert metrics["contact_angle_excess"] == 0.0
+    assert "height_error" not in metrics
+    assert abs(metrics["energy_imbalance"]) < 1e-3
+    assert metrics["line_loss"] > 0.02
+    assert metrics["evening_loss"] < 0.02

@@ -20,6 +20,9 @@ ERRORS_OF_DROP = {
     "max_width_error": "",
     "contact_angle_error": "deg",
     "contact_angle_excess": "deg",
+    "energy_imbalance": "",
+    "particles_lost": "",
+    "spread_max": "",
 }
 ERRORS_OF_PAIR = {"radius_error": "", "place_error": "", "drops_left": ""}
 ERRORS_OF_JOINT = {

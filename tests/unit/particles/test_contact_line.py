@@ -11,7 +11,15 @@ from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.scenes.metrics import verdict
 from reflowshock.particles.steps.descent import Start
-from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from reflowshock.particles.surface.contact_line import (
+    ADVANCING,
+    ON_MASK,
+    ON_PAD,
+    PINNED,
+    RECEDING,
+    ContactLine,
+    RubbingLine,
+)
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 
@@ -234,3 +242,22 @@ def test_a_line_steps_onto_a_pad_that_it_comes_to_and_stops_at_its_far_edge():
         reached.append((line.held_pads(), int(line.state[0])))
     assert reached == [(set(), ON_MASK), ({1}, ON_PAD), ({1}, ON_PAD), ({1}, PINNED)]
     assert body.points[0] == pytest.approx((1.0 + line.edges[1], 0.0, 0.0))
+
+
+def test_friction_holds_a_line_or_opposes_its_motion():
+    """Vertices that stand are let go where the wall cannot hold them, those that turn are held; friction takes."""
+    body = Body.at_rest(box_cloud(1.0, 5))
+    ring = body.cloud.rings[0]
+    line = RubbingLine(0, np.radians(60.0), np.radians(120.0), body.points[ring])
+    across, zero = line._area_gradient(body), np.zeros_like(body.points)
+    needed = zero.copy()
+    needed[ring] = np.resize([0.4, -0.4, 0.6, -0.6], len(ring))[:, None] * across
+    assert not line.settle(body, zero, needed, releases=False)
+    assert line.settle(body, zero, needed, releases=True)
+    assert np.array_equal(line.state, np.resize([PINNED, PINNED, RECEDING, ADVANCING], len(ring)))
+    inward, outward = -np.resize([0.0, 0.0, 1.0, -1.0], len(ring)), zero.copy()
+    outward[ring] = inward[:, None] * across
+    assert (line.friction(body) * outward[ring]).sum() < 0.0
+    assert not line.settle(body, outward, needed, releases=False)
+    assert line.settle(body, -outward, needed, releases=False)
+    assert (line.state == PINNED).all()

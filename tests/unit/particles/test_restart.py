@@ -109,6 +109,21 @@ def stand(checkpoint):
     return [flow.body.points, *(line.state for line in flow.physics.lines)]
 
 
+def stand_with_inertia(checkpoint):
+    """A contact line that rubs on its wall, broken off while some of its vertices stand."""
+    solder = flow_of("ispg", 20.0)[1].model_copy(update={"process_time": 8e-4})
+    drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=7)
+    flow, run = flow_to_rest(drop, solder, checkpoint=checkpoint)
+    assert len(run.records) > 8
+    assert flow.solver.past.losses.line > 0.0
+    return [
+        flow.body.points,
+        flow.body.velocity,
+        run.history(1.0)["energy"],
+        *(line.state for line in flow.physics.lines),
+    ]
+
+
 def flow_of(scheme, limit, section="none"):
     """A drop that moves with inertia, for the time of some steps."""
     effects = SolderEffects(inertia="on", viscosity="on")
@@ -161,7 +176,7 @@ def merge_with_inertia(checkpoint):
 
 
 FLOWS = [flow_as_printed, flow_in_galerkin_form, flow_in_section]
-RUNS = [settle, follow, pull, float_on, carry, stand, *FLOWS, swing, merge, merge_with_inertia]
+RUNS = [settle, follow, pull, float_on, carry, stand, stand_with_inertia, *FLOWS, swing, merge, merge_with_inertia]
 
 
 @pytest.mark.parametrize("run", RUNS)

@@ -262,7 +262,14 @@ ISPG = ("drop.particles_per_edge=11",)
         ("drop={volume='1 mm^3'}", "free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
-        ("drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}", "hysteresis"),
+        (
+            "drop={volume='1 mm^3',receding_angle='20 deg',advancing_angle='60 deg',particles_per_edge=7}",
+            "contact angles",
+        ),
+        (
+            "drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}",
+            "11 particles along an edge (for 6 to 9",
+        ),
     ],
 )
 def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
@@ -276,8 +283,30 @@ def test_the_scheme_ispg_takes_walls_with_friction(wall):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
     assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
     for setting in ("drop.particles_per_edge=5", "drop.particles_per_edge=13"):
-        assert "on a wall with friction (for 7 to 11 it is)" in problems_of(DROP, *asked, setting)
-    assert "pads with friction" in problems_of(BALL, *asked)
+        assert "on a wall with friction (for 6 to 11 it is)" in problems_of(DROP, *asked, setting)
+    assert "on a pad with friction (for 7 to 9 it is)" in problems_of(BALL, *asked)
+    read_case(BALL, [*asked, "drop.particles_per_edge=7"])
+
+
+IMPACT = ("drop.speed=4.7 m/s", "solder.wall=no-slip", "solder.parameters=paper", "drop.particles_per_edge=7")
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("drop.speed=6 m/s", "Weber number 80, Reynolds number 293 is not verified; allowed: <= 4.743 m/s"),
+        ("solder.viscosity=0.1 Pa*s", "Reynolds number 521 is not verified; allowed: <= 2.708 m/s"),
+        ("solder.wall=free-slip", "an impact is not verified with a wall that is slid on freely"),
+        ("drop.pad_radius=0.4 mm", "an impact is not verified with a pad"),
+        ("drop.symmetry=half", "an impact is not verified with planes of symmetry"),
+        ("drop.particles_per_edge=6", "for 6 particles along an edge; allowed: 7 to 9 along an edge"),
+        ("solder.numerics.scheme=energy", "needs the scheme ispg; or a case with [droplet]"),
+    ],
+)
+def test_a_drop_that_strikes_a_wall_is_refused_where_that_is_not_verified(setting, message):
+    asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *IMPACT]
+    assert read_case(DROP, asked).drop.speed == 4.7
+    assert message in problems_of(DROP, *asked, setting)
 
 
 @pytest.mark.parametrize(
