@@ -19,9 +19,10 @@ from reflowshock.particles.scenes.droplet import liquid_of, start_shape
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.heat import Heat, enthalpy_at
-from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface
+from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
+from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import mirrored
 from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance

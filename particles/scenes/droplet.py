@@ -15,8 +15,9 @@ from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.flow import FlowResult, Metrics
 from reflowshock.particles.sph.fluid_state import Law
-from reflowshock.particles.sph.liquid_surface import EDGE, LiquidSurface, SurfaceLost
+from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 
@@ -31,6 +32,8 @@ DIRECTIONS = 36
 # In spacings, and over the height: where the profile of a drop on a wall is read. Next to the wall it is rounded.
 FOOT, SHOULDER = 1.5, 0.7
 FEWEST = 12
+# Over the diameter, times Re^(2/5): thickness of the film that an impact leaves (Roisman 2009).
+RESIDUAL_FILM = 0.79
 # Newton steps until the surface encloses the volume.
 ENCLOSURES = 3
 
@@ -51,11 +54,19 @@ def solve_droplet(
         raise SurfaceLost(
             f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
             f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
-            "films thinner than two spacings are not followed: take more particles per diameter"
+            f"parts smaller than their particles are not followed: take more particles per diameter{_enough(scene)}"
         ) from error
     history = run.history(COLUMNS)
     words = {"outcome": outcome(history)} if scene.impact_speed else {}
     return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
+
+
+def _enough(scene: Droplet) -> str:
+    """Tell with how many the film that an impact leaves is two particles thick."""
+    if not scene.impact_speed:
+        return ""
+    film = RESIDUAL_FILM / scene.reynolds_number**0.4
+    return f" ({2.0 / film:.0f} have two in the film of {film:.2g} diameters that the impact leaves)"
 
 
 def droplet(scene: Droplet) -> Simulation:
@@ -228,6 +239,9 @@ def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
         found["weber"], found["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
         found["spread_max"] = (float(history["spread"][widest]), "")
         found["time_of_spread_max"] = (float(history["time"][widest]), "s")
+        if history["foot"][widest] > 0.0:
+            film = scene.volume / (0.25 * pi * (history["foot"][widest] * scene.diameter) ** 2)
+            found["film_over_spacing"] = (float(film / scene.spacing), "")
         wets = np.flatnonzero(history["foot"] > 0.0)
         if len(wets) and wets[-1] + 1 < len(history["time"]):
             found["contact_time"] = (float(history["time"][wets[-1] + 1] - history["time"][wets[0]]), "s")

@@ -11,8 +11,8 @@ sums carry too little of a pressure, nor that a lattice of particles under press
 Particles that no pressure spreads draw together where it is negative: they are shifted to where there are fewer
 (`simulation.py`). Beside the surface it is itself what lacks in their sums, so that they fill it evenly.
 
-A part that comes down on the wall becomes wet. Triangles are evened out along the surface every few steps; where they
-have shrunk or grown too much, the surface is made anew from its distance, and then it may also part or leave the wall.
+A part that comes down on the wall becomes wet. Triangles are split, joined and evened out every few steps
+(`surface_care.py`); where they are worn all the same, the surface is made anew from its distance, and may then part.
 Parts that come as near to each other as particles stand, of two drops or of one, become one: the gap between them is
 closed (`surface/closing.py`), volume is restored, particles and their momentum are not touched. A foot on the wall that
 has become thinner than particles fill leaves it where the liquid moves away: a drop that rebounds.
@@ -30,20 +30,18 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside, have_moved
-from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
-from reflowshock.particles.sph import grounds, surface_loops
+from reflowshock.particles.sph import grounds, surface_care, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph.thin_films import hold_films
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, between, boundary_loops, mirrored
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
-from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops, mirrored
+from reflowshock.particles.surface.level_set import Grid, LevelSet, relax, signed_distance
+from reflowshock.particles.surface.surface_quality import vertex_normals
 
-# In spacings of the particles: edges of triangles, the skin of the lists.
-EDGE, SKIN = 1.2, 0.5
-# The same: triangles lower than this above the wall are on it; no air is followed that would have to leave.
-TOUCH = 0.3
+# In spacings of the particles: the skin of the lists.
+SKIN = 0.5
 # The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
 # tried where contact lines would meet in a point.
 MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
@@ -51,9 +49,8 @@ MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
 FOOT, THIN = 2.0, 3.0
 # Steps after which triangles are evened out.
 CARE = 10
-# Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
-AREAS, LOWEST_QUALITY = (0.5, 2.0), 0.1
-WALL = Plate.horizontal(0.0)
+# Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
+LOST_FILM = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +153,7 @@ class LiquidSurface:
         if self.ground is None or not len(self.points):
             return
         normals = vertex_normals(self.points, self.triangles, len(self.points))
-        self.wetness = grounds.settle(self.ground, self.points, normals, TOUCH * self.law.spacing)
+        self.wetness = grounds.settle(self.ground, self.points, normals, surface_care.TOUCH * self.law.spacing)
 
     def add(self, points: Floats, triangles: Indices) -> None:
         """Add the surface of more liquid, apart from this one: `(k, 3)` [m], `(t, 3)`."""
@@ -191,6 +188,7 @@ class LiquidSurface:
             SurfaceLost: there are no particles beside a vertex.
         """
         self._update_lists(np.stack(fields[:3], axis=1)[:carriers])
+        self._cover(fields)
         weights, offsets = np.empty((2, len(self._lists[1]))), self._lists[0]
         surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
         level = np.add.reduceat(np.append(weights[0], 0.0), offsets[:-1])
@@ -201,6 +199,8 @@ class LiquidSurface:
         surface_loops.share_out(self._lists, self._shares, self.forces(), pushes)
         outward = self._outward()
         surface_loops.share_out(self._lists, weights, outward, crowd)
+        if self.law.mirror and self.law.no_slip:
+            hold_films((self.points, self._normals(), self._lists, weights), fields, self.law, rates)
         if self.ground is not None:
             images, outward = grounds.reflected(self.ground, self.points, outward, SUPPORT * self.law.length)
             surface_loops.find_weights(images, self._lists, fields, self.law, weights)
@@ -209,12 +209,25 @@ class LiquidSurface:
         rates[1:4] += pushes[:, :fluids] / fields.mass[:fluids]
         rates[7:10] += crowd[:, :fluids]
 
+    def _cover(self, fields: Fields) -> None:
+        """Move vertices that particles pass, or leave behind, at the rim of a film. The volume stays."""
+        volume, normals = self.volume, self._normals()
+        offset = surface_care.strays((self.points, normals), self._lists, fields, self.law.spacing)
+        if offset.any():
+            self.points += offset[:, None] * normals
+            self.enclose(volume)
+
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
         area = volume_and_gradient(self.points, self.triangles, (), ())[1]
         for ring in self.rings:
             area[ring, 2] = 0.0
         return area if self.ground is None else grounds.along(area, *self.wetness)
+
+    def _normals(self) -> Floats:
+        """Outward unit normals `(m, 3)`, of contact lines along the wall; zero where there is none."""
+        outward = self._outward()
+        return outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
 
     def forces(self) -> Floats:
         """Forces -d(E - p V)/dx on the vertices `(m, 3)` [N], with the pressure that leaves none on the whole surface.
@@ -273,12 +286,12 @@ class LiquidSurface:
         if self.law.mirror:
             self._wet()
         if self.moves % CARE == 0:
-            self._even_out()
+            self._care()
             if self._meets():
                 self._make_anew(CLOSED)
             elif self._leaves(velocity):
                 self._make_anew((-THIN,))
-            elif self._is_worn():
+            elif surface_care.is_worn(self.points, self.triangles, self.law.spacing):
                 self._make_anew()
             self.enclose(volume)
         self._find_wetness()
@@ -300,7 +313,7 @@ class LiquidSurface:
         for ring in self.rings:
             self.points[ring, 2] = 0.0
         np.maximum(self.points[:, 2], 0.0, out=self.points[:, 2])
-        flat = np.flatnonzero((self.points[self.triangles, 2] <= TOUCH * self.law.spacing).all(axis=1))
+        flat = np.flatnonzero(surface_care.on_wall(self.points, self.triangles, self.law.spacing))
         if len(flat) and not self._take(self.points, np.delete(self.triangles, flat, axis=0)):
             for triangle in flat[::-1]:
                 self._take(self.points, np.delete(self.triangles, triangle, axis=0))
@@ -321,15 +334,19 @@ class LiquidSurface:
         self._find_wetness()
         return True
 
-    def _even_out(self) -> None:
+    def _care(self) -> None:
+        """Close dry spots, split and collapse edges, and even out triangles."""
+        if lidded := surface_care.without_dry_spots(self.points, self.triangles, self.rings, self.law.spacing):
+            self._take(*lidded)
         try:
+            for change in surface_care.changes(self.law.spacing):
+                new = change(self.points, self.triangles, self.rings + self._lines_on_ground())
+                if len(new.triangles) != len(self.triangles):
+                    self._take(0.5 * (self.points[new.first] + self.points[new.second]), new.triangles)
             lines = self.rings + self._lines_on_ground()
+            self.points, self.triangles = surface_care.evened_out(self.points, self.triangles, self.rings, lines)
         except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
             return
-        self.points += smoothing_offsets(self.points, self.triangles, len(self.points), lines)
-        for ring in self.rings:
-            self.points[ring, 2] = 0.0
-        self.triangles, _ = flip_to_delaunay(self.points, self.triangles, lines)
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -341,24 +358,10 @@ class LiquidSurface:
             return ()
         return boundary_loops(self.triangles[self._wet_shares() > 0.5])
 
-    def _is_worn(self) -> bool:
-        """Whether triangles are too small, too large or slivers."""
-        corner = self.points[self.triangles]
-        square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
-        area = triangle_areas(self.points, self.triangles)
-        even = np.sqrt(3.0) / 4.0 * (EDGE * self.law.spacing) ** 2
-        low, high = AREAS
-        return not low * even < area.mean() < high * even or bool(
-            (4.0 * np.sqrt(3.0) * area / square).min() < LOWEST_QUALITY
-        )
-
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
-        spacing, normals = self.law.spacing, vertex_normals(self.points, self.triangles, len(self.points))
-        for ring in self.rings:  # where it meets its image
-            normals[ring, 2] = 0.0
-            normals[ring] /= np.linalg.norm(normals[ring], axis=1)[:, None]
-        return narrowest_gap(self.points, normals, MEETING * spacing, spacing) < MEETING * spacing
+        gap = MEETING * self.law.spacing
+        return narrowest_gap(self.points, self.triangles, self._normals(), gap, self.law.spacing) < gap
 
     def _leaves(self, velocity: Floats) -> bool:
         """Whether liquid moves away from the wall on a foot that is too thin for its particles."""
@@ -370,15 +373,15 @@ class LiquidSurface:
         self.rebuilds += 1
         before, energy = parts_of(self.triangles), self.energy
         closed = mirrored(self.points, self.triangles) if self.law.mirror else (self.points, self.triangles)
-        distance = signed_distance(*closed, Grid.around(closed[0], EDGE * self.law.spacing))
+        distance = signed_distance(*closed, Grid.around(closed[0], surface_care.EDGE * self.law.spacing))
         for gap in gaps:
             level = closed_level(distance, gap * self.law.spacing) if gap else distance
-            points, triangles = extract_surface(level)
-            if self.law.mirror:
-                points, triangles = between(points, triangles, (WALL,), 1e-6 * self.law.spacing)
             try:
-                rings = boundary_loops(triangles)
+                points, triangles, rings = surface_care.triangulated(level, bool(self.law.mirror))
             except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
+                continue
+            wet = sum(area_within(points[ring]) for ring in rings)
+            if gap >= 0.0 and wet < (1.0 - LOST_FILM) * self.wetted_area:
                 continue
             self._take(*relax(level, points, triangles, rings))
             after = parts_of(self.triangles)

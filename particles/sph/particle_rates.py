@@ -137,6 +137,8 @@ def _by_liquid(i, neighbours, fields, law):
         side = 1.0 - 2.0 * image
         hold = side if law.no_slip else 1.0  # an image moves on along the wall, or back
         weight_below = (side - 1.0) * law.gravity_z  # an image has more weight
+        held = 0.5 * (1.0 - hold)  # by the wall, with which nothing turns
+        turning, sheared = (1.0 - held) * along, (1.0 - held) * aside + held * 2.0 / density
         for n in range(len(neighbours)):
             j = uint32(neighbours[n])
             dx, dy, dz = apart((x, y, z), j, side, fields, periods)
@@ -155,8 +157,8 @@ def _by_liquid(i, neighbours, fields, law):
             push += artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, density)
             shared = pair_terms.shared_viscosity(viscosity, fields.viscosity[j]) if law.rheology else viscosity
             softened2 = distance2 + softening
-            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along * shared)
-            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside * shared)
+            push += pair_terms.central_viscosity(approach, softened2, steep, volume, turning * shared)
+            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, sheared * shared)
             jump = beside - density
             ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + side * fields.slope_z[j]
             rise = -0.5 * (ex * dx + ey * dy + ez * dz)
@@ -179,8 +181,6 @@ def _by_walls(i, fluids, neighbours, fields, law):
     periods, (line, inverse, scale, softening, level) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
     viscosity = own_viscosity(i, fields, law) / density if law.no_slip else 0.0
-    along = 2.0 * (law.dimension + 2) * viscosity if law.has_surface else 0.0
-    aside = 0.0 if law.has_surface else 2.0 * viscosity
     rate = ax = ay = az = cx = cy = cz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
         side = 1.0 - 2.0 * image
@@ -199,9 +199,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
             rate += pair_terms.continuity(closing, steep, volume, density)
             other = fields.pressure[j] + weight_below * fields.z[j] * beside
             push = pair_terms.pressure(own, other, steep, volume, density)
-            softened2, approach = distance2 + softening, du * dx + dv * dy + dw * dz
-            push += pair_terms.central_viscosity(approach, softened2, steep, volume, along)
-            drag = pair_terms.shear_viscosity(distance2, softened2, steep, volume, aside)
+            drag = pair_terms.shear_viscosity(distance2, distance2 + softening, steep, volume, 2.0 * viscosity)
             crowd = steep * volume * pair_terms.crowding(shape(law.kernel, line, q), level)
             ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
             cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz

@@ -5,7 +5,7 @@ shared among the same particles by the same weights. So the work of the forces i
 is kept. Above a wall in z = 0 the images of particles count too: they move and are pushed as in a mirror.
 """
 
-from math import sqrt
+from math import inf, sqrt
 
 from numba import njit, prange
 
@@ -53,3 +53,28 @@ def share_out(lists, shares, vectors, found):
             found[0, j] += shares[0, k] * vectors[v, 0]
             found[1, j] += shares[0, k] * vectors[v, 1]
             found[2, j] += shares[1, k] * vectors[v, 2]
+
+
+@njit(cache=True, parallel=True)
+def find_strays(vertices, lists, fields, cover, strays):
+    """Write how far vertices are to move along their normals [m] to lie just beyond the particles beside them `(m,)`.
+
+    Args:
+        vertices: points `(m, 3)` [m] and outward normals `(m, 3)`.
+        lists: particles beside each vertex.
+        fields: of the particles.
+        cover: how far beyond each particle the surface is at least and at most [m]; its curvature about one, halved
+            [1/m]; how far before a vertex a particle is left out [m].
+        strays: found.
+    """
+    (points, normals), (offsets, indices), (least, most, bend, before) = vertices, lists, cover
+    for v in prange(points.shape[0]):
+        top = -inf
+        for k in range(offsets[v], offsets[v + 1]):
+            j = indices[k]
+            dx, dy, dz = fields.x[j] - points[v, 0], fields.y[j] - points[v, 1], fields.z[j] - points[v, 2]
+            along = dx * normals[v, 0] + dy * normals[v, 1] + dz * normals[v, 2]
+            aside2 = dx * dx + dy * dy + dz * dz - along * along
+            if along < before:
+                top = max(top, along - bend * aside2)
+        strays[v] = max(top + least, min(top + most, 0.0)) if top > -inf else 0.0

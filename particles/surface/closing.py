@@ -1,8 +1,9 @@
 """Gaps in a liquid's surface, and the surface that closes them: liquids that meet become one."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, eye_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -14,11 +15,14 @@ BLUNTINGS = 4
 FACING = -0.5
 
 
-def narrowest_gap(points: Floats, normals: Floats, gap: float, aside: float) -> float:
+def narrowest_gap(points: Floats, triangles: Indices, normals: Floats, gap: float, aside: float) -> float:
     """Return the narrowest gap outside a surface between vertices that face each other [m]; inf where none is found.
+
+    A vertex does not face the neighbours of its neighbours: a notch that narrow is a bend of the surface, not a gap.
 
     Args:
         points: `(m, 3)` [m].
+        triangles: `(t, 3)`.
         normals: `(m, 3)`, outward.
         gap: only narrower ones are looked for [m].
         aside: how far beside the mean normal of two vertices they may be [m].
@@ -26,12 +30,22 @@ def narrowest_gap(points: Floats, normals: Floats, gap: float, aside: float) -> 
     first, second = cKDTree(points).query_pairs(float(np.hypot(gap, aside)), output_type="ndarray").T
     facing = (normals[first] * normals[second]).sum(axis=1) < FACING
     first, second = first[facing], second[facing]
+    near = _share_a_neighbour(triangles, len(points), first, second)
+    first, second = first[~near], second[~near]
     normal = normals[first] - normals[second]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     between = points[second] - points[first]
     height = (between * normal).sum(axis=1)
     beside = np.linalg.norm(between - height[:, None] * normal, axis=1)
     return float(height[(height > 0.0) & (height < gap) & (beside < aside)].min(initial=np.inf))
+
+
+def _share_a_neighbour(triangles: Indices, count: int, first: Indices, second: Indices) -> NDArray[np.bool_]:
+    """Whether the vertices of each pair `(k,)` are joined by one edge or two."""
+    ends = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    edges = coo_array((np.ones(len(ends), np.int32), ends.T), shape=(count, count)).tocsr()
+    around = edges + edges.T + eye_array(count, dtype=np.int32, format="csr")
+    return np.asarray(around[first].multiply(around[second]).sum(axis=1)).ravel() > 0
 
 
 def closed_level(level: LevelSet, gap: float) -> LevelSet:

@@ -7,8 +7,9 @@ import pytest
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.scenes.droplet import droplet
 from reflowshock.particles.sph import flow
-from reflowshock.particles.sph.liquid_surface import EDGE, Meeting
+from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import closed_level, narrowest_gap, part_of_vertex, parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface
 
@@ -39,13 +40,13 @@ def go(simulation, until):
 
 
 def test_a_gap_between_faces_is_found_and_a_film_is_not():
-    normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    normals, none = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.empty((0, 3), np.int32)
     points = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]])
-    assert narrowest_gap(points, normals, 0.5, 0.5) == pytest.approx(0.3)
-    assert narrowest_gap(points, normals, 0.2, 0.5) == np.inf
-    assert narrowest_gap(points, normals, 0.5, 0.05) == np.inf
-    assert narrowest_gap(points, -normals, 0.5, 0.5) == np.inf  # liquid is between them
-    assert narrowest_gap(points, np.abs(normals), 0.5, 0.5) == np.inf
+    assert narrowest_gap(points, none, normals, 0.5, 0.5) == pytest.approx(0.3)
+    assert narrowest_gap(points, none, normals, 0.2, 0.5) == np.inf
+    assert narrowest_gap(points, none, normals, 0.5, 0.05) == np.inf
+    assert narrowest_gap(points, none, -normals, 0.5, 0.5) == np.inf  # liquid is between them
+    assert narrowest_gap(points, none, np.abs(normals), 0.5, 0.5) == np.inf
 
 
 def test_narrow_gaps_close_and_wide_ones_stay():

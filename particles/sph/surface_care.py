@@ -1,0 +1,138 @@
+"""The triangles of a liquid's surface, kept fit to carry it while it stretches: long edges are split, short ones go.
+
+A film that spreads over a wall is soon thinner than the cells of any grid that would serve to triangulate it anew; so
+its triangles are changed one by one, which loses nothing of it.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.plate import Plate
+from reflowshock.particles.core.surface_measure import triangle_areas
+from reflowshock.particles.sph import surface_loops
+from reflowshock.particles.sph.fluid_state import Fields
+from reflowshock.particles.surface.cloud_level_set import area_within, between, boundary_loops
+from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface
+from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
+
+# In spacings of the particles: edges of triangles.
+EDGE = 1.2
+# Of that: longer edges are split, shorter ones collapse.
+LONGEST, SHORTEST = 1.7, 0.4
+# Triangles are made anew where their mean area has left this range, over that at the start, or their quality this.
+AREAS, LOWEST_QUALITY = (0.5, 2.0), 0.1
+# Contact lines that turn by more at a vertex (the cosine) bend more sharply than what moves them can: the kernel is
+# two edges wide.
+SHARPEST_TURN = 0.5
+# In spacings: triangles lower than the first above the wall are on it where they face it; a film thinner than the
+# second is none.
+TOUCH, DRY = 0.3, 0.1
+# The same: how far beyond its particles the surface is at least (they may be a bit outside) and at most, its radius
+# about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
+COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
+WALL = Plate.horizontal(0.0)
+
+
+def changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
+    """Return what splits edges that are too long and what collapses those that are too short, for a spacing [m]."""
+    long, short = LONGEST * EDGE * spacing, SHORTEST * EDGE * spacing
+    return partial(split_long, longest=long, on_rings=True), partial(collapse_short, shortest=short, on_rings=True)
+
+
+def without_dry_spots(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float
+) -> tuple[Floats, Indices] | None:
+    """Return points and triangles with a film over dry spots of the wall that are smaller than a particle; else None.
+
+    Args: as `evened_out`; contact lines run clockwise about dry spots.
+    """
+    spots = [ring for ring in rings if -(spacing**2) < area_within(points[ring]) < 0.0]
+    if not spots:
+        return None
+    points = np.concatenate((points, [points[ring].mean(axis=0) for ring in spots]))
+    lids = []
+    for number, ring in enumerate(spots, len(points) - len(spots)):
+        points[ring, 2] = points[number, 2] = TOUCH * spacing
+        lids.append(np.stack((np.roll(ring, -1), ring, np.full_like(ring, number)), axis=1))
+    return points, np.concatenate((triangles, *lids)).astype(np.int32)
+
+
+def triangulated(level: LevelSet, mirror: bool) -> tuple[Floats, Indices, tuple[Indices, ...]]:
+    """Return points `(m, 3)` [m], triangles `(t, 3)` and contact lines of a level set, above a mirror in z = 0 or not.
+
+    Raises:
+        CannotRebuild: contact lines meet in a point.
+    """
+    points, triangles = extract_surface(level)
+    if mirror:
+        points, triangles = between(points, triangles, (WALL,), 1e-6 * level.grid.spacing)
+    return points, triangles, boundary_loops(triangles)
+
+
+def evened_out(
+    points: Floats, triangles: Indices, rings: Sequence[Indices], lines: Sequence[Indices]
+) -> tuple[Floats, Indices]:
+    """Return points and triangles evened out along the surface.
+
+    Args:
+        points: `(m, 3)` [m].
+        triangles: `(t, 3)`.
+        rings: contact lines on the wall z = 0, whose sharp bends are blunted.
+        lines: these and others along which the surface has an edge.
+    """
+    points = points + smoothing_offsets(points, triangles, len(points), lines)
+    for ring in rings:
+        points[ring] += _blunting(points[ring])
+        points[ring, 2] = 0.0
+    return points, flip_to_delaunay(points, triangles, lines)[0]
+
+
+def _blunting(line: Floats) -> Floats:
+    """Half the way to the middle of its neighbours for each vertex of a closed line `(k, 3)` that bends sharply [m]."""
+    before, after = line - np.roll(line, 1, axis=0), np.roll(line, -1, axis=0) - line
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    is_sharp = (before * after).sum(axis=1) < SHARPEST_TURN * lengths
+    return np.where(is_sharp[:, None], 0.25 * (after - before), 0.0)
+
+
+def is_worn(points: Floats, triangles: Indices, spacing: float) -> bool:
+    """Whether triangles are too small, too large or slivers."""
+    corner = points[triangles]
+    square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
+    area = triangle_areas(points, triangles)
+    even = np.sqrt(3.0) / 4.0 * (EDGE * spacing) ** 2
+    low, high = AREAS
+    return not low * even < area.mean() < high * even or bool(
+        (4.0 * np.sqrt(3.0) * area / square).min() < LOWEST_QUALITY
+    )
+
+
+def on_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bool_]:
+    """Whether each triangle has come down on the wall z = 0 `(t,)`.
+
+    Liquid that faces the wall wets it. What faces away from it is a film, thin as it may be, until it is dry.
+    """
+    corner = points[triangles]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    faces_wall = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
+    return corner[:, :, 2].max(axis=1) <= np.where(faces_wall, TOUCH, DRY) * spacing
+
+
+def strays(vertices: tuple[Floats, Floats], lists: tuple[Indices, Indices], fields: Fields, spacing: float) -> Floats:
+    """Return how far vertices have to move outward to lie beyond their particles, and not far beyond them, `(m,)` [m].
+
+    Args:
+        vertices: points `(m, 3)` [m] and outward normals `(m, 3)`.
+        lists: particles beside each vertex.
+        fields: of the particles.
+        spacing: of the particles [m].
+    """
+    cover = COVER[0] * spacing, COVER[1] * spacing, 0.5 / (CREST * spacing), OWN * spacing
+    found = np.empty(len(vertices[0]))
+    surface_loops.find_strays(vertices, lists, fields, cover, found)
+    return found
