@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.parameters.flows import largest_time_step
+from reflowshock.particles.parameters.flows import CENTRAL, largest_time_step
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.threads import ThreadParticles
@@ -155,6 +155,7 @@ class Simulation:
         """The largest stable step [s]."""
         law, tension = self.law, self.surface.tension if self.surface else 0.0
         viscosity = self.particles.largest_viscosity if law.rheology else law.viscosity
+        viscosity *= CENTRAL if law.has_surface else 1.0
         return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, viscosity, tension)
 
     def step(self, time_step: float) -> None:

@@ -63,15 +63,17 @@ def carry(lists, shares, velocity, time_step, points):
 def share_out(lists, weights, vectors, found):
     """Add what each particle has of kinds of vectors of vertices `(k, m, 3)` to ``found`` `(k, 3, n)`.
 
-    ``weights`` `(k, 2, pairs)`. Components are shared out side by side, so that a sum has one order.
+    ``weights`` `(k, 2, pairs)`. Kinds are shared out side by side, so that every sum has one order.
     """
     offsets, indices = lists
-    for component in prange(3 * vectors.shape[0]):
-        kind, d = component // 3, component % 3
-        given, own, result = weights[kind, 1 if d == 2 else 0], vectors[kind], found[kind, d]
+    for kind in prange(vectors.shape[0]):
+        given, own, result = weights[kind], vectors[kind], found[kind]
         for v in range(own.shape[0]):
             for k in range(offsets[v], offsets[v + 1]):
-                result[indices[k]] += given[k] * own[v, d]
+                j = indices[k]
+                result[0, j] += given[0, k] * own[v, 0]
+                result[1, j] += given[0, k] * own[v, 1]
+                result[2, j] += given[1, k] * own[v, 2]
 
 
 @njit(cache=True, parallel=True)

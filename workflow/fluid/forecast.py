@@ -10,7 +10,7 @@ from rich.table import Table
 
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.flows import DamBreak, SphFlow, TaylorGreen, largest_time_step
+from reflowshock.particles.parameters.flows import CENTRAL, DamBreak, SphFlow, TaylorGreen, largest_time_step
 from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
@@ -112,7 +112,7 @@ def time_step(scene: SphFlow, is_viscous: bool) -> float:
     """Return the time step that a flow is expected to take [s]."""
     length, viscosity = scene.numerics.smoothing_length * scene.spacing, 0.0
     if is_viscous:
-        viscosity = scene.largest_viscosity
+        viscosity = scene.largest_viscosity * (CENTRAL if isinstance(scene, DamBreak | Droplet | Printing) else 1.0)
     tension = scene.surface_tension if isinstance(scene, Droplet | Printing) else 0.0
     return largest_time_step(length, scene.sound + scene.fastest, scene.density, viscosity, tension)
 

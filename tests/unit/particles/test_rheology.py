@@ -97,3 +97,11 @@ def test_printed_ink_has_it_too():
     for _ in range(5):
         deposit.step(1.0)
     assert np.ptp(deposit.simulation.fields.viscosity) > 0.0
+
+
+def test_the_step_of_a_stiff_drop_is_stable():
+    stiff = droplet(ink(None, speed=5.0, viscosity=0.3))
+    assert stiff.time_step() < 0.5 * ink(None).density * stiff.law.length**2 / 0.3 * 0.126
+    for _ in range(60):
+        stiff.step(stiff.time_step())
+        assert stiff.fastest < 5.1
