@@ -83,7 +83,7 @@ class Galerkin:
         spread = shape.T @ volumes
         of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
         carried = with_moments(body, volumes + of_shapes)
-        drift = ghosts.drift(body.points, (*body.plates, *planes), twists)
+        drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
         return cls(volumes, carried, starts, columns, weights, shape, ghosts, drift)
 
     @property

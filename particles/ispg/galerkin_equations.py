@@ -304,7 +304,8 @@ class GalerkinEquations:
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]; they add up to that of the enclosed volume."""
         rates = kernels.rates_of_volume(self.space.rows, self.space.images, self._parts, field)
-        return rates + self._rates_of_images(np.concatenate((np.zeros_like(field), self.space.driven(field))))
+        driven = self.space.driven(field)
+        return rates + self._rates_of_images(np.concatenate((np.zeros_like(field), driven))) if driven.any() else rates
 
     def _balanced(self, rates: Floats) -> Floats:
         """Rates `(n,)` less their sum, which is shared out by the volumes."""
