@@ -54,7 +54,7 @@ def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (tilted(), Plate.horizontal(0.4, side=1.0))
     twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
-    found = mirror(points, plates, REACH, [slip, slip])
+    found = mirror(points, plates, 2.0 * REACH, [slip, slip])
     other = np.concatenate((twist[:3] + np.cross(twist[3:], plates[1].origin - plates[0].origin), twist[3:]))
     moving = plates[0].rigid_velocity(twist, points)
     images = np.einsum("gcd,gd->gc", found.reflection, moving[found.source])
