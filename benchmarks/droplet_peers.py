@@ -36,7 +36,7 @@ from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
 from reflowshock.particles.scenes.dam_break import solve_dam_break
 from reflowshock.particles.scenes.droplet import solve_droplet
-from reflowshock.particles.sph.liquid_surface import SurfaceLost
+from reflowshock.particles.sph.surface_care import SurfaceLost
 from reflowshock.particles.steps.time_step import capillary_limit
 
 mpl.use("Agg")

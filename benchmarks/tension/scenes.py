@@ -24,10 +24,9 @@ from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency,
 from reflowshock.particles.scenes.droplet import base_width, droplet
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.liquid_surface import SurfaceLost
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT
-from reflowshock.particles.sph.surface_care import EDGE
+from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 
 TRACKED = "tracked surface"
 MODELS = ("colour function", "pairwise", "free-surface pressure", TRACKED)

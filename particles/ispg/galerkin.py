@@ -104,10 +104,6 @@ class Galerkin:
         """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
         return field - self.shape @ self.with_images(field)
 
-    def load_rough(self, force: Floats) -> Floats:
-        """The transposed of `rough`: forces on the particles `(n, 3)` [N]."""
-        return force - self.shown(force)
-
     def gradient(self, field: Floats) -> Floats:
         """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
         return kernels.velocity_gradient(self.starts, self.columns, self.weights, self.with_images(field))
@@ -124,7 +120,7 @@ class Galerkin:
         Args:
             field: the velocity.
             factors: `(n, 3)` of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], each with a force
-                on what it resists, as `load_rough` and `load` have it.
+                on what it resists, by the transposed of what finds it.
         """
         images = self.with_images(field)
         return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))

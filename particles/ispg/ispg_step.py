@@ -28,7 +28,7 @@ from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import Acting, GalerkinPast, LostEnergy, centre, evening_passes, with_step
+from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, StepMotion, centre, evening_passes, with_step
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
     PlateSteps,
@@ -254,7 +254,7 @@ class PreparedIspgStep:
             self.solver.first_energy = self.energy + kinetic
         losses = past.carried_losses(kinetic, self.energy)
         way = mean if plates else transport
-        acting = Acting(rubbed, (mean - base.velocity) / base.time_step, way)
+        acting = StepMotion(rubbed, (mean - base.velocity) / base.time_step, way)
         losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
         potential = self.physics.energy(moved)
         driving = force - base.time_step * equations.tension(mean)

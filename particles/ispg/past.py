@@ -148,7 +148,7 @@ def centre(body: Body) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Acting:
+class StepMotion:
     """What acted in a step, `(n, 3)`.
 
     Attributes:
@@ -166,7 +166,7 @@ def with_step(
     losses: LostEnergy,
     equations: GalerkinEquations,
     velocities: tuple[Floats, Floats],
-    acting: Acting,
+    acting: StepMotion,
     time_step: float,
 ) -> LostEnergy:
     """Losses with those of a step [s], but for the way that the forces act along.

@@ -48,9 +48,9 @@ def scheme_problems(solder: Solder) -> list[Problem]:
     return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
 
 
-def ispg_problems(solder: Solder, place: str) -> list[Problem]:
-    """Find the scheme ispg at a place where it does not hold, or is not verified; empty for other schemes."""
-    if solder.numerics.scheme != "ispg":
+def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
+    """Find the scheme ispg at a place where it does not hold, or is not verified; empty for others, or no place."""
+    if solder.numerics.scheme != "ispg" or place is None:
         return []
     message = f'the scheme "ispg" is for drops and one joint, with inertia; it is not verified for {place}'
     return [Problem("solder.numerics.scheme", message, "ispg", "energy")]

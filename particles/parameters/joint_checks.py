@@ -28,20 +28,19 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = (
-        found or ispg_joint_problems(joint, solder) or _load_problems(joint, solder) or _motion_problems(joint, solder)
-    )
+    found = found or checks.ispg_problems(solder, unverified_joint(joint, solder))
+    found = found or _load_problems(joint, solder) or _motion_problems(joint, solder)
     return found or too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
-def ispg_joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find joints that the scheme ispg is not verified for."""
+def unverified_joint(joint: Joint, solder: Solder) -> str | None:
+    """What of a joint the scheme ispg is not verified for; None where it is."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     places = {
         "packages that float, on walls with friction": joint.package is not None and solder.wall != "free-slip",
         f"joints without inertia ({inertia['why']})": not inertia["on"],
     }
-    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+    return next((place for place, is_met in places.items() if is_met), None)
 
 
 def _tilt_problems(joint: Joint) -> list[Problem]:

@@ -7,7 +7,7 @@ from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_drop
-from reflowshock.particles.parameters.joint_checks import ispg_joint_problems
+from reflowshock.particles.parameters.joint_checks import unverified_joint
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
@@ -34,30 +34,35 @@ class HasWall(Protocol):
 
 
 def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
-    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy."""
+    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy.
+
+    It is ispg as well where no other scheme computes the scene.
+    """
     ispg = changed(solder, "numerics.scheme", "ispg")
     if isinstance(scene, Drop):
-        found = [] if scene.section != "none" else _ispg_problems(scene, ispg)
+        place = _unverified_drop(scene, solder)
+        alone = scene.section != "none" or scene.speed is not None
     elif isinstance(scene, Joint):
-        found = ispg_joint_problems(scene, ispg)
+        place = unverified_joint(scene, solder)
+        alone = scene.path is not None and scene.path.speed is not None
     else:
-        found = _ispg_pair_problems(scene, ispg)
-    if found:
-        return solder, found[0].message
-    return ispg, "with inertia ISPG costs less than tetrahedra"
+        place, alone = _unverified_pair(scene, solder), False
+    if alone:
+        return ispg, "no other scheme computes it"
+    return (ispg, "with inertia it costs less than tetrahedra") if place is None else (solder, f"not ISPG: {place}")
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     """Find what cannot work before a drop runs."""
     found = _flow_problems(drop, solder) or _pad_problems(drop) or _section_problems(drop, solder)
-    found = found or _ispg_problems(drop, solder) or _impact_problems(drop, solder)
+    found = found or checks.ispg_problems(solder, _unverified_drop(drop, solder)) or _impact_problems(drop, solder)
     found = found or _resolution_problems(drop) or _symmetry_problems(drop, solder)
     return found or _wall_problems(drop) or free_problems(drop, solder)
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
     """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = _flow_problems(pair, solder) or _ispg_pair_problems(pair, solder)
+    found = _flow_problems(pair, solder) or checks.ispg_problems(solder, _unverified_pair(pair, solder))
     found = found or free_problems(pair, solder) or _pair_resolution(pair)
     return found or _distance_problems(pair, solder)
 
@@ -87,10 +92,8 @@ def _section_problems(drop: Drop, solder: Solder) -> list[Problem]:
     return []
 
 
-def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find what the scheme ispg is not verified for."""
-    if solder.numerics.scheme != "ispg":
-        return []
+def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
+    """What of a drop the scheme ispg is not verified for; None where it is."""
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
     fewest, most = SECTION_EDGES if drop.section != "none" else ISPG_EDGES if drop.hysteresis is None else HELD_EDGES
     rubs, (low, high) = solder.wall != "free-slip", FRICTION_EDGES
@@ -112,7 +115,7 @@ def _ispg_problems(drop: Drop, solder: Solder) -> list[Problem]:
             drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
         ),
     }
-    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+    return next((place for place, is_met in places.items() if is_met), None)
 
 
 def _impact_problems(drop: Drop, solder: Solder) -> list[Problem]:
@@ -145,8 +148,8 @@ def _impact_problems(drop: Drop, solder: Solder) -> list[Problem]:
     return []
 
 
-def _ispg_pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
-    """Find pairs of drops that the scheme ispg is not verified for."""
+def _unverified_pair(pair: Drops, solder: Solder) -> str | None:
+    """What of two drops the scheme ispg is not verified for; None where it is."""
     inertia = decide_drop(solder, pair.is_free)["inertia"]
     places = {
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(pair.contact_angle),
@@ -154,7 +157,7 @@ def _ispg_pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"two drops of {pair.particles} particles (up to {ISPG_PAIR} it is)": pair.particles > ISPG_PAIR,
     }
-    return next((checks.ispg_problems(solder, place) for place, is_met in places.items() if is_met), [])
+    return next((place for place, is_met in places.items() if is_met), None)
 
 
 def _angle_at_rest(drop: Drop) -> float | None:

@@ -20,8 +20,9 @@ from reflowshock.particles.parameters.printing import Printing
 from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
 from reflowshock.particles.sph.flow import PICTURES, FlowResult, Metrics, Picture
-from reflowshock.particles.sph.liquid_surface import Meeting, SurfaceLost
+from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.surface_care import SurfaceLost
 
 COLUMNS = ("time", "drops", "largest_speed", "kinetic_energy", "surface_energy", "height")
 # Steps after which the light is accounted for, and after which a row of the history is kept.

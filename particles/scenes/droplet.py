@@ -15,9 +15,9 @@ from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.flow import FlowResult, Metrics
 from reflowshock.particles.sph.fluid_state import Law
-from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
+from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import EDGE
+from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 from reflowshock.particles.surface.profile import width

@@ -82,7 +82,8 @@ def follow_path(
         steps = ceil(motion.duration(flow.body.plates[1]) / flow.time_step.largest)
         flow.physics = replace(flow.physics, motions=(motion,))
         checkpoint = checkpoints(number) if checkpoints else None
-        run = run_to_rest(flow, replace(rule, max_steps=flow.steps + steps + rule.max_steps), checkpoint=checkpoint)
+        last = replace(rule, max_steps=flow.steps + steps + rule.max_steps, end_time=begun + rule.end_time)
+        run = run_to_rest(flow, last, checkpoint=checkpoint)
         if run.ruptured:
             time, there = flow.time - begun, placed_geometry(place, flow.body.plates)
             yield _broken(joint_shape(there, solder, flow, run), place, solder, flow, time)

@@ -25,7 +25,7 @@ BLOCKS = 256
 LIMIT = {} if config.ENABLE_CUDASIM else {"max_registers": 128}
 
 
-class Velocities(NamedTuple):
+class Speeds(NamedTuple):
     """Rows of the state that say how fast particles are [m/s]."""
 
     u: Any
@@ -163,7 +163,7 @@ def _largest(measure, kinds):
 
 @njit
 def _speed2(i, state, built_at, middle):
-    return (speed2_of(i, Velocities(state[3], state[4], state[5])),)
+    return (speed2_of(i, Speeds(state[3], state[4], state[5])),)
 
 
 @njit

@@ -16,11 +16,11 @@ from reflowshock.particles.core.neighbours import FEWEST, REACH, SPARE
 from reflowshock.particles.sph import cuda_loops as loops
 from reflowshock.particles.sph.cuda_loops import BLOCKS, STATE, THREADS_PER_BLOCK, blocks_for
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.neighbour_rows import SKIN
 from reflowshock.particles.sph.smoothing import SUPPORT
-from reflowshock.particles.sph.threads import RATES
+from reflowshock.particles.sph.threads import RATES, SKIN
 
 WALLS = Fields._fields[12:17]
+MOVING = STATE.index("density") + 1  # the first rows of a state: positions, velocities, densities
 Vector = tuple[float, float, float]
 Lattice = tuple[Vector, float, tuple[int, int, int]]
 NOWHERE = (0.0, 0.0, 0.0)
@@ -74,6 +74,7 @@ class CudaParticles:
         state = cuda.to_device(np.array([getattr(fields, name) for name in STATE]))
         self._loop(loops.take, self._count, state, 0, self._order, self._state)
         self._loop(loops.take, self._fluids, cuda.to_device(rates), 0, self._order[: self._fluids], self._rates)
+        self._host = None
 
     @property
     def fields(self) -> Fields:
@@ -140,9 +141,12 @@ class CudaParticles:
         self._run(self._loops.find_rates, *lists)
 
     def add(self, act: Callable[[Floats, Fields], None]) -> None:
-        """Let the host add to rates 1 to 3 and 7 to 9; of the fields it has present positions, and masses."""
+        """Let the host add to rates 1 to 3 and 7 to 9; it has present positions, velocities, densities, viscosities."""
         found = np.zeros((RATES, self._fluids))
-        act(found, self._given._replace(**dict(zip("xyz", self._on_host(self._state[:3]), strict=True))))
+        now = dict(zip(STATE[:MOVING], self._on_host(self._state[:MOVING]), strict=True))
+        if self._law.rheology:
+            now["viscosity"] = self._on_host(self._state[-1:])[0]
+        act(found, self._given._replace(**now))
         given = cuda.to_device(np.concatenate((found[1:4], found[7:10])))
         self._loop(loops.add_rates, self._fluids, given, self._order, self._rates)
 

@@ -18,9 +18,9 @@ from reflowshock.particles.parameters.flows import DIFFUSIVE
 from reflowshock.particles.parameters.freezing import Freezing
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.neighbour_rows import Rows
 from reflowshock.particles.sph.particle_rates import apart, constants_of, periods_of, summed
 from reflowshock.particles.sph.smoothing import slope
+from reflowshock.particles.sph.threads import Rows
 
 # Of the latent heat: with less of it a particle is solid, so that the front is in its middle.
 FROZEN = 0.5

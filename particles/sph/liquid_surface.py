@@ -63,10 +63,6 @@ class Meeting:
     energy: float
 
 
-class SurfaceLost(ArithmeticError):
-    """Vertices of the surface have no particles beside them: the liquid has left it."""
-
-
 @dataclass(slots=True)
 class LiquidSurface:
     """The free surface of a liquid, closed by the wall z = 0 where there is one.
@@ -196,7 +192,7 @@ class LiquidSurface:
         self._cover(fields)
         weights = np.empty((2, 2, len(self._lists[1])))
         if not surface_loops.find_weights(self.points, self._lists, fields, self.law, weights).all():
-            raise SurfaceLost("the liquid has left its surface")
+            raise surface_care.SurfaceLost("the liquid has left its surface")
         self._shares = weights[0]
         outward = self._outward()
         found = np.zeros((2, 3, carriers))
@@ -216,9 +212,12 @@ class LiquidSurface:
         """Move vertices that particles pass, or leave behind, at the rim of a film. The volume stays."""
         volume, normals = self.volume, self._normals()
         offset = surface_care.strays((self.points, normals), self._lists, fields, self.law.spacing)
+        if self.ground is not None:
+            offset[self.wetness[0] > 0.0] = 0.0
         if offset.any():
             self.points += offset[:, None] * normals
             self.enclose(volume)
+            self._find_wetness()
 
     def _outward(self) -> Floats:
         """Areas about the vertices times their outward normals `(m, 3)` [m^2], of what lies on the ground along it."""
@@ -228,8 +227,8 @@ class LiquidSurface:
         return area if self.ground is None else grounds.along(area, *self.wetness)
 
     def _normals(self) -> Floats:
-        """Outward unit normals `(m, 3)`, of contact lines along the wall; zero where there is none."""
-        outward = self._outward()
+        """Outward unit normals `(m, 3)`, of contact lines along the wall; none on the ground."""
+        outward = self._outward() * (1.0 if self.ground is None else (self.wetness[0] < 1.0)[:, None])
         return outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
 
     def forces(self) -> Floats:
@@ -359,8 +358,9 @@ class LiquidSurface:
 
     def _meets(self) -> bool:
         """Whether parts of it have come as near to each other as particles stand; across the wall none meet."""
-        gap = MEETING * self.law.spacing
-        return narrowest_gap(self.points, self.triangles, self._normals(), gap, self.law.spacing) < gap
+        on_ground, gap = self.ground is not None, MEETING * self.law.spacing
+        normals = vertex_normals(self.points, self.triangles, len(self.points)) if on_ground else self._normals()
+        return narrowest_gap(self.points, self.triangles, normals, gap, self.law.spacing) < gap
 
     def _leaves(self, velocity: Floats) -> bool:
         """Whether liquid moves away from the wall on a foot that is too thin for its particles."""

@@ -38,6 +38,10 @@ COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
 WALL = Plate.horizontal(0.0)
 
 
+class SurfaceLost(ArithmeticError):
+    """Vertices of the surface have no particles beside them: the liquid has left it."""
+
+
 def changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
     """Return what splits edges that are too long and what collapses those that are too short, for a spacing [m]."""
     long, short = LONGEST * EDGE * spacing, SHORTEST * EDGE * spacing

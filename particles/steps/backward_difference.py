@@ -9,7 +9,6 @@ Euler. A mode of frequency omega is damped at a rate of omega^4 dt^3 / 4 and slo
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
@@ -49,12 +48,6 @@ class BackwardDifference:
     def start(cls, count: int) -> "BackwardDifference":
         """Start a body of `count` particles."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
-
-    def stopped(self, held: NDArray[np.bool_], carried: Floats) -> "BackwardDifference":
-        """The last step where particles `(n,)` that something has caught since went with it, by `(n, 3)` [m]."""
-        still = held[:, None]
-        displacement, change = np.where(still, carried, self.displacement), np.where(still, 0.0, self.velocity_change)
-        return BackwardDifference(displacement, change, self.time_step)
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:
         """Start of the equivalent step from positions and velocities `(n, 3)` now, for a time step [s]."""

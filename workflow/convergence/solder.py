@@ -11,7 +11,7 @@ from reflowshock.particles.parameters.effects import decide_drop
 from reflowshock.units import from_si
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
-from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SolderCase
 from reflowshock.workflow.store.product import read_record
 
 Settings = Mapping[str, str]
@@ -91,9 +91,10 @@ def drop_study(case: DropCase) -> ConvergenceStudy:
     exact = "sphere" if drop.is_free else "Young-Laplace"
     if decide_drop(case.molten, drop.is_free)["inertia"]["on"]:
         if drop.section != "none":
-            return _study(exact, errors, (_spacing_of_drop(case, SECTION_EDGES),))
+            return _study(exact, errors, (_spacing_of_drop(case, SECTION_EDGES, settings=_scheme(case)),))
         own = "ISPG" if case.molten.numerics.scheme == "ispg" else "tetrahedra"
-        return _study(exact, errors, (_spacing_of_drop(case, SCHEME_EDGES), *_other_schemes(case, own, {})))
+        spacing = _spacing_of_drop(case, SCHEME_EDGES, settings=_scheme(case))
+        return _study(exact, errors, (spacing, *_other_schemes(case, own, {})))
     parameters, choices = [_spacing_of_drop(case, PER_EDGE)], _steps_of_drop(case)
     if drop.symmetry == "none" and not drop.is_free:
         parameters.append(_spacing_of_drop(case, OF_A_QUARTER, "quarter", {"drop.symmetry": "quarter"}))
@@ -101,6 +102,11 @@ def drop_study(case: DropCase) -> ConvergenceStudy:
         parameters += _other_schemes(case, "relaxation", MOVING)
         choices += _printed_scheme(case)
     return _study(exact, errors, tuple(parameters), tuple(choices))
+
+
+def _scheme(case: SolderCase) -> Settings:
+    """The scheme that the case has, for all runs of a series: with others a finer one might have another."""
+    return {"solder.numerics.scheme": case.molten.numerics.scheme}
 
 
 def _steps_of_drop(case: DropCase) -> list[StudyRun]:
@@ -165,7 +171,7 @@ def joint_study(case: JointCase) -> ConvergenceStudy:
     lifted = case.joint.package is not None and "lift" in case.joint.package.free
     own = {"collapse_height_error": "standoff"} if lifted else {"axial_force_error": "axial force"}
     errors = SHAPE | own
-    parameter = _spacing("joint.spacing", case.joint.spacing)
+    parameter = _spacing("joint.spacing", case.joint.spacing, _scheme(case))
     return _study("Young-Laplace", errors, (parameter,))
 
 
@@ -173,16 +179,16 @@ def drops_study(case: DropsCase) -> ConvergenceStudy:
     """Particle spacing of two drops, about the one that the case has."""
     errors = {"max_width_error": "largest width", "height_error": "height"}
     exact = "sphere" if case.drops.is_free else "Young-Laplace"
-    parameter = _spacing("drops.spacing", case.drops.spacing, FINENESS[1:])
+    parameter = _spacing("drops.spacing", case.drops.spacing, _scheme(case), FINENESS[1:])
     return _study(exact, errors, (parameter,))
 
 
-def _spacing(key: str, own: float, fineness: tuple[float, ...] = FINENESS) -> Parameter:
+def _spacing(key: str, own: float, settings: Settings, fineness: tuple[float, ...] = FINENESS) -> Parameter:
     """A spacing that the case gives [m], and others about it; values are relative to it."""
 
     def at(value: float) -> StudyRun:
         text = from_si(value * own, "mm", digits=3)
-        return StudyRun(f"spacing {text}", "particle spacing", {key: text}, value)
+        return StudyRun(f"spacing {text}", "particle spacing", {key: text, **settings}, value)
 
     return Parameter("particle spacing", tuple(1.0 / one for one in fineness), at, SECOND)
 

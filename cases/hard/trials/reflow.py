@@ -50,11 +50,13 @@ class MoltenScene(Parameters):
 
     def molten(self, scene: Drop | Joint | Drops) -> Solder:
         """The solder as the solvers take it."""
+        from reflowshock.particles.parameters.scene_checks import with_scheme
+
         solder = self.solder.resolve(scene, self.gravity)
-        if self.bond is None:
-            return solder
-        gravity = self.bond * solder.surface_tension / (solder.density * solder.volume ** (2.0 / 3.0))
-        return solder.model_copy(update={"gravity": gravity})
+        if self.bond is not None:
+            gravity = self.bond * solder.surface_tension / (solder.density * solder.volume ** (2.0 / 3.0))
+            solder = solder.model_copy(update={"gravity": gravity})
+        return with_scheme(scene, solder)[0] if self.solder.numerics.scheme == "auto" else solder
 
     def measured(self, shape: "JointShape") -> dict[str, Measured]:
         """All that a shape tells, with the energy of its history.

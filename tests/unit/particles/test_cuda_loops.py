@@ -26,6 +26,11 @@ assert "reflowshock.particles.sph.cuda_loops" in sys.modules
 saved = copy.deepcopy(simulation.saved())
 again = SCENES[sys.argv[1]]("cuda")
 again.restore(saved)
+assert all(np.array_equal(*pair) for pair in zip(simulation.fields, again.fields))
+seen = []
+simulation.particles.add(lambda rates, fields: seen.append(fields))
+for name in ("x", "z", "u", "w", "density", "mass", "viscosity"):
+    assert np.array_equal(getattr(seen[0], name), getattr(simulation.fields, name)), name
 for one in (simulation, again):
     one.step(1e-3 * one.time_step())
 assert all(np.array_equal(*pair) for pair in zip(simulation.fields, again.fields))

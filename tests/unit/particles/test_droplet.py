@@ -10,8 +10,9 @@ from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.scenes.droplet import base_width, droplet, outcome, solve_droplet, width
 from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
-from reflowshock.particles.sph.liquid_surface import LiquidSurface, SurfaceLost
+from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph.surface_care import SurfaceLost
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
 COARSE = DropletNumerics(particles_per_diameter=8)

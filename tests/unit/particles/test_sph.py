@@ -16,10 +16,10 @@ from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.flow import liquid_and_walls
 from reflowshock.particles.sph.fluid_state import REPRODUCING
-from reflowshock.particles.sph.neighbour_rows import Rows
 from reflowshock.particles.sph.particle_rates import condition_of, rates_of, solved
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
+from reflowshock.particles.sph.threads import Rows
 
 AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.pi * q * q}
 
