@@ -60,9 +60,9 @@ def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
     points = np.stack((fields.x, fields.y, np.full(simulation.fluids, height)), axis=1)
     count = simulation.fluids
     lists = np.arange(0, count * count + 1, count, dtype=np.int32), np.tile(np.arange(count, dtype=np.int32), count)
-    weights = np.empty((2, count * count))
+    weights = np.empty((2, 2, count * count))
     find_weights(points, lists, fields, law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights), fields, law, simulation.rates)
+    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, law, simulation.rates)
     assert by_images < 0.6 * height**2
     assert -simulation.rates[1].mean() * height**2 / 3.0 == pytest.approx(1.0, abs=0.05)
 
@@ -74,9 +74,9 @@ def test_a_film_of_two_particles_is_left_to_the_sums_over_pairs():
     before = simulation.rates.copy()
     points = np.array([[0.5, 0.5, 2.0]])
     lists = np.array([0, simulation.fluids], np.int32), np.arange(simulation.fluids, dtype=np.int32)
-    weights = np.empty((2, simulation.fluids))
+    weights = np.empty((2, 2, simulation.fluids))
     find_weights(points, lists, fields, simulation.law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights), fields, simulation.law, simulation.rates)
+    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, simulation.law, simulation.rates)
     assert np.array_equal(simulation.rates, before)
 
 
