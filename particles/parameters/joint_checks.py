@@ -28,8 +28,8 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     if found:
         return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
     found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = found or checks.ispg_problems(solder, unverified_joint(joint, solder))
-    found = found or _load_problems(joint, solder) or _motion_problems(joint, solder)
+    found = found or _motion_problems(joint, solder) or checks.ispg_problems(solder, unverified_joint(joint, solder))
+    found = found or _load_problems(joint, solder)
     return found or too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 

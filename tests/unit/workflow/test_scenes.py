@@ -341,7 +341,7 @@ def test_the_scheme_ispg_takes_planes_of_symmetry():
     [
         (DROP, "solder.effects.inertia=on", "ispg", "costs less than tetrahedra"),
         (DROP, "solder.effects.inertia=off", "energy", "without inertia"),
-        (DROP, "drop.section=axisymmetric", "ispg", "costs less"),
+        (DROP, "drop.section=axisymmetric", "ispg", "no other scheme"),
         (DROP, "drop.particles_per_edge=21", "energy", "(for 5 to 15 it is)"),
         (PAIR, "drops.spacing=0.07 mm", "energy", "(up to 2000 it is)"),
         (JOINT, "solder.wall=no-slip", "ispg", "costs less"),
