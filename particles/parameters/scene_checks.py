@@ -20,7 +20,8 @@ ISPG_ANGLES = (radians(30.0), radians(148.0))
 ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis
 # 5 an edge at 30 degrees without slip was not at rest after 1600 steps; more than 11 were not run.
 FRICTION_EDGES, FRICTION_PAD_EDGES = (6, 11), (7, 9)
-ISPG_PAD_EDGE = FREE_EDGE = 11
+ISPG_PAD_EDGE = 11
+FREE_EDGES = (7, 11)
 IMPACT_EDGES, IMPACT_WEBER, IMPACT_REYNOLDS = (7, 9), 50.0, 300.0
 ISPG_PAIR = 2000
 
@@ -101,8 +102,8 @@ def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
     in_section, between = drop.section != "none", all(_is_between(one) for one in drop.hysteresis or (angle,))
     places = {
         "parts of free drops": drop.is_free and drop.symmetry != "none",
-        f"{drop.count} particles along an edge of a free drop (up to {FREE_EDGE} it is)": (
-            drop.is_free and drop.count > FREE_EDGE
+        f"{drop.count} particles along an edge of a free drop (for {FREE_EDGES[0]} to {FREE_EDGES[1]} it is)": (
+            drop.is_free and not FREE_EDGES[0] <= drop.count <= FREE_EDGES[1]
         ),
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not between,
         "hysteresis in section": in_section and drop.hysteresis is not None,

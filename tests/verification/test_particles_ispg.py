@@ -55,11 +55,11 @@ def at_rest(*asked, **wall):
 
 
 def test_a_cube_without_a_wall_comes_to_rest_as_a_sphere():
-    scene, solder = cube(5, 60.0)
+    scene, solder = cube(7, 60.0)
     drop = drop_to_rest(scene.model_copy(update={"contact_angle": None}), solder)
     metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0 and metrics["particles_lost"] == 0
-    assert abs(metrics["max_width_error"]) < 0.002 and abs(metrics["height_error"]) < 0.01
+    assert abs(metrics["max_width_error"]) < 0.002 and abs(metrics["height_error"]) < 0.005
     assert abs(metrics["volume_drift"]) < 1e-12
     assert abs(metrics["energy_imbalance"]) < 1e-5
 

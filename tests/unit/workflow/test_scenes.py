@@ -259,7 +259,7 @@ ISPG = ("drop.particles_per_edge=11",)
     [
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
         ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
-        ("drop={volume='1 mm^3',particles_per_edge=13}", "13 particles along an edge of a free drop (up to 11 it is)"),
+        ("drop={volume='1 mm^3',particles_per_edge=13}", "13 particles along an edge of a free drop (for 7 to 11"),
         ("drop={volume='1 mm^3',symmetry='half'}", "parts of free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
