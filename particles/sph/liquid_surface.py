@@ -210,11 +210,12 @@ class LiquidSurface:
 
     def _cover(self, fields: Fields) -> None:
         """Move vertices that particles pass, or leave behind, at the rim of a film. The volume stays."""
-        volume, normals = self.volume, self._normals()
+        normals = self._normals()
         offset = surface_care.strays((self.points, normals), self._lists, fields, self.law.spacing)
         if self.ground is not None:
             offset[self.wetness[0] > 0.0] = 0.0
         if offset.any():
+            volume = self.volume
             self.points += offset[:, None] * normals
             self.enclose(volume)
             self._find_wetness()
