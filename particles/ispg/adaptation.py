@@ -23,7 +23,7 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import GalerkinPast
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
+from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, extreme_edges, split_long
 
 # The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
 LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
@@ -75,8 +75,9 @@ class Adaptation:
         """Change the particles where they are too far apart or too near."""
         if self.solver.past is None:
             return
+        on_rings = not any(line.has_edge for line in self.physics.lines)
         for find in (_longer, _shorter):
-            surface = find(body, not any(line.has_edge for line in self.physics.lines))
+            surface = find(body, on_rings)
             if surface is not None:
                 self._apply(body, _with_inner(body, surface))
         inner = _inner_change(body)
@@ -127,11 +128,17 @@ def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) 
 
 
 def _longer(body: Body, on_rings: bool) -> NewSurface | None:
-    return _if_changed(body, split_long(*_surface(body), LONGEST_EDGE * body.cloud.spacing, on_rings))
+    longest = LONGEST_EDGE * body.cloud.spacing
+    if extreme_edges(body.points, body.triangles)[1] <= longest:
+        return None
+    return _if_changed(body, split_long(*_surface(body), longest, on_rings))
 
 
 def _shorter(body: Body, on_rings: bool) -> NewSurface | None:
-    return _if_changed(body, collapse_short(*_surface(body), SHORTEST_EDGE * body.cloud.spacing, on_rings))
+    shortest = SHORTEST_EDGE * body.cloud.spacing
+    if extreme_edges(body.points, body.triangles)[0] >= shortest:
+        return None
+    return _if_changed(body, collapse_short(*_surface(body), shortest, on_rings))
 
 
 def _surface(body: Body) -> tuple[Floats, Indices, Sequence[Indices]]:
@@ -152,7 +159,8 @@ def _with_inner(body: Body, surface: NewSurface) -> Change:
 
 def _inner_change(body: Body) -> Change | None:
     """What comes and goes below the surface, None where nothing does."""
-    gone, pairs = _too_near(body), _gaps(body)
+    lists = find_neighbours(body.points, 2.0 * EMPTY * WIDEST_GAP * body.cloud.spacing)
+    gone, pairs = _too_near(body, lists), _gaps(body, lists)
     if not len(gone) and not len(pairs):
         return None
     kept = np.setdiff1d(np.arange(len(body.points), dtype=np.int32), gone)
@@ -160,18 +168,32 @@ def _inner_change(body: Body) -> Change | None:
     return Change(first, second, body.cloud.surface_count, body.triangles, body.cloud.rings)
 
 
-def _too_near(body: Body) -> Indices:
+def _too_near(body: Body, lists: tuple[Indices, Indices]) -> Indices:
     """Particles below the surface to leave out: one of two that are too near."""
-    pairs = cKDTree(body.points).query_pairs(NEAREST * body.cloud.spacing, output_type="ndarray")
-    last = np.unique(pairs.max(axis=1)) if len(pairs) else np.empty(0, np.int64)
-    return last[last >= body.cloud.surface_count].astype(np.int32)
+    crowded = _crowded(body.points, *lists, NEAREST * body.cloud.spacing)
+    return crowded[crowded >= body.cloud.surface_count]
 
 
-def _gaps(body: Body) -> Indices:
+@njit(cache=True)
+def _crowded(points, offsets, indices, nearest):
+    """The later ones of pairs not farther apart than the nearest may be, `(m,)`, ascending."""
+    crowded, count = np.empty(points.shape[0], np.int32), 0
+    for i in range(points.shape[0]):
+        for k in range(offsets[i], offsets[i + 1]):
+            j = indices[k]
+            if j < i and _square(points, j, points[i, 0], points[i, 1], points[i, 2]) <= nearest**2:
+                crowded[count] = i
+                count += 1
+                break
+    return crowded[:count]
+
+
+def _gaps(body: Body, lists: tuple[Indices, Indices]) -> Indices:
     """Pairs of particles `(m, 2)` in the middle of which there is room for another one."""
     spacing, points = body.cloud.spacing, body.points
-    reach = 2.0 * EMPTY * spacing * WIDEST_GAP
-    pairs, room = _open_pairs(points, *find_neighbours(points, reach), GAP * spacing, EMPTY * spacing)
+    pairs, room = _open_pairs(points, *lists, GAP * spacing, EMPTY * spacing)
+    if not len(pairs):
+        return pairs
     middle = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])
     inside = _depth(body, middle) > DEPTH * spacing
     wall = body.cloud.wall[pairs]
@@ -188,12 +210,14 @@ def _gaps(body: Body) -> Indices:
 def _open_pairs(points, offsets, indices, gap, empty):
     """Pairs `(m, 2)` more than a gap apart with no particle nearer to their middle than `empty`, and how far apart."""
     pairs, apart, count = np.empty((indices.shape[0] // 2 + 1, 2), np.int32), np.empty(indices.shape[0] // 2 + 1), 0
-    least, limit = max(gap, 2.0 * empty), empty**2
+    least, limit = max(gap, 2.0 * empty) ** 2, empty**2
     for i in range(points.shape[0]):
         for a in range(offsets[i], offsets[i + 1]):
             j = indices[a]
-            length = np.sqrt(_square(points, j, points[i, 0], points[i, 1], points[i, 2]))
-            if j < i or length <= least:
+            if j < i:
+                continue
+            square = _square(points, j, points[i, 0], points[i, 1], points[i, 2])
+            if square <= least:
                 continue
             x, y, z = points[i, 0] + points[j, 0], points[i, 1] + points[j, 1], points[i, 2] + points[j, 2]
             nearest = limit
@@ -203,7 +227,7 @@ def _open_pairs(points, offsets, indices, gap, empty):
                     break
             if nearest == limit:
                 pairs[count, 0], pairs[count, 1] = i, j
-                apart[count] = length
+                apart[count] = np.sqrt(square)
                 count += 1
     return pairs[:count], apart[:count]
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
@@ -31,6 +32,18 @@ class NewSurface:
     second: Indices
     triangles: Indices
     rings: tuple[Indices, ...]
+
+
+@njit(cache=True)
+def extreme_edges(points, triangles):
+    """Lengths of the shortest and the longest edge of triangles `(t, 3)` [m]."""
+    shortest, longest = np.inf, 0.0
+    for a, b, c in triangles:
+        for i, j in ((a, b), (b, c), (c, a)):
+            x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+            square = x * x + y * y + z * z
+            shortest, longest = min(shortest, square), max(longest, square)
+    return np.sqrt(shortest), np.sqrt(longest)
 
 
 def split_long(
@@ -97,7 +110,7 @@ def collapse_short(
         outer = (sides[edge] < 0).any()
         if on_ring[gone] and not (outer and on_rings):
             continue
-        near = np.unique(triangles[faces_of[kept] + faces_of[gone]])
+        near = triangles[np.concatenate((faces_of[kept], faces_of[gone]))]
         place = points[kept] if on_ring[kept] and not on_ring[gone] else 0.5 * (points[kept] + points[gone])
         if busy[near].any() or not _may_collapse(points, triangles, faces_of, (kept, gone), place):
             continue
@@ -114,7 +127,7 @@ def collapse_short(
 
 
 def _may_collapse(
-    points: Floats, triangles: Indices, faces_of: Sequence[list[int]], ends: tuple[int, int], place: Floats
+    points: Floats, triangles: Indices, faces_of: Sequence[Indices], ends: tuple[int, int], place: Floats
 ) -> bool:
     """Whether the ends of an edge, joined at a place `(3,)`, leave a surface that is neither folded nor pinched off."""
     kept, gone = ends
@@ -135,24 +148,23 @@ def _edges(triangles: Indices) -> tuple[Indices, NDArray[np.int64]]:
     """Edges `(e, 2)`, the smaller vertex first, and the triangles on both sides `(e, 2)`, -1 where there is none."""
     half = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     owner = np.tile(np.arange(len(triangles)), 3)
-    edges, number = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
-    number = number.ravel()
-    sides = np.full((len(edges), 2), -1)
-    order = np.argsort(number, kind="stable")
-    starts = np.searchsorted(number[order], np.arange(len(edges)))
+    lower, upper = half.min(axis=1).astype(np.int64), half.max(axis=1)
+    key = lower * (int(triangles.max()) + 1) + upper
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+    sides = np.full((len(starts), 2), -1)
     sides[:, 0] = owner[order[starts]]
     double = np.diff(np.append(starts, len(order))) == 2
     sides[double, 1] = owner[order[starts[double] + 1]]
-    return edges.astype(np.int32), sides
+    first = order[starts]
+    return np.column_stack((lower[first], upper[first])).astype(np.int32), sides
 
 
-def _faces_of(triangles: Indices, count: int) -> list[list[int]]:
-    """The triangles around each vertex."""
-    result: list[list[int]] = [[] for _ in range(count)]
-    for face, corners in enumerate(triangles.tolist()):
-        for corner in corners:
-            result[corner].append(face)
-    return result
+def _faces_of(triangles: Indices, count: int) -> list[Indices]:
+    """The triangles around each vertex, ascending."""
+    order = np.argsort(triangles.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(triangles.ravel(), minlength=count))
+    return np.split(order // 3, ends[:-1])
 
 
 def _insert(lines: list[list[int]], i: int, j: int, new: int) -> None:
