@@ -374,6 +374,5 @@ class GalerkinEquations:
 
 def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
     """Stiffness `(3 s, 3 s)` by particle to velocities of the first s that walls admit by projections `(n, 3, 3)`."""
-    rows = np.repeat(np.arange(len(stiffness.indptr) - 1), np.diff(stiffness.indptr))
-    blocks = admitted[rows] @ stiffness.data @ admitted[stiffness.indices]
+    blocks = kernels.projected_blocks(stiffness.indptr, stiffness.indices, stiffness.data, admitted)
     return sparse.bsr_matrix((blocks, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

@@ -28,6 +28,23 @@ def projected(frames, field):
 
 
 @njit(cache=True)
+def projected_blocks(starts, columns, blocks, frames):
+    """Blocks `(k, 3, 3)` of a matrix between a matrix of each row's and of each column's particle `(n, 3, 3)`."""
+    result, half = np.empty_like(blocks), np.empty((3, 3))
+    for i in range(starts.shape[0] - 1):
+        own = frames[i]
+        for k in range(starts[i], starts[i + 1]):
+            block, other = blocks[k], frames[columns[k]]
+            for c in range(3):
+                for d in range(3):
+                    half[c, d] = own[c, 0] * block[0, d] + own[c, 1] * block[1, d] + own[c, 2] * block[2, d]
+            for c in range(3):
+                for d in range(3):
+                    result[k, c, d] = half[c, 0] * other[0, d] + half[c, 1] * other[1, d] + half[c, 2] * other[2, d]
+    return result
+
+
+@njit(cache=True)
 def rates_of_volume(rows, images, parts, field):
     """Rates of volume `(n,)` [m^3/s] of velocities `(n, 3)`, those of `parts`: volumes `(n,)`, unbalanced `(n, 3)`."""
     volumes, unbalanced = parts

@@ -121,7 +121,8 @@ class PreparedSectionStep(PreparedIspgStep):
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
         stiffness = sum((part.stiffness(body) for part in tensions), sparse.csr_matrix((masses.size * 3,) * 2))
         motions = rigid.reshape(len(rigid), 3 * len(masses)) @ basis
-        free = (basis.T @ np.repeat(masses, 3), basis.T @ stiffness @ basis, motions)
+        free_stiffness = sparse.bsr_matrix(basis.T @ stiffness @ basis, blocksize=(1, 1))
+        free = (basis.T @ np.repeat(masses, 3), free_stiffness, motions)
         return SectionEquations(
             space=cast(Galerkin, space),  # what a step asks of either is the same
             matrices=space,
