@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import blas, lapack
+from scipy.linalg import lapack
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
@@ -23,6 +23,7 @@ MANY_ITERATIONS = 12
 TOO_MANY_ITERATIONS = 80
 # Added to the diagonal, which is about one, in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
+SAVED = ("root", "scale", "order", "iterations")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,52 +77,84 @@ def _length(values: Floats) -> float:
     return float(np.sqrt(np.vdot(values, values)))
 
 
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A symmetric matrix A, scaled and in an order in which its entries lie next to the diagonal.
+
+    Attributes:
+        rows: of S A S, from b places before the diagonal to it, `(n, b + 1)`.
+        scale: S, `(n,)`.
+        order: `(n,)` which row of A each row is.
+    """
+
+    rows: Singles
+    scale: Floats
+    order: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, matrix: Floats) -> "Band":
+        """Of a matrix `(n, n)` without zeros, scaled to a diagonal of one."""
+        count, scale = len(matrix), 1.0 / np.sqrt(matrix.diagonal())
+        rows = np.zeros((count, count), np.float32)
+        for i, row in enumerate(scale[:, None] * matrix * scale):
+            rows[i, count - 1 - i :] = row[: i + 1]
+        return cls(rows, scale, np.arange(count))
+
+
 @dataclass(slots=True)
 class LaggedCholesky:
     """Factors of an earlier matrix, made anew when their last use took many iterations.
 
-    They are dense: particles push on those two supports away, so that factors of a few thousand fill up anyhow. Single
-    precision is enough to precondition with, and half the memory twice as fast.
+    They fill a band: particles push on those two supports away. Single precision is enough to precondition with, and
+    half the memory twice as fast.
 
     Attributes:
-        root: R of R^T R = S A S, `(n, n)`, upper triangle.
-        scale: S, `(n,)`.
+        root: R of R^T R = S A S, by diagonals as LAPACK has them, `(b + 1, n)`.
+        scale: S, `(n,)`, by row of R.
+        order: `(n,)` which row of A each row of R is.
         iterations: of the last solve.
     """
 
     root: Singles | None = None
     scale: Floats | None = None
+    order: NDArray[np.int64] | None = None
     iterations: int = 0
 
-    def solve(
-        self, operator: Apply, matrix: Callable[[], tuple[Singles, Floats]], right: Floats, tolerance: Tolerance
-    ) -> Floats:
-        """Solve A x = b from zero; `matrix` makes the lower triangle of S A S, and S, where new factors are needed.
+    def solve(self, operator: Apply, matrix: Callable[[], Band], right: Floats, tolerance: Tolerance) -> Floats:
+        """Solve A x = b from zero; `matrix` makes A where new factors are needed.
 
         Raises:
             SolveFailed: the true residual stays above the limit, or A has no factors.
         """
         fresh = self.scale is None or self.iterations > MANY_ITERATIONS or len(self.scale) != len(right)
         if fresh:
-            self.root, self.scale = _factored(*matrix())
+            self._factor(matrix())
         try:
             most = MAX_ITERATIONS if fresh else TOO_MANY_ITERATIONS
             return self._solved(operator, right, replace(tolerance, most=most))
         except SolveFailed:
             if fresh:
                 raise
-        self.root, self.scale = _factored(*matrix())
+        self._factor(matrix())
         return self._solved(operator, right, tolerance)
+
+    def _factor(self, matrix: Band) -> None:
+        """Factor a matrix, whose rows are overwritten."""
+        matrix.rows[:, -1] += SHIFT
+        self.root, failed = lapack.spbtrf(matrix.rows.T, lower=0, overwrite_ab=1)
+        self.scale, self.order = matrix.scale[matrix.order], matrix.order
+        if failed:
+            raise SolveFailed(f"Cholesky factors of {len(self.order)} pressures: pivot {failed} is not positive")
 
     def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
         """Solve with the factors that are kept."""
-        root, scale = self.root, self.scale
-        assert scale is not None
+        root, scale, order = self.root, self.scale, self.order
 
         def precondition(residual: Floats) -> Floats:
-            # One right-hand side: the routine for many (potrs) takes four times as long.
-            scaled = (scale * residual).astype(np.float32)
-            return scale * blas.strsv(root, blas.strsv(root, scaled, trans=1), overwrite_x=1)
+            found = np.empty_like(residual)
+            scaled = (scale * residual[order]).astype(np.float32)
+            found[order] = scale * lapack.spbtrs(root, scaled, lower=0, overwrite_b=1)[0]
+            return found
 
         start = np.zeros_like(right)
         solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance)
@@ -129,21 +162,11 @@ class LaggedCholesky:
 
     def saved(self) -> dict[str, Any]:
         """All of it, for a checkpoint."""
-        root = None if self.root is None else self.root[np.triu_indices(len(self.root))]
-        return {"root": root, "scale": self.scale, "iterations": self.iterations}
+        return {name: getattr(self, name) for name in SAVED}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
-        self.scale, self.iterations, self.root = saved["scale"], saved["iterations"], None
-        if self.scale is not None:
-            self.root = np.zeros((len(self.scale),) * 2, np.float32, order="F")
-            self.root[np.triu_indices(len(self.scale))] = saved["root"]
-
-
-def _factored(matrix: Singles, scale: Floats) -> tuple[Singles, Floats]:
-    """Root of a shifted matrix, of which the lower triangle is given, in its place; and its scale."""
-    matrix[np.diag_indices_from(matrix)] += SHIFT
-    root, failed = lapack.spotrf(matrix.T, lower=0, overwrite_a=1, clean=0)
-    if failed:
-        raise SolveFailed(f"Cholesky factors of {len(scale)} pressures: pivot {failed} is not positive")
-    return root, scale
+        for name in SAVED:
+            setattr(self, name, saved[name])
+        if self.root is not None:
+            self.root = np.asfortranarray(self.root)

@@ -39,6 +39,7 @@ class Galerkin:
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
         shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
+        order: `(n,)` particles one after the other along the longest side of the body.
         drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
         riders: motions of plates that float.
     """
@@ -50,6 +51,7 @@ class Galerkin:
     weights: Floats
     shape: sparse.csr_matrix
     ghosts: Ghosts
+    order: NDArray[np.int64]
     drift: Floats
     riders: Riders | None = None
 
@@ -84,7 +86,8 @@ class Galerkin:
         of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
         carried = with_moments(body, volumes + of_shapes)
         drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
-        return cls(volumes, carried, starts, columns, weights, shape, ghosts, drift)
+        order = np.argsort(body.points[:, np.argmax(np.ptp(body.points, axis=0))], kind="stable")
+        return cls(volumes, carried, starts, columns, weights, shape, ghosts, order, drift)
 
     @property
     def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:

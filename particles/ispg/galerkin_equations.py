@@ -32,12 +32,17 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.discretisation.lagged_cholesky import Apply, LaggedCholesky, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import (
+    Apply,
+    Band,
+    LaggedCholesky,
+    Tolerance,
+    conjugate_gradients,
+)
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
@@ -265,15 +270,13 @@ class GalerkinEquations:
         found = np.tensordot(riders.rates(velocity), riders.twists, 1)
         return {wall: found[wall] for wall in floating}
 
-    def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
-        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal.
-
-        Returns the lower triangle of S A S `(n, n)`, whose diagonal is about one, and S `(n,)`.
-        """
+    def pressure_matrix(self) -> Band:
+        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal."""
         space, stiff = self.space, np.repeat(self.masses / self.time_step, 3)
         stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
         roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
-        return kernels.pressure_matrix(space.rows, space.images, space.volumes, roots)
+        rows, scale = kernels.pressure_matrix(space.rows, space.images, space.volumes, roots, space.order)
+        return Band(rows, scale, space.order)
 
     @property
     def given(self) -> Floats:

@@ -113,42 +113,49 @@ def _divergences(rows, images, roots):
 
 
 @njit(cache=True)
-def _by_particle(starts, particle, entries):
-    """Entries sorted by the particle of their column: firsts `(n + 1,)`, rows, entries."""
-    firsts = np.zeros(starts.shape[0], np.int64)
+def _by_particle(starts, particle, entries, order):
+    """Entries by the particle of their column, those of each in an order of the rows.
+
+    Firsts `(n + 1,)`, ranks of the rows, entries; where what follows the row of each of the given ones begins, `(k,)`;
+    how far apart the ranks of one particle are at most.
+    """
+    count = starts.shape[0] - 1
+    firsts = np.zeros(count + 1, np.int64)
     for j in particle:
         firsts[j + 1] += 1
     firsts = np.cumsum(firsts)
-    fill, row, result = firsts.copy(), np.empty(particle.shape[0], np.int32), np.empty_like(entries)
-    for i in range(starts.shape[0] - 1):
-        for k in range(starts[i], starts[i + 1]):
-            at = fill[particle[k]]
-            fill[particle[k]] += 1
-            row[at] = i
-            result[at] = entries[k]
-    return firsts, row, result
+    fill, rank, ends = firsts.copy(), np.empty(particle.shape[0], np.int32), np.empty(particle.shape[0], np.int64)
+    result, width = np.empty_like(entries), 0
+    for r in range(count):
+        for k in range(starts[order[r]], starts[order[r] + 1]):
+            j = particle[k]
+            rank[fill[j]], ends[k] = r, fill[j]
+            for c in range(3):
+                result[fill[j], c] = entries[k, c]
+            fill[j] += 1
+    for k in range(particle.shape[0]):
+        own, last = rank[ends[k]], firsts[particle[k] + 1]
+        width = max(width, own - rank[firsts[particle[k]]])
+        while ends[k] < last and rank[ends[k]] == own:  # a particle and its images
+            ends[k] += 1
+    return firsts, rank, result, ends, width
 
 
 @njit(cache=True, parallel=True)
-def pressure_matrix(rows, images, volumes, roots):
-    """Lower triangle, in single precision, of the matrix A of rates of volume under pressures.
+def pressure_matrix(rows, images, volumes, roots, order):
+    """Band, in single precision, of the matrix A of rates of volume under pressures, particles in an order `(n,)`.
 
-    Without what is unbalanced. ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S `(n, n)`,
-    whose diagonal is about one, zero above it, and S `(n,)`.
+    Without what is unbalanced. ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S by rows from
+    b places before the diagonal, which is about one, to it, `(n, b + 1)`; and S `(n,)`, by particle.
     """
-    starts = rows[0]
-    count = starts.shape[0] - 1
+    starts, count = rows[0], order.shape[0]
     particle, entries, lengths = _divergences(rows, images, roots)
-    firsts, row, others = _by_particle(starts, particle, entries)
-    matrix = np.empty((count, count), np.float32)
-    for i in prange(count):
-        line = matrix[i]
-        line[:] = 0.0
-        for k in range(starts[i], starts[i + 1]):
-            j = particle[k]
+    firsts, rank, others, ends, width = _by_particle(starts, particle, entries, order)
+    band = np.zeros((count, width + 1), np.float32)
+    for r in prange(count):
+        line, shift = band[r], width - r
+        for k in range(starts[order[r]], starts[order[r] + 1]):
             x, y, z = entries[k, 0], entries[k, 1], entries[k, 2]
-            for a in range(firsts[j], firsts[j + 1]):
-                if row[a] > i:
-                    break
-                line[row[a]] += x * others[a, 0] + y * others[a, 1] + z * others[a, 2]
-    return matrix, 1.0 / (volumes * lengths)
+            for a in range(firsts[particle[k]], ends[k]):
+                line[rank[a] + shift] += x * others[a, 0] + y * others[a, 1] + z * others[a, 2]
+    return band, 1.0 / (volumes * lengths)

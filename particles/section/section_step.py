@@ -10,14 +10,13 @@ from math import ceil
 from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.discretisation.lagged_cholesky import Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import Band, Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
@@ -89,15 +88,10 @@ class SectionEquations(GalerkinEquations):
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
 
-    def pressure_matrix(self) -> tuple[NDArray[np.float32], Floats]:
-        """Rates of volume under pressures, A, but for what nodal integration misses.
-
-        Returns the lower triangle of S A S `(n, n)`, whose diagonal is one, and S `(n,)`.
-        """
+    def pressure_matrix(self) -> Band:
+        """Rates of volume under pressures, A, but for what nodal integration misses."""
         rows = sparse.diags(self.matrices.volumes) @ self.matrices.divergence_rows() @ self.basis
-        matrix = rows @ self.inertia.solve(rows.T.toarray())
-        scale = 1.0 / np.sqrt(matrix.diagonal())
-        return np.tril(scale[:, None] * matrix * scale).astype(np.float32), scale
+        return Band.of(rows @ self.inertia.solve(rows.T.toarray()))
 
 
 class SectionStep(IspgStep):

@@ -11,7 +11,7 @@ from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_clou
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
-from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky, Tolerance
+from reflowshock.particles.discretisation.lagged_cholesky import Band, LaggedCholesky, Tolerance
 from reflowshock.particles.ispg.collocation import collocate
 from reflowshock.particles.ispg.galerkin import Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow
@@ -199,9 +199,19 @@ def test_the_pressure_matrix_is_that_of_its_operator(body, space):
     roots = np.sqrt(1e-3 / equations.masses)[:, None, None] * equations.admitted
     balanced = replace(equations, unbalanced=np.zeros_like(body.points))
     columns = [balanced.constraint(projected(roots @ roots, balanced.push(unit))) for unit in np.eye(len(roots))]
-    matrix, scale = pressure_matrix(space.rows, space.images, space.volumes, roots)
-    assert np.diag(matrix) == pytest.approx(1.0, abs=0.8)
-    assert matrix / np.outer(scale, scale) == pytest.approx(np.tril(columns), abs=1e-6 * np.abs(columns).max())
+    order = space.order
+    band, scale = pressure_matrix(space.rows, space.images, space.volumes, roots, order)
+    assert band[:, -1] == pytest.approx(1.0, abs=0.8)
+    count, width = len(order), band.shape[1]
+    assert width < count
+    matrix = np.zeros((count, width + count))
+    for rank, row in enumerate(band):
+        matrix[rank, rank + 1 : rank + 1 + width] = row
+    whole = np.tril(np.array(columns)[np.ix_(order, order)])
+    assert matrix[:, :width] == pytest.approx(0.0, abs=0.0)
+    assert matrix[:, width:] / np.outer(scale[order], scale[order]) == pytest.approx(
+        whole, abs=1e-6 * np.abs(columns).max()
+    )
 
 
 def test_factors_of_an_earlier_matrix_solve_and_are_restored():
@@ -211,12 +221,8 @@ def test_factors_of_an_earlier_matrix_solve_and_are_restored():
     first, now = half @ half.T, (half + 0.02 * random.normal(size=half.shape)) @ (half.T)
     now = 0.5 * (now + now.T)
 
-    def lower(matrix):
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        return np.tril(matrix * np.outer(scale, scale)).astype(np.float32), scale
-
     tolerance, factors, again = Tolerance(1e-12, 0.0), LaggedCholesky(), LaggedCholesky()
-    exact = factors.solve(first.__matmul__, lambda: lower(first), right, tolerance)
+    exact = factors.solve(first.__matmul__, lambda: Band.of(first), right, tolerance)
     assert exact == pytest.approx(np.linalg.solve(first, right))
     few = factors.iterations
     again.restore(factors.saved())
@@ -230,7 +236,7 @@ def test_factors_of_an_earlier_matrix_solve_and_are_restored():
 def test_a_matrix_without_factors_is_an_error():
     with pytest.raises(SolveFailed, match="pivot 2 is not positive"):
         LaggedCholesky().solve(
-            lambda x: x, lambda: (np.float32([[1, 0], [2, 1]]), np.ones(2)), np.ones(2), Tolerance(1e-9, 0.0)
+            lambda x: x, lambda: Band.of(np.array([[1.0, 2.0], [2.0, 1.0]])), np.ones(2), Tolerance(1e-9, 0.0)
         )
 
 
