@@ -16,11 +16,11 @@ Singles = NDArray[np.float32]
 MAX_ITERATIONS = 500
 # Of the norm of the right-hand side: more than this is no solution.
 RESIDUAL_LIMIT = 1e-4
-# A step takes four with new factors, fourteen with the last step's and twice as many with those before; the former cost
-# as much as ten of 216 pressures, fifty of 1331.
-MANY_ITERATIONS = 12
+# A step takes six with new factors, twelve with the last step's and twice as many with those before; new ones cost as
+# much as fifteen of 1331 pressures.
+MANY_ITERATIONS = 8
 # With factors of another matrix: where these do not do, new ones cost less than to go on.
-TOO_MANY_ITERATIONS = 80
+TOO_MANY_ITERATIONS = 30
 # Added to the diagonal, which is about one, in the factors only: pressures from particle to particle hardly show.
 SHIFT = 1e-6
 SAVED = ("root", "scale", "order", "iterations")

@@ -145,7 +145,9 @@ class GalerkinEquations:
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
         inertia = self.masses / self.time_step
         inverse = 1.0 / inertia[:, None]
-        load = self.momentum(velocity) / self.time_step + force - self._carried_along()
+        load = self.momentum(velocity) / self.time_step + force
+        if self.walls.any() or self.space.drift.any():
+            load -= self._carried_along()
         parts = (self.space.rows, self.space.images)
         operator: Apply = partial(kernels.friction_operator, *parts, (inertia, self.factors, self.admitted))
         right, begun = kernels.projected(self.admitted, load), kernels.projected(self.admitted, velocity) + self.given

@@ -215,7 +215,7 @@ def forces_of(starts, columns, weights, stress, result):
             result[j, 2] += wx * s20 + wy * s21 + wz * s22
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def resistance(starts, columns, weights, field, factors):
     """Forces `(n + g, 3)` that resist velocities `(n + g, 3)`, in one pass over the rows.
 
