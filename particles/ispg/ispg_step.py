@@ -26,9 +26,10 @@ from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
+from reflowshock.particles.ispg.ledger import Ledger, LostEnergy, Solution, StepEnd
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import GalerkinPast, LostEnergy, StepMotion, centre, evening_passes, with_step
+from reflowshock.particles.ispg.past import GalerkinPast, Prediction, centre, evening_passes
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
     PlateSteps,
@@ -40,7 +41,6 @@ from reflowshock.particles.ispg.rigid_motions import (
     rigid_momenta,
     rigid_motions,
     wall_velocities,
-    with_momenta,
 )
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
@@ -210,106 +210,105 @@ class PreparedIspgStep:
         self, time_step: float, volume: float, rubbing: Sequence[RubbingLine], releases: bool
     ) -> Motion | None:
         """The motion with the vertices held that are; None where others are to be, and may be released."""
+        start = self._predicted(time_step)
+        acting = self._acting(start, (time_step, volume), bool(start.given or rubbing))
+        if acting.walls is not None:
+            pull = acting.walls[0] / self.tension
+            changed = [line.settle(start.body, acting.mean, pull, releases) for line in rubbing]
+            if any(changed):
+                return None
+        end = self._end(start, acting, time_step)
+        kinetic = start.equations.kinetic(start.past.velocity)
+        if start.past.kinetic is None and kinetic:  # it starts in motion
+            self.solver.first_energy = self.energy + kinetic
+        ledger = Ledger(self.physics, start.equations, start.body, start.given, acting, end)
+        losses, before = start.past.carried_losses(kinetic, self.energy), (start.past.velocity, self.energy)
+        losses, force = ledger.booked(losses, before, rubbing, self.tension)
+        self.solver.past = self._left(start, acting, end, losses)
+        return self._motion(start.equations, acting, end, force)
+
+    def _predicted(self, time_step: float) -> Prediction:
+        """Where the equations of a step [s] hold."""
         body, past = self.body, self.past
         base = past.history.base(body.points, past.velocity, time_step)
         pace = self._pace(base)
-        given, guessed = self._given_twists(time_step), self._guessed_twists(pace)
+        given = self._plates.given(self.physics.motions, body, time_step)
+        guessed = self._plates.guessed(self.physics.motions, pace)
         guess = self._guess(pace, given | guessed)
         ways = self._plates.middle_ways(given | guessed, time_step)
         predicted = body.placed(base.points + base.time_step * guess, ways)
         equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
         if past.kinetic is not None:
-            past = self._with_momenta(equations, motions)
+            past = past.with_momenta(equations, motions, self.admitted)
             base = past.history.base(body.points, past.velocity, time_step)
-        force = self._surface_force(predicted, equations) + base.time_step * equations.tension(guess)
+        return Prediction(past, base, given, guessed, guess, predicted, equations, motions)
+
+    def _acting(self, start: Prediction, end: tuple[float, float], of_walls: bool) -> Solution:
+        """What acts in a step [s] that ends at a volume [m^3], both in `end`, and whether forces of walls are asked."""
+        equations, past, before = start.equations, start.past, start.base.velocity
+        force = self._surface_force(start.body, equations) + start.base.time_step * equations.tension(start.guess)
         expected = equations.momentum(past.acceleration)
-        rubbed = equations.rubbed(base.velocity, expected)
-        load = equations.momentum(rubbed) / base.time_step + force + equations.push(past.pressure) - expected
+        rubbed = equations.rubbed(before, expected)
+        load = equations.momentum(rubbed) / start.base.time_step + force + equations.push(past.pressure) - expected
         drive = equations.driver()
-        start = equations.given + drive(equations.beyond_given(load), equations.on_plates(past.pressure))
-        rate = self._rate_of_volume(guess, predicted, given | guessed, (time_step, volume))
-        change = equations.project(start, rate, self.solver.factors, drive)
-        mean = start + drive(equations.push(change), equations.on_images(change))
+        reached = equations.given + drive(equations.beyond_given(load), equations.on_plates(past.pressure))
+        rate = self._rate_of_volume(start.guess, start.body, start.given | start.guessed, end)
+        change = equations.project(reached, rate, self.solver.factors, drive)
+        mean = reached + drive(equations.push(change), equations.on_images(change))
         pressure = past.pressure + change
-        if given or rubbing:
-            forces = equations.reaction((base.velocity, rubbed, mean), force, pressure)
-            changed = [line.settle(predicted, mean, forces[0] / self.tension, releases) for line in rubbing]
-            if any(changed):
-                return None
-        twists = given | equations.twists(mean, guessed)
+        walls = equations.reaction((before, rubbed, mean), force, pressure) if of_walls else None
+        return Solution(force, before, rubbed, mean, pressure, walls)
+
+    def _end(self, start: Prediction, acting: Solution, time_step: float) -> StepEnd:
+        """Where the body and its plates are after a step [s], and how fast."""
+        body, past = self.body, start.past
+        twists = start.given | start.equations.twists(acting.mean, start.guessed)
         plates = self._plates.next(twists, time_step)
-        ways = {wall: plate.displacement for wall, plate in plates.items()}
-        history = past.history.followed_by(past.velocity, mean, time_step)
+        history = past.history.followed_by(past.velocity, acting.mean, time_step)
         velocity = past.velocity + history.velocity_change
-        moved = body.placed(body.points + history.displacement, ways)
+        moved = body.placed(body.points + history.displacement, {w: plate.displacement for w, plate in plates.items()})
         history = replace(history, displacement=moved.points - body.points)
-        transport = history.displacement / time_step
-        mean_pressure = float(np.average(pressure, weights=equations.space.volumes))
-        momenta = rigid_momenta(motions, equations.masses, velocity)
+        return StepEnd(moved, velocity, self.physics.energy(moved), history, plates, twists)
+
+    def _left(self, start: Prediction, acting: Solution, end: StepEnd, losses: LostEnergy) -> GalerkinPast:
+        """What the step leaves to the next one."""
+        equations, past, body = start.equations, start.past, self.body
+        momenta = rigid_momenta(start.motions, equations.masses, end.velocity)
         if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
             momenta[TURN] = past.momenta[TURN]
-        kinetic = equations.kinetic(past.velocity)
-        if past.kinetic is None and kinetic:  # it starts in motion
-            self.solver.first_energy = self.energy + kinetic
-        losses = past.carried_losses(kinetic, self.energy)
-        way = mean if plates else transport
-        acting = StepMotion(rubbed, (mean - base.velocity) / base.time_step, way)
-        losses = with_step(losses, equations, (past.velocity, velocity), acting, time_step)
-        potential = self.physics.energy(moved)
-        driving = force - base.time_step * equations.tension(mean)
-        loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
-        work = time_step * (float((driving * way).sum() + pressure @ equations.constraint(way)) + loads)
-        done, pull = 0.0, float("nan")
-        if given:
-            done, pull = equations.work(predicted, {wall: ways[wall] for wall in given}, forces)
-            work += time_step * equations.power(predicted, given, forces) - done
-        slid = time_step * self.tension * sum(line.rubbed(predicted, way) for line in rubbing)
-        integration = losses.integration + self.energy - potential - work - slid
-        losses = replace(losses, integration=integration, plates=losses.plates - done, line=losses.line + slid)
-        gradient = equations.space.gradient(velocity)
-        self.solver.past = GalerkinPast(
-            points=moved.points,
-            centre=centre(body) + equations.masses @ history.displacement / equations.masses.sum(),
-            velocity=velocity,
+        gradient, time_step = equations.space.gradient(end.velocity), end.history.time_step
+        return GalerkinPast(
+            points=end.body.points,
+            centre=centre(body) + equations.masses @ end.history.displacement / equations.masses.sum(),
+            velocity=end.velocity,
             gradient=gradient,
-            kinetic=equations.kinetic(velocity),
-            potential=potential,
-            pressure=pressure,
-            acceleration=past.acceleration + (mean - rubbed) / base.time_step,
+            kinetic=equations.kinetic(end.velocity),
+            potential=end.potential,
+            pressure=acting.pressure,
+            acceleration=past.acceleration + (acting.mean - acting.rubbed) / equations.time_step,
             volumes=equations.space.carried,
             evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
             momenta_change=np.zeros(6) if past.kinetic is None else momenta - past.momenta,
-            history=history,
+            history=end.history,
             losses=losses,
-            plates=self._plates.kept(plates),
+            plates=self._plates.kept(end.plates),
         )
+
+    def _motion(self, equations: GalerkinEquations, acting: Solution, end: StepEnd, pull: float) -> Motion:
+        """The motion that the step asks of the body; plates are pulled by a force [N]."""
+        slides = None if has_friction(self.physics) else equations.slide(end.velocity, SLIDING * abs(self.energy))
         return Motion(
-            velocity=velocity,
-            transport=transport,
-            pressure=equations.space.averages(pressure),
-            surface_pressure=mean_pressure,
-            twists={wall: way / time_step for wall, way in ways.items()},
+            velocity=end.velocity,
+            transport=end.transport,
+            pressure=equations.space.averages(acting.pressure),
+            surface_pressure=float(np.average(acting.pressure, weights=equations.space.volumes)),
+            twists={wall: way / end.history.time_step for wall, way in end.ways.items()},
             iterations=self.solver.factors.iterations,
             pull=pull,
-            drift=None if has_friction(self.physics) else equations.slide(velocity, SLIDING * abs(self.energy)),
+            drift=slides,
         )
-
-    def _with_momenta(self, equations: GalerkinEquations, motions: Floats) -> GalerkinPast:
-        """The last velocity and its last change, with the momenta of the last steps along rigid motions `(6, n, 3)`.
-
-        Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
-        Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
-        drop would be left turning.
-        """
-        past, kept = self.past, self.admitted
-        if not kept.any():
-            return past
-        along = motions[kept], equations.masses, equations.rigid
-        velocity = with_momenta(*along, past.velocity, past.momenta[kept])
-        change = with_momenta(*along, past.history.velocity_change, past.momenta_change[kept])
-        return replace(past, velocity=velocity, history=replace(past.history, velocity_change=change))
 
     def _rate_of_volume(
         self, guess: Floats, predicted: Body, twists: Mapping[int, Floats], end: tuple[float, float]
@@ -331,17 +330,6 @@ class PreparedIspgStep:
     @property
     def _plates(self) -> PlateSteps:
         return PlateSteps(self.past.plates, self.past.history.time_step)
-
-    def _given_twists(self, time_step: float) -> dict[int, Floats]:
-        """Mean twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
-        moved = [motion for motion in self.physics.motions if not len(motion.directions)]
-        ways = {motion.wall: time_step * motion.given(self.body.plates[motion.wall], time_step) for motion in moved}
-        return {wall: self._plates.last(wall).mean_along(way, time_step) for wall, way in ways.items()}
-
-    def _guessed_twists(self, pace: float) -> dict[int, Floats]:
-        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
-        walls = [motion.wall for motion in self.physics.motions if len(motion.directions)]
-        return {wall: pace * self.past.twists.get(wall, np.zeros(6)) for wall in walls}
 
     def _pace(self, base: Base) -> float:
         """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""

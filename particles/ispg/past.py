@@ -1,7 +1,7 @@
-"""What a step of the Galerkin scheme leaves to the next one, and the energies that the steps so far have lost."""
+"""What a step of the Galerkin scheme leaves to the next one, and where the equations of that one hold."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,49 +9,16 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.ledger import LostEnergy
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.rigid_motions import held, wall_velocities
+from reflowshock.particles.ispg.rigid_motions import held, wall_velocities, with_momenta
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
 
 # Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
 EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class LostEnergy:
-    """Energies that a flow has lost [J].
-
-    Attributes:
-        viscous: to viscosity, in the liquid and on its walls.
-        smoothing: to the smoothing of velocities.
-        integration: to the time integration: of the momentum, and of the way that the forces act along.
-        transfer: to the shift of particles, which take the velocity where they come, and to new masses.
-        evening: to what keeps triangles well shaped, at the volume.
-        rebuilding: to bodies made anew, where liquids meet or part.
-        line: to the friction of contact lines on walls with hysteresis.
-        plates: to plates that are moved; negative where they give work to the liquid.
-    """
-
-    viscous: float = 0.0
-    smoothing: float = 0.0
-    integration: float = 0.0
-    transfer: float = 0.0
-    evening: float = 0.0
-    rebuilding: float = 0.0
-    line: float = 0.0
-    plates: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """All of them."""
-        return float(sum(getattr(self, entry.name) for entry in fields(self)))
-
-
-def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
-    """Losses of several flows, each by its kind."""
-    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +101,20 @@ class GalerkinPast:
         acceleration = projected(projections, self.acceleration)
         return replace(self, points=body.points, velocity=velocity, acceleration=acceleration, history=history)
 
+    def with_momenta(self, equations: GalerkinEquations, motions: Floats, kept: NDArray[np.bool_]) -> "GalerkinPast":
+        """The past with the momenta of the last steps along those of the rigid motions `(6, n, 3)` that are kept.
+
+        Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
+        Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
+        drop would be left turning.
+        """
+        if not kept.any():
+            return self
+        along = motions[kept], equations.masses, equations.rigid
+        velocity = with_momenta(*along, self.velocity, self.momenta[kept])
+        change = with_momenta(*along, self.history.velocity_change, self.momenta_change[kept])
+        return replace(self, velocity=velocity, history=replace(self.history, velocity_change=change))
+
     def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
         """The past of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
         history = self.history.stopped(physics.pinned(body), np.zeros_like(body.points))
@@ -141,50 +122,34 @@ class GalerkinPast:
         return replace(self, velocity=velocity, acceleration=acceleration, history=history)
 
 
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Where the equations of a step hold.
+
+    Attributes:
+        past: what the last step left, with the momenta along rigid motions that it had.
+        base: start of the equivalent backward Euler step.
+        given, guessed: mean twists of plates that are moved, and those predicted of plates that float, `(6,)`.
+        guess: velocity of the prediction, `(n, 3)` [m/s].
+        body: at the predicted positions.
+        equations: there.
+        motions: rigid ones there, `(6, n, 3)`.
+    """
+
+    past: GalerkinPast
+    base: Base
+    given: dict[int, Floats]
+    guessed: dict[int, Floats]
+    guess: Floats
+    body: Body
+    equations: GalerkinEquations
+    motions: Floats
+
+
 def centre(body: Body) -> Floats:
     """Centre of the liquid `(3,)` [m]."""
     volume, first, _ = body_moments(body)
     return first / volume
-
-
-@dataclass(frozen=True, slots=True)
-class StepMotion:
-    """What acted in a step, `(n, 3)`.
-
-    Attributes:
-        rubbed: velocity that friction acted on [m/s].
-        acceleration: [m/s^2].
-        transport: velocity that moved the particles [m/s].
-    """
-
-    rubbed: Floats
-    acceleration: Floats
-    transport: Floats
-
-
-def with_step(
-    losses: LostEnergy,
-    equations: GalerkinEquations,
-    velocities: tuple[Floats, Floats],
-    acting: StepMotion,
-    time_step: float,
-) -> LostEnergy:
-    """Losses with those of a step [s], but for the way that the forces act along.
-
-    The velocities `(n, 3)` are those before and after it [m/s].
-
-    Of the time integration: what the change of momentum takes beyond the change of kinetic energy.
-    """
-    last, now = velocities
-    power = equations.losses(acting.rubbed, acting.transport)
-    change = time_step * float((acting.transport * equations.momentum(acting.acceleration)).sum())
-    gain = equations.kinetic(now) - equations.kinetic(last)
-    return replace(
-        losses,
-        viscous=losses.viscous + time_step * power.viscous,
-        smoothing=losses.smoothing + time_step * power.smoothing,
-        integration=losses.integration + change - gain,
-    )
 
 
 def evening_passes(gradient: Floats, frequency: float, time_step: float) -> float:

@@ -17,7 +17,8 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin import AT_REST
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.past import GalerkinPast, centre, total_losses
+from reflowshock.particles.ispg.ledger import total_losses
+from reflowshock.particles.ispg.past import GalerkinPast, centre
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 

@@ -87,6 +87,16 @@ class PlateSteps:
         way, _, change = self.plates.get(wall, np.zeros((3, 6)))
         return OneLeg(way, change, self.time_step)
 
+    def given(self, motions: Sequence[PlateMotion], body: Body, time_step: float) -> dict[int, Floats]:
+        """Mean twists `(6,)` of plates that are moved: after the whole step [s] these are where they should be."""
+        moved = [motion for motion in motions if not len(motion.directions)]
+        ways = {motion.wall: time_step * motion.given(body.plates[motion.wall], time_step) for motion in moved}
+        return {wall: self.last(wall).mean_along(way, time_step) for wall, way in ways.items()}
+
+    def guessed(self, motions: Sequence[PlateMotion], pace: float) -> dict[int, Floats]:
+        """Twists `(6,)` of plates that float, in the prediction: the last ones, at a share of their pace."""
+        return {motion.wall: pace * self.twist(motion.wall) for motion in motions if len(motion.directions)}
+
     def middle_ways(self, twists: Mapping[int, Floats], time_step: float) -> dict[int, Floats]:
         """Displacements `(6,)` [m, rad] of plates with mean twists to where the equations of a step [s] hold."""
         bases = {wall: self.last(wall).base(np.zeros(6), twist, time_step) for wall, twist in twists.items()}

@@ -13,7 +13,7 @@ from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
 from reflowshock.particles.discretisation.inner_tetrahedra import winding_numbers
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.past import total_losses
+from reflowshock.particles.ispg.ledger import total_losses
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import Force, plate_wrench
