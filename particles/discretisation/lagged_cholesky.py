@@ -149,6 +149,7 @@ class LaggedCholesky:
     def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
         """Solve with the factors that are kept."""
         root, scale, order = self.root, self.scale, self.order
+        assert scale is not None
 
         def precondition(residual: Floats) -> Floats:
             found = np.empty_like(residual)

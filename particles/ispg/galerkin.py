@@ -111,12 +111,6 @@ class Galerkin:
         """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
         return kernels.velocity_gradient(self.starts, self.columns, self.weights, self.with_images(field))
 
-    def load(self, stress: Floats) -> Floats:
-        """The transposed of `gradient`: forces on particles `(n, 3)` [N] of stresses times volume `(n, 3, 3)` [N m]."""
-        result = self._nothing()
-        kernels.forces_of(self.starts, self.columns, self.weights, stress, result)
-        return self._folded(result)
-
     def resistance(self, field: Floats, factors: Floats) -> Floats:
         """Forces `(n, 3)` [N] that resist a velocity `(n, 3)` [m/s]: of roughness, walls and viscosity.
 

@@ -199,22 +199,6 @@ def velocity_gradient(starts, columns, weights, field):
     return gradient
 
 
-@njit(cache=True)
-def forces_of(starts, columns, weights, stress, result):
-    """Add the transposed: forces on particles and images `(n + g, 3)` of stresses `(n, 3, 3)`."""
-    for i in range(starts.shape[0] - 1):
-        s = stress[i]
-        s00, s01, s02 = s[0, 0], s[0, 1], s[0, 2]
-        s10, s11, s12 = s[1, 0], s[1, 1], s[1, 2]
-        s20, s21, s22 = s[2, 0], s[2, 1], s[2, 2]
-        for k in range(starts[i], starts[i + 1]):
-            j, w = columns[k], weights[k]
-            wx, wy, wz = w[1], w[2], w[3]
-            result[j, 0] += wx * s00 + wy * s01 + wz * s02
-            result[j, 1] += wx * s10 + wy * s11 + wz * s12
-            result[j, 2] += wx * s20 + wy * s21 + wz * s22
-
-
 @njit(cache=True, fastmath={"contract"})
 def resistance(starts, columns, weights, field, factors):
     """Forces `(n + g, 3)` that resist velocities `(n + g, 3)`, in one pass over the rows.

@@ -7,6 +7,7 @@ Euler. A mode of frequency omega is damped at a rate of omega^4 dt^3 / 4 and slo
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Base:
 
 
 @dataclass(frozen=True, slots=True)
-class BackwardDifference:
+class LastStep:
     """The last step: its displacement and change of velocity, `(n, 3)`, and its size [s]; infinite at the start."""
 
     displacement: Floats
@@ -45,9 +46,14 @@ class BackwardDifference:
     time_step: float = np.inf
 
     @classmethod
-    def start(cls, count: int) -> "BackwardDifference":
+    def start(cls, count: int) -> Self:
         """Start a body of `count` particles."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
+
+
+@dataclass(frozen=True, slots=True)
+class BackwardDifference(LastStep):
+    """The last step, as this method continues it."""
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:
         """Start of the equivalent step from positions and velocities `(n, 3)` now, for a time step [s]."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.steps.backward_difference import Base
+from reflowshock.particles.steps.backward_difference import Base, LastStep
 
 # What is left of stiff modes after a step. At a half, 30 steps of a period damp by 3 % of what viscosity does at an
 # Ohnesorge number of 2e-3, BDF2 by 65 %.
@@ -25,20 +25,8 @@ NEW, OLD = 1.0 / (1.0 + RADIUS) ** 2, RADIUS**2 / (1.0 + RADIUS) ** 2
 
 
 @dataclass(frozen=True, slots=True)
-class OneLeg:
-    """The last step: its displacement and change of velocity, `(n, 3)`, and its size [s]; infinite at the start.
-
-    The first step is one by the midpoint rule.
-    """
-
-    displacement: Floats
-    velocity_change: Floats
-    time_step: float = np.inf
-
-    @classmethod
-    def start(cls, count: int) -> "OneLeg":
-        """Start a body of `count` particles."""
-        return cls(np.zeros((count, 3)), np.zeros((count, 3)))
+class OneLeg(LastStep):
+    """The last step, as this method continues it. The first step is one by the midpoint rule."""
 
     def stopped(self, held: NDArray[np.bool_], carried: Floats) -> "OneLeg":
         """The last step where particles `(n,)` that something has caught since went with it, by `(n, 3)` [m]."""

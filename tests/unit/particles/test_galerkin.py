@@ -59,11 +59,13 @@ def test_linear_velocities_along_the_wall_are_exact(body, space):
 
 
 def test_loads_are_the_transposed(body, space):
-    """Virtual power: f . (v - N v), s : grad v and p div v."""
+    """Virtual power: f . (v - N v), of viscous stress and of p div v."""
     random = np.random.default_rng(3)
     field, force = random.normal(size=(2, len(body.points), 3))
-    stress, factor = random.normal(size=(len(body.points), 3, 3)), random.normal(size=len(body.points))
-    assert (space.load(stress) * field).sum() == pytest.approx((stress * space.gradient(field)).sum())
+    other, factor = random.normal(size=(len(body.points), 3)), random.normal(size=len(body.points))
+    stress = factor[:, None, None] * (space.gradient(other) + space.gradient(other).transpose(0, 2, 1))
+    viscous = space.resistance(other, np.column_stack((0.0 * factor, 0.0 * factor, factor)))
+    assert (viscous * field).sum() == pytest.approx((stress * space.gradient(field)).sum())
     assert ((force - space.shown(force)) * field).sum() == pytest.approx((force * space.rough(field)).sum())
     assert (space.divergence_load(factor) * field).sum() == pytest.approx(factor @ space.divergence(field))
 
