@@ -13,9 +13,9 @@ SECONDS_PER_INERTIAL_STEP = 0.006
 SECONDS_PER_INERTIAL_STEP_OF_THOUSAND = 0.15
 INERTIAL_COST_EXPONENT = 1.5
 
-# Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
-SECONDS_PER_ISPG_STEP = 0.0018
-SECONDS_PER_ISPG_STEP_AND_PARTICLE = 1.35e-5
+# Steps of the scheme ispg; measured by benchmarks/bench_ispg.py with 141 to 1385 particles on a slow machine.
+SECONDS_PER_ISPG_STEP = 0.005
+SECONDS_PER_ISPG_STEP_AND_PARTICLE = 4e-5
 # Steps of a section, whose pressures have dense matrices; measured with 121 to 1681 particles.
 SECONDS_PER_SECTION_STEP, SECONDS_PER_SECTION_STEP_AND_PARTICLE = 0.008, 3e-5
 SECONDS_PER_SECTION_STEP_AND_PAIR = 2.3e-8
