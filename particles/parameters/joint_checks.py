@@ -1,8 +1,10 @@
 """Parameters of one joint that are each allowed but make no joint together. Loads neither numba nor PETSc."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from math import asin, inf, sin, sqrt
 
+from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, mm_per_s, mn, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_effects
@@ -35,12 +37,18 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 def unverified_joint(joint: Joint, solder: Solder) -> str | None:
     """What of a joint the scheme ispg is not verified for; None where it is."""
-    inertia = decide_effects(joint.geometry, solder)["inertia"]
-    places = {
-        "packages that float, on walls with friction": joint.package is not None and solder.wall != "free-slip",
-        f"joints without inertia ({inertia['why']})": not inertia["on"],
-    }
-    return next((place for place, is_met in places.items() if is_met), None)
+    if joint.package is not None and solder.wall != "free-slip":
+        return "packages that float, on walls with friction"
+    return unverified_joints([joint.geometry], solder)
+
+
+def unverified_joints(geometries: Iterable[JointGeometry], solder: Solder) -> str | None:
+    """What of joints between plates at rest, each by itself, the scheme ispg is not verified for; None where it is."""
+    for geometry in geometries:
+        inertia = decide_effects(geometry, solder)["inertia"]
+        if not inertia["on"]:
+            return f"joints without inertia ({inertia['why']})"
+    return None
 
 
 def _tilt_problems(joint: Joint) -> list[Problem]:
