@@ -40,6 +40,14 @@ def test_the_plan_names_the_scheme_and_its_cost(tmp_path):
     assert "particles each, by ISPG" in reflowshock("plan", tmp_path, settings=SETTINGS).stdout
 
 
+def test_it_is_the_default_with_inertia():
+    def scheme(*settings):
+        return read_case(SMALL_CASE, settings).solder.numerics.scheme
+
+    assert (scheme(), scheme(SETTINGS[1])) == ("energy", "ispg")
+    assert scheme(SETTINGS[1], "solder.numerics.scheme=energy") == "energy"
+
+
 def test_joints_without_inertia_are_refused():
     with pytest.raises(CaseError, match="not verified for joints without inertia"):
         read_case(SMALL_CASE, SETTINGS[:1])
