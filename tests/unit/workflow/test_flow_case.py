@@ -111,7 +111,7 @@ def test_what_cannot_be_is_refused_in_words(path, setting, words):
 
 @pytest.mark.parametrize(
     ("given", "followed"),
-    [('weber = 32\nreynolds = 500', 6.0 * 2.0**-2.5), ('viscosity = "10 mPa*s"\ncontact_angle = "60 deg"', 4.0)],
+    [("weber = 32\nreynolds = 500", 6.0 * 2.0**-2.5), ('viscosity = "10 mPa*s"\ncontact_angle = "60 deg"', 4.0)],
 )
 def test_a_drop_is_followed_as_long_as_its_scene_asks_for(tmp_path, given, followed):
     """Without a duration: an impact 6 D / U, a drop that comes to rest 4 sqrt(rho D^3 / gamma)."""
