@@ -51,3 +51,8 @@ def test_it_is_the_default_with_inertia():
 def test_joints_without_inertia_are_refused():
     with pytest.raises(CaseError, match="not verified for joints without inertia"):
         read_case(SMALL_CASE, SETTINGS[:1])
+
+
+def test_joints_that_overflow_both_pads_are_refused():
+    with pytest.raises(CaseError, match="not verified for joints that overflow both pads"):
+        read_case(SMALL_CASE, (*SETTINGS, "solder.volume=0.26 mm^3"))

@@ -1,6 +1,6 @@
 """What does not fit together in the case of a package: its geometry, its solder, its shock."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -70,13 +70,13 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
 
 
-def _unverified(case: PackageCase, geometries: "Iterable[JointGeometry]") -> str | None:
+def _unverified(case: PackageCase, geometries: "Collection[JointGeometry]") -> str | None:
     """What of the joints the scheme ispg is not verified for; None where it is."""
     from reflowshock.particles.parameters.joint_checks import unverified_joints
 
     if case.thermal is not None:
         return "load steps of [thermal], which are at rest"
-    return unverified_joints(geometries, case.solder)
+    return unverified_joints(geometries, case.solder) if case.solder.numerics.scheme == "ispg" else None
 
 
 def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
