@@ -26,7 +26,7 @@ from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
-from reflowshock.particles.ispg.ledger import Ledger, LostEnergy, Solution, StepEnd
+from reflowshock.particles.ispg.ledger import Ledger, LostEnergy, StepAction, StepEnd
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
 from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
 from reflowshock.particles.ispg.past import GalerkinPast, Prediction, centre, evening_passes
@@ -244,7 +244,7 @@ class PreparedIspgStep:
             base = past.history.base(body.points, past.velocity, time_step)
         return Prediction(past, base, given, guessed, guess, predicted, equations, motions)
 
-    def _acting(self, start: Prediction, end: tuple[float, float], of_walls: bool) -> Solution:
+    def _acting(self, start: Prediction, end: tuple[float, float], of_walls: bool) -> StepAction:
         """What acts in a step [s] that ends at a volume [m^3], both in `end`, and whether forces of walls are asked."""
         equations, past, before = start.equations, start.past, start.base.velocity
         force = self._surface_force(start.body, equations) + start.base.time_step * equations.tension(start.guess)
@@ -258,9 +258,9 @@ class PreparedIspgStep:
         mean = reached + drive(equations.push(change), equations.on_images(change))
         pressure = past.pressure + change
         walls = equations.reaction((before, rubbed, mean), force, pressure) if of_walls else None
-        return Solution(force, before, rubbed, mean, pressure, walls)
+        return StepAction(force, before, rubbed, mean, pressure, walls)
 
-    def _end(self, start: Prediction, acting: Solution, time_step: float) -> StepEnd:
+    def _end(self, start: Prediction, acting: StepAction, time_step: float) -> StepEnd:
         """Where the body and its plates are after a step [s], and how fast."""
         body, past = self.body, start.past
         twists = start.given | start.equations.twists(acting.mean, start.guessed)
@@ -271,7 +271,7 @@ class PreparedIspgStep:
         history = replace(history, displacement=moved.points - body.points)
         return StepEnd(moved, velocity, self.physics.energy(moved), history, plates, twists)
 
-    def _left(self, start: Prediction, acting: Solution, end: StepEnd, losses: LostEnergy) -> GalerkinPast:
+    def _left(self, start: Prediction, acting: StepAction, end: StepEnd, losses: LostEnergy) -> GalerkinPast:
         """What the step leaves to the next one."""
         equations, past, body = start.equations, start.past, self.body
         momenta = rigid_momenta(start.motions, equations.masses, end.velocity)
@@ -296,7 +296,7 @@ class PreparedIspgStep:
             plates=self._plates.kept(end.plates),
         )
 
-    def _motion(self, equations: GalerkinEquations, acting: Solution, end: StepEnd, pull: float) -> Motion:
+    def _motion(self, equations: GalerkinEquations, acting: StepAction, end: StepEnd, pull: float) -> Motion:
         """The motion that the step asks of the body; plates are pulled by a force [N]."""
         slides = None if has_friction(self.physics) else equations.slide(end.velocity, SLIDING * abs(self.energy))
         return Motion(

@@ -47,7 +47,7 @@ def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
+class StepAction:
     """What acts in a step by its equations.
 
     Attributes:
@@ -115,7 +115,7 @@ class Ledger:
     equations: GalerkinEquations
     predicted: Body
     given: dict[int, Floats]
-    acting: Solution
+    acting: StepAction
     end: StepEnd
 
     def booked(
