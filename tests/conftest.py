@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from tests.support.compiled_once import compile_once
 from tests.support.shared_run import shared_run
 
 keep_kernels_by_source()
+compile_once()
 os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: ranks that wait leave them to others
 
 # Two workers begin with these: one compiles kernels while the other needs none. Then what takes long comes first.

@@ -19,6 +19,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from tests.support.compiled_once import compile_once
 from tests.support.warm_client import ask
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -97,6 +98,7 @@ def serve(client: str, listener: socket.socket) -> None:
 
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
+    compile_once()
     numba.njit(lambda value: value)(0)  # what the first kernel of a process has Numba load
     gc.freeze()  # to look at what is loaded would copy its memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:
