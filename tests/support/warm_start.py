@@ -25,7 +25,7 @@ from tests.support.warm_client import ask
 ROOT = Path(__file__).resolve().parents[2]
 # What commands, stages and ranks load; not MPI, nor what loads it: a process that has begun it cannot be forked.
 LIBRARIES = (
-    "ffcx", "gmsh", "matplotlib.backends.backend_svg", "matplotlib.pyplot", "meshio", "numba", "pandas",
+    "ffcx", "gmsh", "matplotlib.backends.backend_agg", "matplotlib.pyplot", "meshio", "numba", "pandas",
     "pyvista.plotting", "scipy.signal", "scipy.sparse.linalg", "scipy.spatial", "snakemake.cli", "ufl",
     "reflowshock.fem.elements.element", "reflowshock.fem.kernels.box_rows", "reflowshock.fem.kernels.levels",
     "reflowshock.fem.kernels.nonlinear", "reflowshock.fem.mesh.mesh", "reflowshock.fem.problem.inputs",
