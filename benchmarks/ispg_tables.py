@@ -108,6 +108,13 @@ def section(count: int, degrees: float, *settings: str, bond: float = 0.0) -> Ro
     return heavy(count, degrees, bond, *cut) if bond else drop(count, degrees, *cut)
 
 
+def merging(spacing: float, on_wall: bool) -> Row:
+    """Drops of 0.5 and 0.25 mm^3 that become one."""
+    wall = ("drops.contact_angle=60 deg", "drops.distance=1.3 mm") if on_wall else ()
+    name = f"{spacing:.2f} mm, {'60 deg' if on_wall else 'free'}"
+    return Row(name, "coalescence", (*PAPER, "gravity=off", f"drops.spacing={spacing} mm", *wall))
+
+
 TABLES: dict[str, list[Row]] = {
     "drops": [drop(count, angle) for count in (5, 7, 9, 11, 13, 15) for angle in (60, 120)]
     + [drop(count, angle) for count in (7, 11) for angle in (30, 148)],
@@ -161,11 +168,7 @@ TABLES: dict[str, list[Row]] = {
     "impact": [
         drop(count, 90, "drop.speed=4.74 m/s", *NO_SLIP, name="4.74 m/s") for count in (7, 9)
     ],
-    "merging": [
-        Row("on a wall, 60 deg", "coalescence",
-            (*PAPER, "gravity=off", "drops.contact_angle=60 deg", "drops.distance=1.3 mm", "drops.spacing=0.13 mm")),
-        Row("free", "coalescence", PAPER),
-    ],
+    "merging": [merging(0.15, True), merging(0.15, False), merging(0.13, True), merging(0.1, False)],
     "real": [
         Row("5, 60 deg", "sessile_drop", (*MOVES[:2], "drop.particles_per_edge=5", "drop.contact_angle=60 deg")),
     ],
