@@ -6,8 +6,8 @@
 
 A row is a case of this repository with some settings, as `reflowshock run CASE --set ...` takes them, computed without
 products. Each is stored in results/ispg_tables.json as soon as it is there and is not computed again: after a change
-of the scheme give --again, or remove the file. All rows take an hour and a half of one core; seconds are those of the
-processor, without loading.
+of the scheme give --again, or remove the file. All rows take an hour of one core. Seconds are those of the processor,
+without loading.
 """
 
 import argparse
