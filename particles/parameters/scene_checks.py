@@ -74,7 +74,7 @@ def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
 
 
 def _section_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find drops that are no bodies of revolution that the scheme ispg computes in section."""
+    """Find drops that the scheme ispg does not compute in section: it knows uniform walls with free slip only."""
     if drop.section == "none":
         return []
     if solder.numerics.scheme != "ispg":
