@@ -252,25 +252,26 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
 
 
 ISPG = ("drop.particles_per_edge=11",)
+HELD = "volume='1 mm^3',receding_angle='60 deg',advancing_angle='90 deg'"
 
 
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
-        ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
+        ("drop.contact_angle=155 deg", "contact angles outside 20 deg to 148 deg"),
         ("drop={volume='1 mm^3',particles_per_edge=13}", "13 particles along an edge of a free drop (for 7 to 11"),
         ("drop={volume='1 mm^3',symmetry='half'}", "parts of free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
-        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
+        ("drop={volume='1 mm^3',contact_angle='19 deg',particles_per_edge=5}", "contact angles outside 20 deg to 148"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=9}", "edge below 30 deg (for 5 to 5 it is)"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',symmetry='half'}", "contact angles outside 30 deg to 148 deg"),
+        ("drop={volume='1 mm^3',contact_angle='45 deg',section='plane'}", "contact angles outside 60 deg to 148 deg"),
         (
             "drop={volume='1 mm^3',receding_angle='20 deg',advancing_angle='60 deg',particles_per_edge=7}",
             "contact angles",
         ),
-        (
-            "drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}",
-            "11 particles along an edge (for 6 to 9",
-        ),
+        (f"drop={{{HELD}}}", "11 particles along an edge (for 6 to 9"),
     ],
 )
 def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
@@ -289,7 +290,6 @@ def test_the_scheme_ispg_takes_walls_with_friction(wall):
     read_case(BALL, [*asked, "drop.particles_per_edge=7"])
 
 
-HELD = "volume='1 mm^3',receding_angle='60 deg',advancing_angle='90 deg'"
 IMPACT = ("drop.speed=4.7 m/s", "solder.wall=no-slip", "solder.parameters=paper", "drop.particles_per_edge=7")
 
 
