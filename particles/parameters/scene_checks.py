@@ -17,9 +17,8 @@ from reflowshock.problem import Problem
 FEWEST_PER_EDGE = 5
 SPACINGS_IN_PAD = 2.0
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-# On uniform walls with free slip. At 15 degrees a cube spreads twice as far as it rests; there its middle is a tenth of
-# a spacing thick with 5 an edge, and masses of particles are negative. In a quarter those on the axis have no volumes.
-FILM_ANGLE, FILM_EDGES = radians(20.0), (5, 5)
+# Of whole drops on uniform walls with free slip: in a quarter particles on the axis, each with a pressure, are locked.
+FILM_ANGLE, FILM_EDGES = radians(15.0), (5, 7)
 # In a plane the face of a cube spreads 2.7 times too far on a wall of 30 degrees: its middle is half a spacing thick.
 PLANE_ANGLE = radians(60.0)
 ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis

@@ -30,7 +30,7 @@ STEPS_PER_PERIOD = round(1.0 / LONGEST_OF_SWING)
 
 LONG = [
     pytest.param(*row, marks=pytest.mark.long)
-    for row in ((5, 20.0), (5, 120.0), (6, 60.0), (7, 30.0), (7, 60.0), (7, 148.0), (11, 60.0), (11, 120.0))
+    for row in ((5, 15.0), (5, 120.0), (6, 60.0), (7, 30.0), (7, 60.0), (7, 148.0), (11, 60.0), (11, 120.0))
 ]
 
 

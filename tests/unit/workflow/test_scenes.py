@@ -259,12 +259,12 @@ HELD = "volume='1 mm^3',receding_angle='60 deg',advancing_angle='90 deg'"
     ("setting", "place"),
     [
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
-        ("drop.contact_angle=155 deg", "contact angles outside 20 deg to 148 deg"),
+        ("drop.contact_angle=155 deg", "contact angles outside 15 deg to 148 deg"),
         ("drop={volume='1 mm^3',particles_per_edge=13}", "13 particles along an edge of a free drop (for 7 to 11"),
         ("drop={volume='1 mm^3',symmetry='half'}", "parts of free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
-        ("drop={volume='1 mm^3',contact_angle='19 deg',particles_per_edge=5}", "contact angles outside 20 deg to 148"),
-        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=9}", "edge below 30 deg (for 5 to 5 it is)"),
+        ("drop={volume='1 mm^3',contact_angle='14 deg',particles_per_edge=5}", "contact angles outside 15 deg to 148"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=9}", "edge below 30 deg (for 5 to 7 it is)"),
         ("drop={volume='1 mm^3',contact_angle='20 deg',symmetry='half'}", "contact angles outside 30 deg to 148 deg"),
         ("drop={volume='1 mm^3',contact_angle='45 deg',section='plane'}", "contact angles outside 60 deg to 148 deg"),
         (
