@@ -38,11 +38,13 @@ class HasWall(Protocol):
         """Whether there is no wall."""
 
 
-def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
-    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy.
+def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tuple[Solder, str]:
+    """The solder of a scene with the scheme asked for, and why it has it; no words but where that is auto.
 
-    It is ispg as well where no other scheme computes the scene.
+    Auto stands for ispg where it is verified or no other scheme computes the scene, else for energy.
     """
+    if asked != "auto":
+        return solder, ""
     ispg = changed(solder, "numerics.scheme", "ispg")
     if isinstance(scene, Drop):
         place = _unverified_drop(scene, solder)

@@ -63,7 +63,7 @@ class MoltenScene(Parameters):
         if self.bond is not None:
             gravity = self.bond * solder.surface_tension / (solder.density * solder.volume ** (2.0 / 3.0))
             solder = solder.model_copy(update={"gravity": gravity})
-        return with_scheme(scene, solder)[0] if self.solder.numerics.scheme == "auto" else solder
+        return with_scheme(scene, solder, self.solder.numerics.scheme)[0]
 
     def measured(self, shape: "JointShape") -> dict[str, Measured]:
         """All that a shape tells, with the energy of its history.
