@@ -42,11 +42,23 @@ def solve_droplet(
 ) -> FlowResult:
     """Let a droplet move.
 
+    Raises: as `follow`.
+    """
+    return follow(scene, droplet(scene), progress, checkpoint)
+
+
+def follow(
+    scene: Droplet,
+    simulation: Simulation,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> FlowResult:
+    """Let the liquid of a simulation move as a droplet does, whatever state it begins in.
+
     Raises:
         FloatingPointError: a position is not finite.
         SurfaceLost: the drop breaks into parts that are too small for its particles.
     """
-    simulation = droplet(scene)
     try:
         run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
     except SurfaceLost as error:
