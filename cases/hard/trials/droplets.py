@@ -63,7 +63,7 @@ class DropletTrial(Parameters):
 
 
 class TankTrial(Parameters):
-    """A column of liquid in a tank, in a plane; thrown towards the other wall with a speed, or filling the tank.
+    """A column of liquid in a tank, in a plane; at rest at its wall, or thrown at the other one from the middle.
 
     With ``undiffused`` it is computed a second time, without diffusion of density, to compare their noise.
     """
@@ -241,7 +241,9 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, Measured], float]:
 
     scene = parameters.dam_break
     one = dam(scene)
-    one.fields.u[: one.fluids] = parameters.thrown
+    if parameters.thrown:
+        one.fields.u[: one.fluids] = parameters.thrown
+        one.fields.x[: one.fluids] += 0.5 * (scene.tank_length - scene.width)
     parameters.unrest.disturb(one.fields, one.fluids, one.law.spacing)
     simulation = Simulation(one.fields, one.fluids, one.law, device=flow.device_of(scene))
     watch, unit = Watch(simulation), scene.density * scene.gravity * scene.height
