@@ -112,7 +112,7 @@ class Watch:
         self.rows.append(
             (
                 one.time, one.kinetic_energy + tension + weight + one.elastic_energy, one.fastest,
-                np.hypot(*momentum[:2]) if law.mirror else float(np.linalg.norm(momentum)),
+                float(np.hypot(momentum[0], momentum[1])) if law.mirror else float(np.linalg.norm(momentum)),
                 float(np.abs(fields.density[liquid] / law.rest_density - 1.0).max()),
                 float(one.pressures.mean()), *centre,
             )
