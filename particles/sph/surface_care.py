@@ -17,7 +17,7 @@ from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields
 from reflowshock.particles.surface.cloud_level_set import area_within, between, boundary_loops
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
-from reflowshock.particles.surface.level_set import LevelSet, extract_surface
+from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, windings_on
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 # In spacings of the particles: edges of triangles.
@@ -35,6 +35,8 @@ TOUCH, DRY = 0.3, 0.1
 # The same: how far beyond its particles the surface is at least (they may be a bit outside) and at most, its radius
 # about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
 COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
+# The same: distance of the nodes at which sheets that have crossed are looked for.
+OVERLAP = 0.5
 WALL = Plate.horizontal(0.0)
 
 
@@ -104,8 +106,16 @@ def _blunting(line: Floats) -> Floats:
     return np.where(is_sharp[:, None], 0.25 * (after - before), 0.0)
 
 
-def is_worn(points: Floats, triangles: Indices, spacing: float) -> bool:
-    """Whether triangles are too small, too large or slivers."""
+def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
+    """Whether sheets of a surface have crossed: it winds round some liquid twice, or round air inside out."""
+    found = windings_on(Grid.around(points, OVERLAP * spacing), points, triangles)
+    return bool(found.max() > 1 or found.min() < 0)
+
+
+def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float) -> bool:
+    """Whether triangles are too small, too large or slivers; or folded, where they do not end on a wall."""
+    if not rings and is_folded(points, triangles, spacing):
+        return True
     corner = points[triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
     area = triangle_areas(points, triangles)
