@@ -18,13 +18,14 @@ from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
+from reflowshock.particles.surface.breakup import largest_part
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 from reflowshock.particles.surface.profile import width
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
-    "surface_energy", "surface_volume", "foot", "parts",
+    "surface_energy", "surface_volume", "foot", "parts", "spray", "shed",
 )  # fmt: skip
 # Share of the radius within which the pressure of a free drop is averaged: the surface is far.
 CORE = 0.5
@@ -161,11 +162,13 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     distance = np.linalg.norm(surface.points - centre, axis=1)
     pressure = float((simulation.pressures[core] if core.any() else simulation.pressures).mean())
     return (
-        simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
+        simulation.time, pressure, float(distance.max() / distance.min()),
+        width(largest_part(surface.points, surface.triangles)) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
         _height(scene, surface.points) / scene.diameter, simulation.fastest,
-        simulation.kinetic_energy, surface.energy, surface.volume / scene.volume,
+        simulation.kinetic_energy, surface.energy, (surface.volume + surface.spray) / scene.volume,
         2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(parts_of(surface.triangles)),
+        surface.spray / scene.volume, float(surface.shed),
     )  # fmt: skip
 
 
@@ -194,8 +197,10 @@ def outcome(history: Mapping[str, Floats]) -> str:
     if not wets.any():
         return "does not touch the wall"
     if wets[-1]:
-        return "a part rebounds" if in_parts else "stays on the wall"
-    return "rebounds in parts" if in_parts else "rebounds"
+        told = "a part rebounds" if in_parts else "stays on the wall"
+    else:
+        told = "rebounds in parts" if in_parts else "rebounds"
+    return f"{told}, sheds satellites" if history["shed"][-1] else told
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
@@ -214,6 +219,8 @@ def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
     found: Metrics = {
         "capillary_number": (fastest * scene.liquid_viscosity / scene.surface_tension, ""),
         "surface_volume_drift": (float(history["surface_volume"][-1] / history["surface_volume"][0] - 1.0), ""),
+        "spray_share": (float(history["spray"].max()), ""),
+        "parts_shed": (float(history["shed"][-1]), ""),
         "ohnesorge": (scene.ohnesorge, ""),
     }
     if not scene.has_wall:
