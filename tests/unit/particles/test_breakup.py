@@ -96,7 +96,7 @@ def test_a_part_smaller_than_its_particles_flies_on_without_a_surface():
     assert surface.volume == pytest.approx(volume, rel=1e-3)
     (shed,) = surface.meetings
     assert (shed.before, shed.after) == (2, 1) and shed.energy == pytest.approx(surface.energy - energy, rel=0.02)
-    liquid = [np.append(place[: simulation.fluids], far) for place, far in zip(simulation.fields, (2.0, 0.0, 0.0))]
+    liquid = np.append(simulation.fields[:3], [[2.0], [0.0], [0.0]], axis=1)
     surface.find_spray(liquid, np.full(simulation.fluids + 1, spacing**3))
     assert surface.spray == pytest.approx(spacing**3)
 
