@@ -45,7 +45,7 @@ def solve_droplet(
 
     Raises:
         FloatingPointError: a position is not finite.
-        SurfaceLost: the drop breaks into parts that are too small for its particles.
+        SurfaceLost: no particle is beside the surface any more.
     """
     simulation = droplet(scene)
     try:
@@ -54,19 +54,17 @@ def solve_droplet(
         raise SurfaceLost(
             f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
             f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
-            f"parts smaller than their particles are not followed: take more particles per diameter{_enough(scene)}"
+            "take more particles per diameter"
         ) from error
     history = run.history(COLUMNS)
-    words = {"outcome": outcome(history)} if scene.impact_speed else {}
+    words = {"outcome": outcome(history), "film": _film(scene)} if scene.impact_speed else {}
     return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
 
 
-def _enough(scene: Droplet) -> str:
-    """Tell with how many the film that an impact leaves is two particles thick."""
-    if not scene.impact_speed:
-        return ""
+def _film(scene: Droplet) -> str:
+    """Tell how thick the film is that an impact leaves, and with how many particles it has two."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
-    return f" ({2.0 / film:.0f} have two in the film of {film:.2g} diameters that the impact leaves)"
+    return f"{film:.2g} diameters thick: two particles with {2.0 / film:.0f} a diameter"
 
 
 def droplet(scene: Droplet) -> Simulation:

@@ -150,7 +150,7 @@ def test_liquid_that_left_its_surface_is_refused():
         lost.add_to(simulation.rates, simulation.fields, simulation.fluids)
 
 
-def test_a_film_too_thin_for_its_particles_ends_the_run_in_words(monkeypatch):
+def test_a_surface_without_particles_ends_the_run_in_words(monkeypatch):
     def tear(self, time_step):
         self.steps = 7
         raise SurfaceLost("torn")
