@@ -13,6 +13,9 @@ RIGHT_ANGLE = 0.5 * pi
 PARTICLES_PER_DIAMETER = 16.0
 # Over the largest speed expected: less, and densities change by more than about 2 % as the drop strikes.
 LEAST_SOUND_SPEED = 8.0
+# Followed where no duration is given. An impact: past its largest width, reached before 4 D / U up to a Weber number of
+# 300, into the recoil. Else five of Rayleigh's periods, 0.785 sqrt(rho D^3 / gamma) each.
+FOLLOWED_IMPACT, FOLLOWED_REST = 6.0, 4.0
 
 WallAngle = Annotated[float | None, Quantity("deg"), Field(ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)]
 
@@ -51,7 +54,7 @@ class Droplet(SphFlow):
     receding_angle: WallAngle = None
     gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
     start: Literal["sphere", "cube"] = "sphere"
-    duration: Annotated[float, Quantity("us")] = Field(gt=0)
+    duration: Annotated[float | None, Quantity("us")] = Field(None, gt=0)
     effects: DropletEffects = DropletEffects()
     numerics: DropletNumerics = DropletNumerics()
 
@@ -118,7 +121,9 @@ class Droplet(SphFlow):
     @property
     def until(self) -> float:
         """How long it is followed [s]."""
-        return self.duration
+        if self.duration is not None:
+            return self.duration
+        return (FOLLOWED_IMPACT if self.impact_speed else FOLLOWED_REST) * self.unit_of_time
 
     @property
     def unit_of_time(self) -> float:

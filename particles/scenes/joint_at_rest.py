@@ -20,6 +20,7 @@ from reflowshock.particles.steps.shape import JointShape
 
 DIRECTIONS = {"lift": LIFT, "shift": SHIFT, "turn": TURN}
 BRACKET = 0.2  # around the collapse height that was found, in which the exact one is sought
+KNOTS = 40  # standoffs at which the exact pull is found along a way; linear between them
 ERRORS = ("width_error", "waist_error", "axial_force_error")
 OF_A_PLACE = ("max_width", "waist", "axial_force", *ERRORS)
 
@@ -68,6 +69,8 @@ def joint_to_rest(
         if joint.path.speed is None:
             states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
             shape = replace(shape, snapshots=states)
+        else:
+            shape = _with_exact_pull(shape, joint, solder, weight)
         return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
     first = None if checkpoints is None else checkpoints(0)
     if joint.package is None:
@@ -102,6 +105,17 @@ def _along(
         if progress is not None:
             progress(len(shapes) / (1 + len(joint.places)))
     return shapes
+
+
+def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float) -> JointShape:
+    """Add `pull_exact` [N] to the history: what a way up or down takes by Young and Laplace, else nan."""
+    if "standoff" not in shape.history:
+        return shape
+    standoff, way = shape.history["standoff"], np.sign(joint.places[-1].gap - joint.standoff)
+    knots = np.linspace(standoff.min(), standoff.max(), KNOTS)
+    meridians = [reference_meridian(replace(joint.geometry, gap=gap), solder, weight) for gap in knots]
+    pulls = [np.nan if meridian is None or way == 0.0 else -way * meridian.axial_force for meridian in meridians]
+    return replace(shape, history=shape.history | {"pull_exact": np.interp(standoff, knots, pulls)})
 
 
 def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> Metrics:

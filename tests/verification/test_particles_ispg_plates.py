@@ -117,6 +117,10 @@ def test_a_joint_is_pulled_until_it_breaks(speed):
     assert metrics["standoff_at_break"] == pytest.approx(0.35e-3 + speed * metrics["time_at_break"], rel=1e-6)
     assert 0.8e-3 < metrics["standoff_at_break"] < 1.1e-3
     assert found.shape.points[:, 2].max() == pytest.approx(1.2e-3)
+    history = found.shape.history
+    known = np.isfinite(history["pull_exact"]) & (history["standoff"] > 0.4e-3)
+    difference = (history["pull"] - history["pull_exact"])[known] / PULL
+    assert np.sqrt(np.mean(difference**2)) < (0.05 if speed == 0.1 else 0.5)
     parts = [metrics[f"volume_{name}"] for name in ("board", "package")]
     assert sum(parts) == pytest.approx(VOLUME, rel=1e-6)
     assert abs(metrics["energy_imbalance"]) < 1e-3

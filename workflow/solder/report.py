@@ -38,7 +38,7 @@ def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> Non
             context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian)
         context["curves"]["body_history"] = history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
-    if path.exists():
+    if path.exists() and "pull" not in shape.history:
         context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
     context["scenes"]["body"] = particle_scene(shape)
 
@@ -76,9 +76,20 @@ def history_curve(history: dict) -> list[Chart]:
         Chart(steps, Axis("time step [µs]", log=True), [Series("time step", step, history["time_step"] / MICRO)]),
     ]
     if "pull" in history:
-        force = Series("package", history["standoff"] / MILLI, history["pull"] / MILLI)
-        charts.insert(0, Chart(Axis("standoff [mm]"), Axis("force along the way [mN]"), [force]))
+        charts.insert(0, pull_chart(history))
     return charts
+
+
+def pull_chart(history: Mapping[str, np.ndarray]) -> Chart:
+    """Return the force that moves the package, beside that of balance, over the standoff, or over time if it stays."""
+    standoff, (axis, way) = history["standoff"], (TIME, history["time"] / MILLI)
+    if np.ptp(standoff) > 1e-6 * standoff.max():
+        axis, way = Axis("standoff [mm]"), standoff / MILLI
+    order = np.argsort(way, kind="stable")  # downwards the standoff falls
+    forces = [Series("particles", way[order], history["pull"][order] / MILLI)]
+    if not np.isnan(exact := history["pull_exact"]).all():
+        forces.append(Series("Young-Laplace", way[order], exact[order] / MILLI, RED))
+    return Chart(axis, Axis("force that moves the package [mN]"), forces)
 
 
 def path_curve(places: Sequence[Mapping]) -> list[Chart]:

@@ -109,6 +109,19 @@ def test_what_cannot_be_is_refused_in_words(path, setting, words):
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("given", "followed"),
+    [("weber = 32\nreynolds = 500", 6.0 * 2.0**-2.5), ('viscosity = "10 mPa*s"\ncontact_angle = "60 deg"', 4.0)],
+)
+def test_a_drop_is_followed_as_long_as_its_scene_asks_for(tmp_path, given, followed):
+    """Without a duration: an impact 6 D / U, a drop that comes to rest 4 sqrt(rho D^3 / gamma)."""
+    path = tmp_path / "case.toml"
+    liquid = 'diameter = "50 um"\ndensity = "1000 kg/m^3"\nsurface_tension = "0.072 N/m"'
+    path.write_text(f'case.name = "short"\n[droplet]\n{liquid}\n{given}\n')
+    capillary = (1000.0 * 50e-6**3 / 0.072) ** 0.5
+    assert read_case(path, [], True).droplet.until == pytest.approx(followed * capillary)
+
+
 def test_a_spacing_that_a_drop_does_not_resolve_is_refused(tmp_path):
     text = FREE.read_text().replace("particles_per_diameter = 16", 'spacing = "20 um"').partition("[scales")[0]
     (tmp_path / "case.toml").write_text(text)

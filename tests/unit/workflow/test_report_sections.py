@@ -13,6 +13,7 @@ from reflowshock.workflow.package_report.array import array_maps
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
 from reflowshock.workflow.package_report.scenes import is_neighbour, role_of
+from reflowshock.workflow.solder.report import pull_chart
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
 
 NAMES = ["A3", "A4", "B3", "B4"]
@@ -232,3 +233,14 @@ def test_residual_stress_is_ranked_by_the_worse_pad():
         "residual_stress_largest": {"value": 30e6, "unit": "Pa"},
     }
     assert "from 80.00 µm to 20.00 µm and leaves 30 MPa at the pads of A4" in residual.in_words(metrics)
+
+
+@pytest.mark.parametrize(("standoff", "axis"), [([0.3e-3, 0.4e-3], "standoff [mm]"), ([0.3e-3, 0.3e-3], "time [ms]")])
+def test_the_force_of_a_moved_package_is_drawn_over_what_changes(standoff, axis):
+    """Over the standoff of a pull, over time of a push aside, which has no exact force."""
+    known = standoff[0] != standoff[1]
+    exact = [2e-3 if known else np.nan] * 2
+    columns = {"time": [0.0, 1e-3], "standoff": standoff, "pull": [2e-3, 3e-3], "pull_exact": exact}
+    chart = pull_chart({name: np.array(column) for name, column in columns.items()})
+    assert chart.x.label == axis
+    assert [line.name for line in chart.series] == ["particles", "Young-Laplace"][: 1 + known]
