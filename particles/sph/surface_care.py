@@ -44,8 +44,6 @@ TOUCH, DRY = 0.3, 0.1
 # The same: how far beyond its particles the surface is at least (they may be a bit outside) and at most, its radius
 # about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
 COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
-# In spacings: particles farther before the surface are outside it.
-OUTSIDE = 0.75
 # In particles: smaller parts are no liquid with a surface; two particles across, a sphere has four, a cube eight.
 FEWEST = 8
 # Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
