@@ -11,15 +11,19 @@ from pathlib import Path
 import pytest
 
 from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from tests.support.compiled_once import compile_once
 from tests.support.shared_run import shared_run
 
 keep_kernels_by_source()
+compile_once()
 os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: ranks that wait leave them to others
 
-# Two workers begin with these: one compiles kernels while the other needs none. Then what takes long comes first.
+# Two workers begin with these: one compiles kernels while the other needs none. Then what takes long comes first, and
+# many short files come last, which keep all workers at work to the end.
 ORDER = (
     "tests/verification/test_effects.py", "tests/unit/test_code.py", "tests/unit/workflow/", "tests/pipeline/",
-    "tests/faults/", "tests/mpi/", "tests/stability/", "cases/hard/", "tests/",
+    "tests/faults/", "tests/mpi/", "tests/stability/", "cases/hard/", "tests/verification/",
+    "tests/",
 )  # fmt: skip
 
 

@@ -127,7 +127,7 @@ def _solder_report(run_folder: Path, case: Case, context: dict, summary: dict) -
     if (run_folder / "reflow/shape.h5").exists():
         from reflowshock.workflow.solder.report import add_solder
 
-        add_solder(run_folder, case.kind, context, summary)
+        add_solder(run_folder, case, context, summary)
 
 
 def _package_study(case: PackageCase) -> ConvergenceStudy:

@@ -146,6 +146,28 @@ OVERFLOWS = tables(
     )
 )
 
+
+@st.composite
+def struck_walls(draw: st.DrawFn) -> dict[str, Any]:
+    """A drop or two side by side that strike a wall, Weber number 1 to 100, Reynolds number 5 to 500; noisy or not."""
+    diameter, density, tension, weber = 50e-6, 1000.0, 0.07, draw(powers(0.0, 2.0))
+    time = diameter / (weber * tension / (density * diameter)) ** 0.5
+    return {
+        "droplet": {
+            "diameter": "50 um",
+            "density": "1000 kg/m^3",
+            "surface_tension": "0.07 N/m",
+            "weber": weber,
+            "reynolds": draw(powers(0.7, 2.7)),
+            "contact_angle": draw(quantities(30.0, 150.0, "deg")),
+            "duration": f"{1e6 * time * draw(numbers(0.5, 2.5)):.4g} us",
+            "numerics": {"particles_per_diameter": draw(st.integers(8, 10))},
+        },
+        "pair": draw(st.sampled_from(["none", "none", "beside"])),
+        "unrest": {"displaced": draw(numbers(0.0, 0.2)), "density": draw(numbers(0.0, 0.01))},
+    }
+
+
 DRAWS: dict[str, Table] = {
     "patches": tables(ELASTIC, kinematics=KINEMATICS),
     "flights": FLIGHTS,
@@ -160,4 +182,5 @@ DRAWS: dict[str, Table] = {
     "revolved_bodies": revolved_bodies(),
     "warped_joints": WARPED_JOINTS,
     "overflows": OVERFLOWS,
+    "struck_walls": struck_walls(),
 }

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-FAMILIES = ("reflow", "elements", "coupling", "remesh")
+FAMILIES = ("reflow", "droplets", "elements", "coupling", "remesh")
 # Each has a table TRIALS: name -> Trial; names are unique among all.
 TABLES = (*(f"trials.{family}" for family in FAMILIES), "run_trial")
 

@@ -125,16 +125,18 @@ class WindowMotion(ExplicitMotion):
         now = self.window_acceleration(time)
         if round(time / self.step) % self._substeps:
             return now
-        before = self.window_acceleration(max(time - self._substeps * self.step, 0.0))
-        return now + 0.5 * (self._substeps - 1) * (now - before)
+        return self._first_of_window(self.window_acceleration(max(time - self._substeps * self.step, 0.0)), now)
 
     def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
         """Return the same at the ends of all substeps of a window: but for the last one it does not change."""
         found = np.empty((len(times), 3))
         found[:] = self.window_acceleration(self.time)
-        now = self.window_acceleration(times[-1])
-        found[-1] = now + 0.5 * (self._substeps - 1) * (now - found[0])
+        found[-1] = self._first_of_window(found[0], self.window_acceleration(times[-1]))
         return found
+
+    def _first_of_window(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the acceleration ``(3,)`` of a window's first substep from those of two windows [m/s^2]."""
+        return now + 0.5 * (self._substeps - 1) * (now - before)
 
     def window_acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the sum of the loads' accelerations ``(3,)`` [m/s^2] as the window of a time [s] begins."""

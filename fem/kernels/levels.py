@@ -203,15 +203,16 @@ def take_steps(motion, forces, interface, accelerations, step):
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
     last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
+    none = np.int64(0)  # of this type: Numba would compile what is called once more for a literal
     means = 0.5 * (accelerations[:-1] + accelerations[1:])
     steady = means[last // 2].copy()
     body, work = (accelerations, means - steady), 0.0
     start = first_moment(motion.counted_mass, displacement)
     add_ahead(motion.ahead, force)
-    count_impulses(interface, 0, force)
+    count_impulses(interface, none, force)
     held = interface.rows.min() if len(interface.rows) else len(velocity)
     for k in range(1, last + 1):
-        reach = moved = begin = 0
+        reach = moved = begin = none
         for pace in range(PACES):
             if acts(forces, pace, k):
                 reach, moved, block = motion.ends[pace], motion.moved[pace], (begin, motion.ends[pace], every[pace], k)

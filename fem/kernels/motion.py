@@ -21,7 +21,7 @@ def advance(state, mobility, acceleration, step):
     kicks = np.zeros((3, 3))
     for c in range(3):
         kicks[0, c] = step * acceleration[c]
-    move(state, mobility, (0, len(mobility)), kicks, (step, 1))
+    move(state, mobility, (np.int64(0), len(mobility)), kicks, (step, np.int64(1)))
 
 
 @njit(cache=True)

@@ -196,8 +196,9 @@ def move_centre(blocks, b, path, w):
         small_increment(point, state)
     elastic_stress(point, state, blocks.elastic[material])
     weight, law = blocks.weight[blocks.pattern[b]], law_of(blocks.plastic, material, path.step)
-    if plastic_flow(point, blocks.state[b], 0, law):
-        add_work(point, weight, 0, blocks.plastic_work[b])
+    g = np.int64(0)  # of this type: Numba would compile the return to the yield surface once more for a literal
+    if plastic_flow(point, blocks.state[b], g, law):
+        add_work(point, weight, g, blocks.plastic_work[b])
     return True
 
 

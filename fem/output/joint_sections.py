@@ -18,7 +18,6 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.joint_elements import JointElements
 
 RESULTANTS = ("axial force", "shear x", "shear y", "torsion", "bending x", "bending y")
-FACE_SUMS, JOINT_SUMS = 13, 7
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,10 @@ class Body:
         """The body with its triangles, as products have it: itself, where it is not a section of one."""
         return self
 
+    def enclosing(self) -> "Body":
+        """The body with triangles around all of it, walls and planes of symmetry besides."""
+        return self
+
     def span(self) -> tuple[float, float]:
         """Heights [m] between which horizontal sections cut the surface, but no plate, tilted ones neither."""
         z, rings = self.points[: self.cloud.surface_count, 2], self.cloud.rings

@@ -26,6 +26,9 @@ from reflowshock.particles.ispg.rigid_motions import Riders
 
 # Reach of the search for neighbours in spacings, and that of particles with too few of them.
 REACH, WIDEST = 2.6, 4.4
+# The least that a particle counts of its volume V in V + N^T V: at the rim of a film that is thinner than a spacing
+# N^T V may be below -V, where the shape functions continue what is inside, and its mass would be negative.
+LEAST_CARRIED = 0.5
 AT_REST: Mapping[int, Floats] = MappingProxyType({})  # no plate moves
 
 
@@ -82,7 +85,7 @@ class Galerkin:
         volumes = nodal_volumes(body, density)
         spread = shape.T @ volumes
         of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
-        carried = with_moments(body, volumes + of_shapes)
+        carried = with_moments(body, np.maximum(volumes + of_shapes, LEAST_CARRIED * volumes))
         drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
         return cls(volumes, carried, starts, columns, weights, shape, ghosts, drift)
 

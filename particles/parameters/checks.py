@@ -52,7 +52,7 @@ def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
     """Find the scheme ispg at a place where it does not hold, or is not verified; empty for others, or no place."""
     if solder.numerics.scheme != "ispg" or place is None:
         return []
-    message = f'the scheme "ispg" is for drops and one joint, with inertia; it is not verified for {place}'
+    message = f'the scheme "ispg" is for drops and joints, with inertia; it is not verified for {place}'
     return [Problem("solder.numerics.scheme", message, "ispg", "energy")]
 
 

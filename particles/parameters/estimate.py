@@ -16,6 +16,8 @@ INERTIAL_COST_EXPONENT = 1.5
 # Steps of the scheme ispg; measured by benchmarks/bench_ispg.py.
 SECONDS_PER_ISPG_STEP = 0.0018
 SECONDS_PER_ISPG_STEP_AND_PARTICLE = 1.35e-5
+# Steps of that scheme until a joint is at rest: 26 to 318, most with fine particles and tilted plates.
+ISPG_STEPS_OF_JOINT = 250
 # Steps of a section, whose pressures have dense matrices; measured with 121 to 1681 particles.
 SECONDS_PER_SECTION_STEP, SECONDS_PER_SECTION_STEP_AND_PARTICLE = 0.008, 3e-5
 SECONDS_PER_SECTION_STEP_AND_PAIR = 2.3e-8
@@ -29,7 +31,10 @@ def particle_count(solder: Solder, geometry: JointGeometry) -> int:
 
 def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
     """Expected time of `solve_joint` on one core [s], from the measured cost of a step."""
-    return TYPICAL_STEPS * _seconds_per_step(particle_count(solder, geometry))
+    particles = particle_count(solder, geometry)
+    if solder.numerics.scheme == "ispg":
+        return ispg_seconds(particles, ISPG_STEPS_OF_JOINT)
+    return TYPICAL_STEPS * _seconds_per_step(particles)
 
 
 def drop_seconds(particles: int) -> float:

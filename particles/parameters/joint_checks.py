@@ -1,8 +1,10 @@
 """Parameters of one joint that are each allowed but make no joint together. Loads neither numba nor PETSc."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from math import asin, inf, sin, sqrt
 
+from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, mm_per_s, mn, too_many
 from reflowshock.particles.parameters.effects import acting_weight, decide_effects
@@ -12,6 +14,7 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
 from reflowshock.problem import Problem
 
+OVERFLOWS = 1e-3  # of its pad's radius: a contact line that is on the mask
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -35,12 +38,36 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 def unverified_joint(joint: Joint, solder: Solder) -> str | None:
     """What of a joint the scheme ispg is not verified for; None where it is."""
-    inertia = decide_effects(joint.geometry, solder)["inertia"]
-    places = {
-        "packages that float, on walls with friction": joint.package is not None and solder.wall != "free-slip",
-        f"joints without inertia ({inertia['why']})": not inertia["on"],
-    }
-    return next((place for place, is_met in places.items() if is_met), None)
+    if joint.package is not None and solder.wall != "free-slip":
+        return "packages that float, on walls with friction"
+    return _without_inertia(joint.geometry, solder)
+
+
+def unverified_joints(geometries: Collection[JointGeometry], solder: Solder) -> str | None:
+    """What of the joints of a package, each by itself, the scheme ispg is not verified for; None where it is."""
+    found = next(filter(None, (_without_inertia(geometry, solder) for geometry in geometries)), None)
+    lowest = min(geometries, key=lambda geometry: geometry.gap)
+    if found is None and _overflows(lowest, solder):
+        return f"joints that overflow both pads, where no edge holds them (gap of {mm(lowest.gap)})"
+    return found
+
+
+def _without_inertia(geometry: JointGeometry, solder: Solder) -> str | None:
+    inertia = decide_effects(geometry, solder)["inertia"]
+    return None if inertia["on"] else f"joints without inertia ({inertia['why']})"
+
+
+def _overflows(geometry: JointGeometry, solder: Solder) -> bool:
+    """Whether the solder is beyond both pads where the plates are level."""
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    weight = acting_weight(solder, decide_effects(geometry, solder))
+    discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
+    try:
+        line = joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).r
+    except NoMeridian:
+        return False
+    ends = ((line[0], geometry.radius_board), (line[-1], geometry.radius_package))
+    return all(rim > (1.0 + OVERFLOWS) * radius for rim, radius in ends)
 
 
 def _tilt_problems(joint: Joint) -> list[Problem]:

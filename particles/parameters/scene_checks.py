@@ -17,6 +17,10 @@ from reflowshock.problem import Problem
 FEWEST_PER_EDGE = 5
 SPACINGS_IN_PAD = 2.0
 ISPG_ANGLES = (radians(30.0), radians(148.0))
+# Of whole drops on uniform walls with free slip: in a quarter particles on the axis, each with a pressure, are locked.
+FILM_ANGLE, FILM_EDGES = radians(15.0), (5, 7)
+# In a plane the face of a cube spreads 2.7 times too far on a wall of 30 degrees: its middle is half a spacing thick.
+PLANE_ANGLE = radians(60.0)
 ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis
 # 5 an edge at 30 degrees without slip was not at rest after 1600 steps; more than 11 were not run.
 FRICTION_EDGES, FRICTION_PAD_EDGES = (6, 11), (7, 9)
@@ -34,11 +38,13 @@ class HasWall(Protocol):
         """Whether there is no wall."""
 
 
-def with_scheme(scene: Drop | Joint | Drops, solder: Solder) -> tuple[Solder, str]:
-    """The solder of a scene with the scheme that auto stands for, and why: ispg where it is verified, else energy.
+def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tuple[Solder, str]:
+    """The solder of a scene with the scheme asked for, and why it has it; no words but where that is auto.
 
-    It is ispg as well where no other scheme computes the scene.
+    Auto stands for ispg where it is verified or no other scheme computes the scene, else for energy.
     """
+    if asked != "auto":
+        return solder, ""
     ispg = changed(solder, "numerics.scheme", "ispg")
     if isinstance(scene, Drop):
         place = _unverified_drop(scene, solder)
@@ -74,7 +80,7 @@ def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
 
 
 def _section_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find drops that are no bodies of revolution that the scheme ispg computes in section."""
+    """Find drops that the scheme ispg does not compute in section: it knows uniform walls with free slip only."""
     if drop.section == "none":
         return []
     if solder.numerics.scheme != "ispg":
@@ -98,14 +104,22 @@ def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
     fewest, most = SECTION_EDGES if drop.section != "none" else ISPG_EDGES if drop.hysteresis is None else HELD_EDGES
     rubs, (low, high) = solder.wall != "free-slip", FRICTION_EDGES
-    on_pad = FRICTION_PAD_EDGES
-    in_section, between = drop.section != "none", all(_is_between(one) for one in drop.hysteresis or (angle,))
+    on_pad, thin = FRICTION_PAD_EDGES, FILM_EDGES
+    in_section, rests = drop.section != "none", drop.hysteresis or (angle,)
+    smooth = not (rubs or in_section or drop.pad_radius or drop.hysteresis or drop.symmetry_axes)
+    least = PLANE_ANGLE if drop.section == "plane" else FILM_ANGLE if smooth else ISPG_ANGLES[0]
+    is_film = not all(_is_between(one) for one in rests)
     places = {
         "parts of free drops": drop.is_free and drop.symmetry != "none",
         f"{drop.count} particles along an edge of a free drop (for {FREE_EDGES[0]} to {FREE_EDGES[1]} it is)": (
             drop.is_free and not FREE_EDGES[0] <= drop.count <= FREE_EDGES[1]
         ),
-        f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])} at rest": not between,
+        f"contact angles outside {deg(least)} to {deg(ISPG_ANGLES[1])} at rest": (
+            not all(_is_between(one, least) for one in rests)
+        ),
+        f"{drop.count} particles along an edge below {deg(ISPG_ANGLES[0])} (for {thin[0]} to {thin[1]} it is)": (
+            is_film and not thin[0] <= drop.count <= thin[1]
+        ),
         "hysteresis in section": in_section and drop.hysteresis is not None,
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"{drop.count} particles along an edge (for {fewest} to {most} it is)": not fewest <= drop.count <= most,
@@ -171,10 +185,9 @@ def _angle_at_rest(drop: Drop) -> float | None:
     return min(max(cap_angle(drop.volume, drop.pad_radius), drop.contact_angle), drop.mask_contact_angle)
 
 
-def _is_between(angle: float | None) -> bool:
-    """Whether a contact angle [rad] is one that the scheme ispg is verified for."""
-    low, high = ISPG_ANGLES
-    return angle is None or low - ROUNDING <= angle <= high + ROUNDING
+def _is_between(angle: float | None, least: float = ISPG_ANGLES[0]) -> bool:
+    """Whether a contact angle [rad] is one that the scheme ispg is verified for, from the least on."""
+    return angle is None or least - ROUNDING <= angle <= ISPG_ANGLES[1] + ROUNDING
 
 
 def _pair_resolution(pair: Drops) -> list[Problem]:

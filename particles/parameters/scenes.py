@@ -65,7 +65,9 @@ class Drop(Parameters):
     angle there is no wall: the drop is free and becomes a sphere.
     Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
     With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
-    With ``section`` its meridian alone is computed, by the scheme ispg: it starts as a cylinder as high as the cube.
+    With ``section`` it is computed in a plane, by the scheme ispg. Axisymmetric: its meridian alone, it starts as a
+    cylinder as high as the cube. Plane: it is the same along y, starts as the cube's section, and volume, energy and
+    forces are those of a piece as deep as the cube.
     With ``speed`` it strikes the wall, by the scheme ispg: it starts as a sphere with the foot of a cap of 155 degrees.
     """
 
@@ -79,7 +81,7 @@ class Drop(Parameters):
     spacing: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
     particles_per_edge: int | None = Field(None, ge=5, le=50)
     symmetry: Literal["none", "half", "quarter"] = "none"
-    section: Literal["none", "axisymmetric"] = "none"
+    section: Literal["none", "axisymmetric", "plane"] = "none"
 
     @property
     def symmetry_axes(self) -> tuple[int, ...]:
@@ -89,6 +91,8 @@ class Drop(Parameters):
     @property
     def particles(self) -> int:
         """Number of particles of the cube, or of the part of it that is computed."""
+        if self.section == "plane":
+            return self.count * (1 + 2 * max(3, round(0.5 * (self.count - 1))))
         if self.section != "none":
             return self.count * (1 + round((self.count - 1) / pi**0.5))
         cuts = len(self.symmetry_axes)

@@ -18,7 +18,7 @@ class FlowNumerics(Parameters):
 
     The scheme energy moves to the least energy of the tracked surface at exactly the volume, on tetrahedra where
     inertia or viscosity acts. The scheme ispg is the paper's method in a form that holds, for drops on a wall or that
-    merge and one joint, with inertia. The scheme auto is ispg where that is verified, which costs less than
+    merge and for joints, with inertia. The scheme auto is ispg where that is verified, which costs less than
     tetrahedra, else energy. The scheme gripc is what Hu et al. print, for comparison: time steps end at the capillary
     limit, and drops break up.
 

@@ -2,7 +2,7 @@
 
 An axisymmetric surface at rest, s the arc length and psi the slope of the meridian against the outward radius:
     r' = cos psi,  z' = sin psi,  psi' = (p - w z) / gamma - sin(psi) / r,  V' = pi r^2 sin psi,
-p the pressure at z = 0, w = rho g the weight of the unit volume.
+p the pressure at z = 0, w = rho g the weight of the unit volume. In a plane without sin(psi) / r, and A' = 2 r sin psi.
 """
 
 from collections.abc import Callable
@@ -174,32 +174,54 @@ def _barrel(a: float, b: float, target: float) -> _State:
 def sessile_meridian(volume: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
     """Find the meridian of a drop on a uniform wall (Bashforth & Adams), from the wall to the apex.
 
-    Shoots from the apex with a given curvature until the meridian has turned by the contact angle; the curvature
-    is the root of the volume.
-
     Args:
         volume: [m^3].
         contact_angle: [rad], in (0, pi).
         surface_tension: gamma [N/m].
         weight: rho g [N/m^3].
     """
+    cap = np.cbrt(np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle)))
+    return _sessile(np.cbrt(volume), cap, contact_angle, (surface_tension, weight), is_plane=False)
+
+
+def sessile_section(area: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
+    """Find half the section of a drop on a uniform wall that is the same along y, r from its middle.
+
+    Without weight it is a segment of a circle. Arguments as `sessile_meridian`, with the area of the section [m^2].
+    """
+    segment = np.sqrt(contact_angle - np.sin(contact_angle) * np.cos(contact_angle))
+    return _sessile(np.sqrt(area), segment, contact_angle, (surface_tension, weight), is_plane=True)
+
+
+def _sessile(
+    length: float, weightless: float, contact_angle: float, fluid: tuple[float, float], *, is_plane: bool
+) -> Meridian:
+    """Shoot from the apex until the line has turned by the contact angle [rad]; its curvature is the root of the size.
+
+    Args:
+        length: of a cube, or a square, of the drop's size [m].
+        weightless: curvature that the drop has without weight, over that length.
+        contact_angle: [rad].
+        fluid: surface tension [N/m] and weight of the unit volume [N/m^3].
+        is_plane: whether the drop is the same along y.
+    """
     from scipy.optimize import brentq
 
-    length = np.cbrt(volume)
+    surface_tension, weight = fluid
     bond = weight * length**2 / surface_tension
 
     def shoot(curvature: float) -> Floats:
-        return _from_apex(curvature, bond, contact_angle)
+        return _from_apex(curvature, bond, contact_angle, is_plane)
 
     def excess(logarithm: float) -> float:
         return float(shoot(np.exp(logarithm))[2, -1] - 1.0)
 
-    cap = (np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle))) ** (1.0 / 3.0)
-    highest = np.log(cap) + 2.0
-    curvature = np.exp(brentq(excess, np.log(cap) - 6.0, highest, xtol=1e-13))
+    middle = np.log(weightless)
+    curvature = np.exp(brentq(excess, middle - 6.0, middle + 2.0, xtol=1e-13))
     r, depth, _ = shoot(curvature)
     height = depth[-1]
-    pressure = (2.0 * curvature + bond * height) * surface_tension / length
+    at_apex = curvature if is_plane else 2.0 * curvature
+    pressure = (at_apex + bond * height) * surface_tension / length
     return Meridian(
         r[::-1] * length, (height - depth[::-1]) * length, float(pressure), 0.0, contact_angle, float("nan")
     )
@@ -254,12 +276,17 @@ def pad_meridian(
     return drop(brentq(overhang, *angle_limits, xtol=1e-10))
 
 
-def _from_apex(curvature: float, bond: float, contact_angle: float) -> Floats:
-    """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3)."""
+def _from_apex(curvature: float, bond: float, contact_angle: float, is_plane: bool) -> Floats:
+    """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3).
+
+    In a plane half the width and the area, in lengths of its square root.
+    """
     from scipy.integrate import solve_ivp
 
     def slopes(_: float, y: Floats) -> list[float]:
         r, depth, psi, _volume = y
+        if is_plane:
+            return [np.cos(psi), np.sin(psi), curvature + bond * depth, 2.0 * r * np.sin(psi)]
         ratio = np.sin(psi) / r if r > 1e-9 else curvature
         turning = 2.0 * curvature + bond * depth - ratio
         return [np.cos(psi), np.sin(psi), turning, np.pi * r * r * np.sin(psi)]

@@ -35,7 +35,7 @@ def solve_dam_break(
     simulation = dam(scene)
     run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
     history = run.history(COLUMNS)
-    lost = {"particles_lost": (float(_lost(scene, simulation)), "")}
+    lost = {"particles_lost": (float(particles_lost(scene, simulation)), "")}
     return flow.result_of(run, history, _metrics(scene, history) | lost)
 
 
@@ -62,10 +62,8 @@ def _sample(scene: DamBreak, simulation: Simulation) -> tuple[float, ...]:
     liquid, fields = slice(simulation.fluids), simulation.fields
     x, z, mass = fields.x[liquid], fields.z[liquid], fields.mass[liquid]
     potential = scene.gravity * float(mass @ z)
-    squeezed = fields.density[liquid] / scene.density
-    elastic = scene.sound**2 * float(mass @ (np.log(squeezed) + 1.0 / squeezed - 1.0))
     pressure, kinetic = _pressure_at(scene, simulation), simulation.kinetic_energy
-    return simulation.time, pressure, float(x.max()), kinetic, potential, elastic
+    return simulation.time, pressure, float(x.max()), kinetic, potential, simulation.elastic_energy
 
 
 def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
@@ -79,7 +77,7 @@ def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
     return float(weight @ fields.pressure[near] / total) if total > DRY else 0.0
 
 
-def _lost(scene: DamBreak, simulation: Simulation) -> int:
+def particles_lost(scene: DamBreak, simulation: Simulation) -> int:
     """Particles that are beyond the middle of a wall's first layer."""
     liquid, half = slice(simulation.fluids), 0.5 * scene.spacing
     x, z = simulation.fields.x[liquid], simulation.fields.z[liquid]

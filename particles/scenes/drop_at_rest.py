@@ -14,7 +14,7 @@ from reflowshock.particles.core.symmetry import cut
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, Decision, acting_weight, decide_drop, switched
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sphere_meridian
+from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sessile_section, sphere_meridian
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
 from reflowshock.particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
 from reflowshock.particles.scenes.section_drop import start_section
@@ -125,6 +125,8 @@ def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:
     """Exact meridian; with hysteresis where all of the line advances, since a cube stands at 90 degrees."""
     if drop.is_free:
         return sphere_meridian(solder.volume, solder.surface_tension)
+    if drop.section == "plane":
+        return sessile_section(drop.edge**2, solder.pad_contact_angle, solder.surface_tension, weight)
     if drop.hysteresis is None:
         return reference_drop(solder, drop.edge_radius, weight)
     if drop.hysteresis[1] >= ANGLE_OF_CUBE:

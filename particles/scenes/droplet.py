@@ -20,6 +20,7 @@ from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.surface.breakup import largest_part
 from reflowshock.particles.surface.closing import parts_of
+from reflowshock.particles.surface.cloud_level_set import boundary_loops
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
 from reflowshock.particles.surface.profile import width
 
@@ -43,11 +44,23 @@ def solve_droplet(
 ) -> FlowResult:
     """Let a droplet move.
 
+    Raises: as `follow`.
+    """
+    return follow(scene, droplet(scene), progress, checkpoint)
+
+
+def follow(
+    scene: Droplet,
+    simulation: Simulation,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> FlowResult:
+    """Let the liquid of a simulation move as a droplet does, whatever state it begins in.
+
     Raises:
         FloatingPointError: a position is not finite.
         SurfaceLost: no particle is beside the surface any more.
     """
-    simulation = droplet(scene)
     try:
         run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
     except SurfaceLost as error:
@@ -146,7 +159,11 @@ def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indi
     points[low] *= radius / np.linalg.norm(points[low], axis=1)[:, None]
     kept = triangles[(points[triangles, 2] >= 0.0).all(axis=1)]
     used, numbers = np.unique(kept, return_inverse=True)
-    return points[used], numbers.reshape(-1, 3).astype(np.int32)
+    points, triangles = points[used], numbers.reshape(-1, 3).astype(np.int32)
+    for ring in boundary_loops(triangles):  # of some triangles all corners are too high to be on it by now
+        points[ring, 2] = 0.0
+        points[ring] *= radius / np.linalg.norm(points[ring], axis=1)[:, None]
+    return points, triangles
 
 
 def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:

@@ -271,7 +271,7 @@ def particles_lost(body: Body) -> int:
 
     Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
     """
-    body = body.whole()
+    body = body.enclosing()
     cloud, inside, corners = body.cloud, body.points.copy(), [body.points[body.triangles]]
     for wall, plate in enumerate(body.plates):
         inside[cloud.wall == wall] -= LITTLE * cloud.spacing * plate.side * plate.normal

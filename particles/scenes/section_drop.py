@@ -1,7 +1,8 @@
-"""A drop on a uniform wall computed in section, by the scheme ispg: half a meridian of a body of revolution.
+"""A drop on a uniform wall in section, by the scheme ispg: a meridian, or a plane where it is the same along y.
 
-It starts as a cylinder as high as the cube that other drops start as. What acts on it is what acts on a body, with the
-forces of a chain in the place of those of triangles.
+A body of revolution starts as a cylinder as high as the cube that other drops start as. In a plane it starts as the
+cube's section, and the piece of it that has the volume is as deep as the cube. What acts on it is what acts on a body,
+with the forces of a chain in the place of those of triangles.
 """
 
 from dataclasses import replace
@@ -21,9 +22,12 @@ from reflowshock.particles.steps.time_step import TimeStep, largest_step
 
 
 def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> SectionFlow:
-    """Set up the flow of a drop's meridian from rest, with only the effects that are on."""
-    chain = Chain.meridian()
-    body = Section.filled(block(chain, drop.edge / np.sqrt(np.pi), drop.edge, drop.count), chain)
+    """Set up the flow of a drop's section from rest, with only the effects that are on."""
+    if drop.section == "plane":
+        chain, width = Chain.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
+    else:
+        chain, width = Chain.meridian(), drop.edge / np.sqrt(np.pi)
+    body = Section.filled(block(chain, width, drop.edge, drop.count), chain)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
     return SectionFlow(body, section_physics(solder, effects), time_step, SectionStep())

@@ -1,4 +1,4 @@
-"""A surface in section: a chain of segments that stands for cones, or for planes of a unit depth.
+"""A surface in section: a chain of segments that stands for cones, or for planes of some depth along y.
 
 Next to the axis a segment is a parabola with its apex there: the curvature of a cone's tip is a quarter too small.
 The liquid is on its left: counter-clockwise from the right contact point, or from the lower end of the axis. Integrals
@@ -75,9 +75,9 @@ class Chain:
         return cls(1, np.pi)
 
     @classmethod
-    def plane(cls, is_closed: bool) -> "Chain":
-        """A unit length along y [m]."""
-        return cls(0, 1.0, is_closed)
+    def plane(cls, is_closed: bool, depth: float = 1.0) -> "Chain":
+        """A piece of a depth along y [m]."""
+        return cls(0, depth, is_closed)
 
     def ends(self, line: Floats) -> tuple[Floats, Floats]:
         """First and second vertices of the segments, `(e, 3)` each."""

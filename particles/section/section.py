@@ -15,13 +15,14 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.section.chain import Chain
 
 NO_TRIANGLES = np.zeros((0, 3), np.int32)
-NARROW = 1e-3  # [rad]
+NARROW = 1e-3  # [rad], or spacings
+LONG = 100.0  # times the width or height
 MERIDIANS = 64  # around the axis, of the triangles that a body is shown with
 
 
 @dataclass(slots=True)
 class Section(Body):
-    """State of a body in section; volumes are those of half a body of revolution, or of a unit depth.
+    """State of a body in section; volumes are those of half a body of revolution, or of a piece in a plane.
 
     Attributes:
         chain: what the surface stands for.
@@ -63,18 +64,24 @@ class Section(Body):
         return integral(0, 0), np.array([integral(1, 0), 0.0, integral(0, 1)]), second
 
     def whole(self) -> Body:
-        """The body with triangles: a meridian turned about its axis, a plane as a sheet of a unit depth without ends.
+        """The body with triangles: a meridian turned about its axis, a plane as deep as its piece and without ends.
 
         The particles below the surface stay in the section.
         """
         if self.chain.power:
             return self.swept(turns(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
-        sheets = np.broadcast_to(np.eye(3), (2, 3, 3))
-        return self.swept((sheets, np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])), is_closed=False)
+        return self.swept(sheets(self.chain.factor), is_closed=False)
+
+    def enclosing(self) -> Body:
+        """The body with triangles around all of it; a plane so long that its ends are out of sight."""
+        if self.chain.power:
+            return self.whole()
+        return self.swept(sheets(LONG * float(np.ptp(self.line, axis=0).max())), is_closed=False)
 
     def narrow(self) -> Body:
-        """The surface between two meridians so close that triangles are as exact as the chain."""
-        return self.swept(turns(np.array([0.0, NARROW])), is_closed=False)
+        """The surface between two copies of the chain so close that triangles are as exact as it is."""
+        copies = turns(np.array([0.0, NARROW])) if self.chain.power else sheets(NARROW * self.cloud.spacing)
+        return self.swept(copies, is_closed=False)
 
     def swept(self, places: tuple[Floats, Floats], is_closed: bool) -> Body:
         """The surface between copies of the chain, one after the other in the sense of y.
@@ -107,7 +114,8 @@ class Section(Body):
         pressure[number] = self.pressure[:count, None]
         wall = np.full(len(points), -1, np.int8)
         wall[len(points) - len(self.points) + count :] = self.cloud.wall[count:]
-        rings = (number[0].astype(np.int32),) if self.plates else ()
+        wetted = number[0] if chain.power else np.concatenate((number[0], number[-1, ::-1]))
+        rings = (wetted.astype(np.int32),) if self.plates else ()
         wall[np.concatenate([*rings, NO_TRIANGLES[:, 0]])] = 0
         first = int(number.max()) + 1
         cloud = Cloud(points, first, triangles, rings, self.plates, wall, self.cloud.spacing)
@@ -131,6 +139,11 @@ def turns(angles: Floats) -> tuple[Floats, Floats]:
     cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
     rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, none + 1.0]]
     return np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3))
+
+
+def sheets(depth: float) -> tuple[Floats, Floats]:
+    """Two places a depth apart along y [m], about the plane of the section."""
+    return np.broadcast_to(np.eye(3), (2, 3, 3)), depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
 
 
 def block(chain: Chain, width: float, height: float, count: int) -> Cloud:

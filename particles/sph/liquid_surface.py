@@ -279,7 +279,7 @@ class LiquidSurface:
                     self._make_anew(CLOSED)
                 elif self._leaves(velocity):
                     self._make_anew((-THIN,))
-                elif surface_care.is_worn(self.points, self.triangles, self.law.spacing):
+                elif surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing):
                     self._make_anew()
             self.enclose(volume - self._shed())
         self._find_wetness()

@@ -127,6 +127,13 @@ class Simulation:
         return 0.5 * float(fields.mass[: self.fluids] @ (u * u + v * v + w * w))
 
     @property
+    def elastic_energy(self) -> float:
+        """Of the compression of the liquid [J]: the work of pressure from the density at rest on."""
+        density, mass = (one[: self.fluids] for one in (self.fields.density, self.fields.mass))
+        squeezed = density / self.law.rest_density
+        return self.law.sound**2 * float(mass @ (np.log(squeezed) + 1.0 / squeezed - 1.0))
+
+    @property
     def fastest(self) -> float:
         """The largest speed of the liquid [m/s]."""
         return self.particles.fastest

@@ -26,7 +26,14 @@ from reflowshock.particles.surface.cloud_level_set import (
     mirrored,
 )
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax, signed_distance
+from reflowshock.particles.surface.level_set import (
+    Grid,
+    LevelSet,
+    extract_surface,
+    relax,
+    signed_distance,
+    windings_on,
+)
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 # In spacings of the particles: edges of triangles.
@@ -44,6 +51,8 @@ TOUCH, DRY = 0.3, 0.1
 # The same: how far beyond its particles the surface is at least (they may be a bit outside) and at most, its radius
 # about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
 COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
+# The same: distance of the nodes at which sheets that have crossed are looked for.
+OVERLAP = 0.5
 # In particles: smaller parts are no liquid with a surface; two particles across, a sphere has four, a cube eight.
 FEWEST = 8
 # Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
@@ -162,8 +171,16 @@ def _blunting(line: Floats) -> Floats:
     return np.where(is_sharp[:, None], 0.25 * (after - before), 0.0)
 
 
-def is_worn(points: Floats, triangles: Indices, spacing: float) -> bool:
-    """Whether triangles are too small, too large or slivers."""
+def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
+    """Whether sheets of a surface have crossed: it winds round some liquid twice, or round air inside out."""
+    found = windings_on(Grid.around(points, OVERLAP * spacing), points, triangles)
+    return bool(found.max() > 1 or found.min() < 0)
+
+
+def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float) -> bool:
+    """Whether triangles are too small, too large or slivers; or folded, where they do not end on a wall."""
+    if not rings and is_folded(points, triangles, spacing):
+        return True
     corner = points[triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
     area = triangle_areas(points, triangles)

@@ -1,7 +1,8 @@
 """The particles of a simulation on threads: their arrays, and the loops over them.
 
 Each loop runs a function of one particle, which `cuda_loops.py` runs on a GPU. An array that a loop writes is an
-argument of its own, not only one of a tuple: Numba may drop the loop then.
+argument of its own, not only one of a tuple: Numba may drop the loop then. Within a parallel loop its index is
+unsigned, but Numba looks first as if it were signed, and would compile all that is called twice: `np.uint64` says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -191,65 +192,68 @@ class ThreadParticles:
 
 @threaded
 def _predict(fields, rates, middle, time_step):
-    for i in prange(rates.shape[1]):
-        predict(i, fields, rates, middle, time_step)
+    for k in prange(rates.shape[1]):
+        predict(np.uint64(k), fields, rates, middle, time_step)
 
 
 @threaded
 def _settle(fields, middle, law):
-    for i in prange(middle.shape[1]):
-        settle(i, fields, middle, law)
+    for k in prange(middle.shape[1]):
+        settle(np.uint64(k), fields, middle, law)
 
 
 @threaded
 def _correct(fields, rates, middle, time_step):
-    for i in prange(rates.shape[1]):
-        correct(i, fields, rates, middle, time_step)
+    for k in prange(rates.shape[1]):
+        correct(np.uint64(k), fields, rates, middle, time_step)
 
 
 @threaded
 def _take_slopes(fields, rates, slope):
-    for i in prange(rates.shape[1]):
-        take_slope(i, fields, rates)
+    for k in prange(rates.shape[1]):
+        take_slope(np.uint64(k), fields, rates)
 
 
 @threaded
 def _shift(fields, rates, factor, law):
-    for i in prange(rates.shape[1]):
-        shift(i, fields, rates, factor, law)
+    for k in prange(rates.shape[1]):
+        shift(np.uint64(k), fields, rates, factor, law)
 
 
 @threaded
 def _fastest2(fluids, fields):
     largest = 0.0
-    for i in prange(fluids):
-        largest = max(largest, speed2_of(i, fields))
+    for k in prange(fluids):
+        largest = max(largest, speed2_of(np.uint64(k), fields))
     return largest
 
 
 @threaded
 def _find_rates(fluids, lists, fields, law, rates):
     rows, counts = lists
-    for i in prange(fluids):
+    for k in prange(fluids):
+        i = np.uint64(k)
         found = rates_of(i, fluids, rows[i, : counts[i]], fields, law)
-        for k in range(10):
-            rates[k, i] = found[k]
+        for row in range(10):
+            rates[row, i] = found[row]
 
 
 @threaded
 def _find_viscosities(fluids, lists, fields, law, found):
     rows, counts = lists
-    for i in prange(fluids):
+    for k in prange(fluids):
+        i = np.uint64(k)
         found[i] = viscosity_of(i, fluids, rows[i, : counts[i]], fields, law)
 
 
 @threaded
 def _find_drifts(fluids, lists, fields, law, middle):
     rows, counts = lists
-    for i in prange(fluids):
+    for k in prange(fluids):
+        i = np.uint64(k)
         drift = drift_of(i, fluids, rows[i, : counts[i]], fields, law)
-        for k in range(3):
-            middle[4 + k, i] = drift[k]
+        for row in range(3):
+            middle[4 + row, i] = drift[row]
 
 
 @threaded
@@ -257,4 +261,4 @@ def _cover_walls(fluids, lists, fields, law, shares):
     rows, counts = lists
     for k in prange(shares.shape[0]):
         i = fluids + k
-        cover(k, i, fields, wall_values(i, fluids, rows[i, : counts[i]], fields, law), law)
+        cover(np.uint64(k), i, fields, wall_values(i, fluids, rows[i, : counts[i]], fields, law), law)

@@ -3,6 +3,7 @@
 Both are written as means of two old vertices, so that any field of the vertices comes along. A split changes no shape.
 A collapse is left out where it would fold the surface or pinch it off (the link condition), and what is left of the
 edge stays on a contact line that one of its ends is on. Contact lines themselves are changed where they may be.
+A corner of three triangles whose base has a short edge is cut off: the base could not collapse, since it closes a loop.
 """
 
 from collections.abc import Sequence
@@ -92,18 +93,22 @@ def collapse_short(
         if length[edge] >= shortest:
             break
         kept, gone = (int(end) for end in edges[edge])
-        if on_ring[gone]:
+        tip = _tip(triangles, faces_of, (kept, gone))
+        if tip is not None:
+            gone = tip
+        elif on_ring[gone]:
             kept, gone = gone, kept
         outer = (sides[edge] < 0).any()
         if on_ring[gone] and not (outer and on_rings):
             continue
         near = np.unique(triangles[faces_of[kept] + faces_of[gone]])
-        place = points[kept] if on_ring[kept] and not on_ring[gone] else 0.5 * (points[kept] + points[gone])
-        if busy[near].any() or not _may_collapse(points, triangles, faces_of, (kept, gone), place):
+        in_place = tip is not None or (on_ring[kept] and not on_ring[gone])
+        place = points[kept] if in_place else 0.5 * (points[kept] + points[gone])
+        if busy[near].any() or (tip is None and not _may_collapse(points, triangles, faces_of, (kept, gone), place)):
             continue
         busy[near] = True
         target[gone] = kept
-        if not on_ring[kept] or on_ring[gone]:
+        if not in_place:
             second[kept] = gone
     faces = target[triangles]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -111,6 +116,17 @@ def collapse_short(
     number = (np.cumsum(stays) - 1).astype(np.int32)
     lines = tuple(number[ring[stays[ring]]] for ring in rings)
     return NewSurface(first[stays], second[stays], number[faces], lines)
+
+
+def _tip(triangles: Indices, faces_of: Sequence[list[int]], ends: tuple[int, int]) -> int | None:
+    """The vertex over an edge in which three triangles alone meet, on a base that is no triangle yet; else None."""
+    shared = set(faces_of[ends[0]]) & set(faces_of[ends[1]])
+    over = set(triangles[list(shared)].ravel().tolist()) - set(ends)
+    for vertex in over:
+        around = set(triangles[faces_of[vertex]].ravel().tolist()) - {vertex}
+        if len(faces_of[vertex]) == len(around) == 3 and not around <= over | set(ends):
+            return int(vertex)
+    return None
 
 
 def _may_collapse(

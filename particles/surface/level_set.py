@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.surface import windings
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 RELAXATIONS = 30
@@ -79,7 +80,7 @@ class LevelSet:
 
 
 def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
-    """Signed distance to a closed, outward oriented surface.
+    """Signed distance to a closed, outward oriented surface; inside is what it winds round, even where it is folded.
 
     Args:
         points: `(n, 3)` [m].
@@ -87,15 +88,29 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
         grid: where to evaluate it.
     """
     nodes = pyvista.ImageData(dimensions=grid.counts, spacing=(grid.spacing,) * 3, origin=grid.origin)
-    surface = pyvista.PolyData.from_regular_faces(points, triangles)
-    values = nodes.compute_implicit_distance(surface)["implicit_distance"]
-    return LevelSet(grid, np.asarray(values).reshape(grid.counts, order="F"))
+    distance = _distance(nodes, points, triangles).reshape(grid.counts, order="F")
+    return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
 
 
 def depths(points: Floats, surface: tuple[Floats, Indices]) -> Floats:
     """How deep points `(n, 3)` are inside a closed surface, negative outside, `(n,)` [m]; arguments as above."""
-    closed = pyvista.PolyData.from_regular_faces(*surface)
-    return -np.asarray(pyvista.PolyData(points).compute_implicit_distance(closed)["implicit_distance"])
+    found = np.zeros(len(points), np.int32)
+    windings.about(points, *surface, found)
+    distance = _distance(pyvista.PolyData(points), *surface)
+    return np.where(found > 0, distance, -distance)
+
+
+def _distance(nodes: pyvista.DataSet, points: Floats, triangles: Indices) -> Floats:
+    """Distance of nodes to a surface [m]. Its sign, by the nearest triangle, is wrong where the surface is folded."""
+    surface = pyvista.PolyData.from_regular_faces(points, triangles)
+    return np.abs(nodes.compute_implicit_distance(surface)["implicit_distance"])
+
+
+def windings_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
+    """How often a closed surface winds round the nodes of a grid, an array of its counts."""
+    found = np.zeros(grid.counts, np.int32)
+    windings.on_grid(points, triangles, grid.origin, grid.spacing, found)
+    return found
 
 
 def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:

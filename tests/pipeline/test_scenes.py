@@ -64,6 +64,22 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
 
+def test_a_drop_in_a_plane_from_case_file_to_report(tmp_path):
+    """The drop of the paper as an endless ridge: at rest a segment of a circle of the area of the cube's face."""
+    settings = ("drop.section=plane", "drop.particles_per_edge=8", "drop.contact_angle=120 deg")
+    result = run("sessile_drop", tmp_path, *settings, "solder.effects.inertia=on", "solder.parameters=paper")
+    assert result.returncode == 0, result.stdout + result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    found = {name: metric["value"] for name, metric in summary["metrics"].items()}
+    angle = np.radians(120.0)
+    radius = 1e-3 / np.sqrt(angle - np.sin(angle) * np.cos(angle))
+    assert found["height"] == pytest.approx(radius * (1.0 - np.cos(angle)), rel=3e-3)
+    assert found["max_width"] == pytest.approx(2.0 * radius, rel=1e-3)
+    assert found["volume"] == pytest.approx(1e-9, rel=1e-12)
+    assert found["particles_lost"] == 0
+    assert "distance from the middle [mm]" in (tmp_path / "report.html").read_text()
+
+
 @pytest.mark.parametrize(
     "place",
     [pytest.param((), marks=pytest.mark.long), ("drops.contact_angle=60 deg", "drops.distance=1.3 mm")],

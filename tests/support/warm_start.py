@@ -19,12 +19,13 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from tests.support.compiled_once import compile_once
 from tests.support.warm_client import ask
 
 ROOT = Path(__file__).resolve().parents[2]
 # What commands, stages and ranks load; not MPI, nor what loads it: a process that has begun it cannot be forked.
 LIBRARIES = (
-    "ffcx", "gmsh", "matplotlib.backends.backend_svg", "matplotlib.pyplot", "meshio", "numba", "pandas",
+    "ffcx", "gmsh", "matplotlib.backends.backend_agg", "matplotlib.pyplot", "meshio", "numba", "pandas",
     "pyvista.plotting", "scipy.signal", "scipy.sparse.linalg", "scipy.spatial", "snakemake.cli", "ufl",
     "reflowshock.fem.elements.element", "reflowshock.fem.kernels.box_rows", "reflowshock.fem.kernels.levels",
     "reflowshock.fem.kernels.nonlinear", "reflowshock.fem.mesh.mesh", "reflowshock.fem.problem.inputs",
@@ -97,6 +98,7 @@ def serve(client: str, listener: socket.socket) -> None:
 
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
+    compile_once()
     numba.njit(lambda value: value)(0)  # what the first kernel of a process has Numba load
     gc.freeze()  # to look at what is loaded would copy its memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:

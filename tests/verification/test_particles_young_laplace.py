@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.reference.young_laplace import NoMeridian, cap_angle, joint_meridian, sessile_meridian
+from reflowshock.particles.reference.young_laplace import (
+    NoMeridian,
+    cap_angle,
+    joint_meridian,
+    sessile_meridian,
+    sessile_section,
+)
 
 GAMMA, RADIUS = 0.4985, 0.24e-3
 
@@ -100,3 +106,24 @@ def test_drop_with_weight(degrees, bond, height, base, width):
     """Bashforth-Adams, lengths over V^(1/3), reference values to five digits."""
     drop = sessile_meridian(1.0, np.radians(degrees), 1.0, bond)
     assert (drop.height, 2 * drop.r[0], drop.max_width) == pytest.approx((height, base, width), abs=2e-5)
+
+
+@pytest.mark.parametrize("degrees", [30, 60, 90, 120, 148])
+def test_a_section_without_weight_is_a_segment_of_a_circle(degrees):
+    """A = R^2 (theta - sin theta cos theta), h = R (1 - cos theta)."""
+    angle = np.radians(degrees)
+    radius = np.sqrt(2.0 / (angle - np.sin(angle) * np.cos(angle)))
+    drop = sessile_section(2.0, angle, 3.0)
+    assert drop.height == pytest.approx(radius * (1.0 - np.cos(angle)), rel=1e-6)
+    assert drop.max_width == pytest.approx(2.0 * radius * np.sin(min(angle, 0.5 * np.pi)), rel=2e-6)
+    assert drop.pressure == pytest.approx(3.0 / radius, rel=1e-6)
+
+
+@pytest.mark.parametrize(("degrees", "bond"), [(60, 1.0), (60, 5.0), (120, 1.0), (148, 5.0)])
+def test_a_section_with_weight_is_in_balance(degrees, bond):
+    """Of one half across the middle, of the whole on the wall: forces along both axes vanish."""
+    angle = np.radians(degrees)
+    drop = sessile_section(1.0, angle, 1.0, bond)
+    across = drop.pressure * drop.height - 0.5 * bond * drop.height**2
+    assert across == pytest.approx(1.0 - np.cos(angle), rel=1e-6)
+    assert 2.0 * drop.r[0] * drop.pressure == pytest.approx(bond + 2.0 * np.sin(angle), rel=1e-6)

@@ -49,7 +49,8 @@ def _joints(case: PackageCase, outlook: PackageForecast) -> str:
     distinct = f"up to {outlook.distinct}" if outlook.load_steps else f"{outlook.distinct}"
     heated = f", {outlook.load_steps} load steps with liquid solder" if outlook.load_steps else ""
     ranks = f", on {case.reflow.ranks} MPI ranks" if case.reflow.ranks is not None else ""
-    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{heated}{ranks}"
+    scheme = ", by ISPG" if case.solder.numerics.scheme == "ispg" else ""
+    return f"{outlook.joints} joints, {distinct} of them distinct, {particles} particles each{scheme}{heated}{ranks}"
 
 
 def _expected(shock: ShockForecast, seconds: float) -> str:

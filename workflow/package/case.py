@@ -106,14 +106,22 @@ class PackageCase(Case):
 
     @classmethod
     def completed(cls, table: dict) -> dict:
-        """With temperatures take large time steps: load steps are at rest, only the shape there counts."""
+        """With temperatures take large time steps: load steps are at rest, only the shape there counts.
+
+        Without, and with inertia, take the scheme ispg, which costs less than tetrahedra.
+        """
         solder = table.get("solder")
-        if "thermal" not in table or not isinstance(solder, dict):
+        if not isinstance(solder, dict):
             return table
-        numerics = solder.get("numerics", {})
-        if isinstance(numerics, dict):
-            numerics = {"time_step_limit": LARGE_STEPS} | numerics
-        return table | {"solder": solder | {"numerics": numerics}}
+        numerics, effects = solder.get("numerics", {}), solder.get("effects")
+        chosen: dict[str, object] = {}
+        if "thermal" in table:
+            chosen["time_step_limit"] = LARGE_STEPS
+        elif isinstance(effects, dict) and effects.get("inertia") == "on":
+            chosen["scheme"] = "ispg"
+        if not chosen or not isinstance(numerics, dict):
+            return table
+        return table | {"solder": solder | {"numerics": chosen | numerics}}
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

@@ -1,7 +1,7 @@
 """What stages found: metrics and health checks in the form of ``summary.json``, with the limits of health."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_
 
 WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
 VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
+ENERGY_IMBALANCE = 0.02  # of what a joint's surface has at the start
 SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
 VOLUME_ERROR = 0.003  # of a joint's hexahedra, against its closed surface
 SCALED_JACOBIAN = 0.2
@@ -43,6 +44,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     closed = [joint for joint in flowed if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
     width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
     drift = worst(joint["metrics"]["volume_drift"]["value"] for joint in flowed)
+    of_motion = _of_motion([joint["metrics"] for joint in flowed if "energy_imbalance" in joint["metrics"]])
     return Findings(
         metrics={
             "distinct_shapes": metric(len({joint["shape"] for joint in flowed})),
@@ -51,15 +53,44 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
             "joint_width_error_max": metric(width_error),
             "joints_compared_in_width": metric(len(closed)),
             "joint_volume_drift_max": metric(drift),
-        },
+        }
+        | of_motion.metrics,
         health={
             "joint_width_error_max": at_most(width_error, WIDTH_ERROR),
             "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
             "joints_bridged": at_most(count("bridged"), 0),
             "joints_open": at_most(count("open"), 0),
             "joints_not_ok": at_most(len(joints) - count("ok") - count("given"), 0),
-        },
+        }
+        | of_motion.health,
         effects=dict(effects),
+    )
+
+
+def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
+    """Judge joints that flowed with an account of their energy, by their metrics; nothing where there are none."""
+    if not joints:
+        return Findings()
+
+    def values(name: str) -> list[float]:
+        return [joint[name]["value"] for joint in joints if name in joint]
+
+    imbalance, lost = worst(values("energy_imbalance")), sum(values("particles_lost"))
+    times = [time for time in values("time_at_rest") if time == time]
+    return Findings(
+        metrics={
+            "joints_at_rest": metric(int(sum(values("at_rest")))),
+            "joint_time_at_rest_max": metric(worst(times), "s"),
+            "joint_steps_max": metric(max(values("steps"), default=0)),
+            "joint_energy_imbalance_max": metric(imbalance),
+            "joint_viscous_loss_max": metric(max(values("viscous_loss"))),
+            "joint_smoothing_loss_max": metric(max(values("smoothing_loss"))),
+            "joint_particles_lost": metric(int(lost)),
+        },
+        health={
+            "joint_energy_imbalance_max": at_most(imbalance, ENERGY_IMBALANCE),
+            "joint_particles_lost": at_most(int(lost), 0),
+        },
     )
 
 

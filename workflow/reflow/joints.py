@@ -145,7 +145,7 @@ def bridge_shapes(
 ) -> "dict[str, JointShape]":
     """Flow the two joints that overlap most into one: its shape under both names, "A9+A10"; nothing where none touch.
 
-    The bridge is a picture of what happens: its joints are taken as upright and in line.
+    The bridge is a picture of what happens: its joints are taken as upright and in line, and relax to rest.
 
     Args:
         found: the pairs that touch, the largest overlap first.
@@ -157,17 +157,24 @@ def bridge_shapes(
     from reflowshock.particles.steps.rest import NoRest
     from reflowshock.particles.surface.cloud_level_set import CannotRebuild
 
-    bridges = {}
+    bridges, relaxing = {}, _relaxing(solder)
     reflowed = [pair for pair in found if pair.first in geometries and pair.second in geometries]
     for pair in reflowed[:1]:
         ends = [replace(geometries[end], offset=(0.0, 0.0), tilt=(0.0, 0.0)) for end in (pair.first, pair.second)]
         name = f"{pair.first}+{pair.second}"
         try:
-            alone = [solve_joint(end, solder) for end in ends]
-            bridges[name] = solve_bridge(ends, alone, pair.distance, solder)
+            alone = [solve_joint(end, relaxing) for end in ends]
+            bridges[name] = solve_bridge(ends, alone, pair.distance, relaxing)
         except (CannotRebuild, NoRest) as error:  # the verdict stands without it
             logger.warning("%s are bridged, but their common body was not found: %s", name, error)
     return bridges
+
+
+def _relaxing(solder: Solder) -> Solder:
+    """The solder without motion, by the default scheme."""
+    numerics = solder.numerics.model_copy(update={"scheme": "energy"})
+    effects = solder.effects.model_copy(update={"inertia": "off", "viscosity": "off"})
+    return solder.model_copy(update={"numerics": numerics, "effects": effects})
 
 
 def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[str] = ("bridged", "open")) -> None:

@@ -1,14 +1,10 @@
 """Pictures by matplotlib, for pages and files that are no report of a run."""
 
-import io
-
 import matplotlib
 
 matplotlib.use("Agg")
-from matplotlib import pyplot
+from matplotlib import pyplot as pyplot
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-from reflowshock.workflow.process.terminal import visible
 
 STYLE = {
     "font.size": 9,
@@ -16,7 +12,6 @@ STYLE = {
     "grid.alpha": 0.25,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "svg.fonttype": "none",
     "font.family": "sans-serif",
     "text.usetex": False,
     "text.parse_math": False,  # a dollar sign in a title or a name is no formula
@@ -28,12 +23,3 @@ def plain_ticks(axis) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
-
-
-def svg(figure) -> str:
-    """Return a figure as an SVG element, and close it."""
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg")
-    pyplot.close(figure)
-    text = stream.getvalue()
-    return visible(text[text.index("<svg") :])

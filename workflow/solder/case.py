@@ -30,13 +30,10 @@ class SolderCase(Case):
     @property
     def decided(self) -> tuple[Solder, str]:
         """The solder as the solver takes it, and why it has its scheme; no words where the case says it."""
-        scene = getattr(self, self.kind)
-        solder = self.solder.resolve(scene, self.gravity)
-        if self.solder.numerics.scheme != "auto":
-            return solder, ""
         from reflowshock.particles.parameters.scene_checks import with_scheme
 
-        return with_scheme(scene, solder)
+        scene = getattr(self, self.kind)
+        return with_scheme(scene, self.solder.resolve(scene, self.gravity), self.solder.numerics.scheme)
 
 
 class DropCase(SolderCase):

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.text import number, percent, quantity
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.curves import MICRO, MILLI, TIME
 from reflowshock.workflow.report.particles import particle_scene
 from reflowshock.workflow.report.tables import figures_of, limited_metrics
+from reflowshock.workflow.solder.case import DropCase
 
 DEGREE = np.pi / 180.0
 HEADLINE = (
@@ -21,7 +23,7 @@ HEADLINE = (
 )  # fmt: skip
 
 
-def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> None:
+def add_solder(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
     """Add the section on solder alone."""
     if not (run_folder / "reflow" / "shape.h5").exists():
         return
@@ -30,12 +32,13 @@ def add_solder(run_folder: Path, kind: str, context: dict, summary: dict) -> Non
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = figures_of(HEADLINE, summary["metrics"], _text)
     context["tables"]["body"] = limited_metrics(summary["metrics"], summary["health"], _text)
-    if kind == "oscillation":
+    if case.kind == "oscillation":
         context["curves"]["swing"] = swing_curve(shape.history, summary["metrics"])
     else:
         if shape.verdict != "apart":
-            axis = middle(shape.surface_points) if kind == "drops" else 0.0
-            context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian)
+            axis = middle(shape.surface_points) if case.kind == "drops" else 0.0
+            is_plane = isinstance(case, DropCase) and case.drop.section == "plane"
+            context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian, is_plane)
         context["curves"]["body_history"] = history_curve(shape.history)
     path = run_folder / "reflow" / "path.json"
     if path.exists() and "pull" not in shape.history:
@@ -48,15 +51,19 @@ def middle(points: np.ndarray) -> np.ndarray:
     return 0.5 * (points.min(axis=0) + points.max(axis=0)) * np.array([1.0, 1.0, 0.0])
 
 
-def profile_curve(points: np.ndarray, meridian: np.ndarray | None) -> list[Chart]:
-    """Return radius against height of the surface particles `(s, 3)` [m], and the exact meridian `(2, k)` [m]."""
-    order = np.argsort(points[:, 2])
-    radius, height = np.hypot(points[:, 0], points[:, 1])[order] / MILLI, points[order, 2] / MILLI
+def profile_curve(points: np.ndarray, meridian: np.ndarray | None, is_plane: bool = False) -> list[Chart]:
+    """Return radius against height of the surface particles `(s, 3)` [m], and the exact meridian `(2, k)` [m].
+
+    Of a drop that is the same along y the distance from its middle.
+    """
+    order, sideways = np.argsort(points[:, 2]), 0.0 if is_plane else 1.0
+    radius, height = np.hypot(points[:, 0], sideways * points[:, 1])[order] / MILLI, points[order, 2] / MILLI
     lines = [Series("surface particles", height, radius, line="none", marks=True)]
     if meridian is not None:
         upwards = np.argsort(meridian[1], kind="stable")
         lines.append(Series("Young-Laplace", meridian[1][upwards] / MILLI, meridian[0][upwards] / MILLI, RED))
-    return [Chart(Axis("height [mm]"), Axis("radius [mm]"), lines, is_upright=True)]
+    label = "distance from the middle [mm]" if is_plane else "radius [mm]"
+    return [Chart(Axis("height [mm]"), Axis(label), lines, is_upright=True)]
 
 
 def history_curve(history: dict) -> list[Chart]:

@@ -12,16 +12,23 @@ from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid, Joint, L
 from reflowshock.particles.parameters.solder import Solder
 
 if TYPE_CHECKING:
+    from reflowshock.particles.steps.flow import LiquidFlow
     from reflowshock.particles.steps.shape import JointShape
 
-SHAPE = {"volume_drift": "", "energy_rise": "", "energy_over_start": "", "capillary_number_at_rest": "", "steps": ""}
+SHAPE = {
+    "volume_drift": "",
+    "energy_rise": "",
+    "energy_over_start": "",
+    "energy_imbalance": "",
+    "capillary_number_at_rest": "",
+    "particles_lost": "",
+    "steps": "",
+}
 ERRORS_OF_DROP = {
     "height_error": "",
     "max_width_error": "",
     "contact_angle_error": "deg",
     "contact_angle_excess": "deg",
-    "energy_imbalance": "",
-    "particles_lost": "",
     "spread_max": "",
 }
 ERRORS_OF_PAIR = {"radius_error": "", "place_error": "", "drops_left": ""}
@@ -56,7 +63,7 @@ class MoltenScene(Parameters):
         if self.bond is not None:
             gravity = self.bond * solder.surface_tension / (solder.density * solder.volume ** (2.0 / 3.0))
             solder = solder.model_copy(update={"gravity": gravity})
-        return with_scheme(scene, solder)[0] if self.solder.numerics.scheme == "auto" else solder
+        return with_scheme(scene, solder, self.solder.numerics.scheme)[0]
 
     def measured(self, shape: "JointShape") -> dict[str, Measured]:
         """All that a shape tells, with the energy of its history.
@@ -74,6 +81,12 @@ class DropTrial(MoltenScene):
     """A drop on a wall or pad, or free."""
 
     drop: Drop
+
+
+class RestTrial(DropTrial):
+    """A drop, and for how many steps it is left alone at rest."""
+
+    steps: int = Field(gt=0)
 
 
 class JointTrial(MoltenScene):
@@ -104,6 +117,46 @@ def drop(parameters: DropTrial) -> dict[str, Measured]:
     solder = parameters.molten(parameters.drop)
     _refuse(drop_problems(parameters.drop, solder))
     return parameters.measured(drop_to_rest(parameters.drop, solder).shape)
+
+
+def rest(parameters: RestTrial) -> dict[str, Measured]:
+    """Bring a drop to rest, and go on as long: what moves then, creeps.
+
+    Speed is the largest of a vertex along its normal in the last half, over gamma / mu; the centre moves along the
+    wall, over V^(1/3); changes of height, width and energy are over those at rest.
+    """
+    from reflowshock.particles.parameters.scene_checks import drop_problems
+    from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
+    from reflowshock.particles.scenes.metrics import body_metrics, particles_lost
+
+    solder = parameters.molten(parameters.drop)
+    _refuse(drop_problems(parameters.drop, solder))
+    flow, run = flow_to_rest(parameters.drop, solder)
+    if not run.at_rest:
+        raise ArithmeticError(f"not at rest after {flow.steps} steps")
+    before, place, energy = flow.profile(), _centre(flow), run.records[-1].energy
+    records = [flow.step() for _ in range(parameters.steps)]
+    after, late = flow.profile(), records[len(records) // 2 :]
+    imbalance = body_metrics(solder, None, flow, run)["energy_imbalance"]
+    found = {
+        "volume_drift": flow.body.cloud.parts * flow.body.volume()[0] / solder.volume - 1.0,
+        "height_drift": after.drop_height(1) / before.drop_height(1) - 1.0,
+        "width_drift": after.max_width / before.max_width - 1.0,
+        "place_drift": float(np.linalg.norm(_centre(flow) - place)) / solder.volume ** (1.0 / 3.0),
+        "energy_drift": records[-1].energy / energy - 1.0,
+        "energy_imbalance": imbalance[0],
+        "late_capillary_number": max(record.speed for record in late) * solder.viscosity / solder.surface_tension,
+        "particles_lost": particles_lost(flow.body),
+    }
+    return {name: Measured(float(value)) for name, value in found.items()}
+
+
+def _centre(flow: "LiquidFlow") -> np.ndarray:
+    """Centre of volume of a drop along its wall `(2,)` [m]."""
+    from reflowshock.particles.core.surface_measure import centre_of_volume
+
+    body = flow.body
+    return centre_of_volume(body.points, body.triangles)[:2]
 
 
 def joint(parameters: JointTrial) -> dict[str, Measured]:
@@ -181,8 +234,19 @@ MEASURES_OF_SWING = {
     "energy_rise": "",
     "energy_over_start": "",
 }
+MEASURES_OF_REST = (
+    "volume_drift",
+    "height_drift",
+    "width_drift",
+    "place_drift",
+    "energy_drift",
+    "energy_imbalance",
+    "late_capillary_number",
+    "particles_lost",
+)
 TRIALS = {
     "drop": Trial(DropTrial, drop, SHAPE | ERRORS_OF_DROP),
+    "rest": Trial(RestTrial, rest, dict.fromkeys(MEASURES_OF_REST, "")),
     "joint": Trial(JointTrial, joint, SHAPE | ERRORS_OF_JOINT),
     "drops": Trial(PairTrial, pair, SHAPE | ERRORS_OF_DROP | ERRORS_OF_PAIR),
     "swing": Trial(SwingTrial, swing, MEASURES_OF_SWING),

@@ -139,6 +139,24 @@ def test_a_collapse_that_would_pinch_the_surface_off_is_left_out():
     assert np.array_equal(new.triangles, triangles)
 
 
+def test_a_tip_of_three_triangles_on_a_narrow_base_is_cut_off():
+    """A corner of a cube became a thread: its three neighbours drew together, and swung with up to 2.5 m/s."""
+    angle = 2.0 * np.pi * np.arange(3) / 3.0
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    foot, waist = (np.column_stack((radius * circle, np.full(3, z))) for radius, z in ((1, 0), (0.2, 1)))
+    points = np.concatenate((foot, waist, [[0.0, 0.0, 2.0]]))
+    sides = [(i, j, 3 + i) for i, j in ((0, 1), (1, 2), (2, 0))]
+    sides += [(j, 3 + j, 3 + i) for i, j in ((0, 1), (1, 2), (2, 0))]
+    tip = [(3 + i, 3 + j, 6) for i, j in ((0, 1), (1, 2), (2, 0))]
+    new = collapse_short(points, np.array([*sides, (2, 1, 0), *tip], np.int32), (), 0.5, on_rings=True)
+    assert np.array_equal(0.5 * (points[new.first] + points[new.second]), points[:6])
+    assert {tuple(np.sort(row)) for row in new.triangles} == {
+        tuple(sorted(row)) for row in [*sides, (0, 1, 2), (3, 4, 5)]
+    }
+    stays = collapse_short(points, np.array([*sides, (2, 1, 0), *tip], np.int32), (), 0.3, on_rings=True)
+    assert len(stays.triangles) == 10
+
+
 @pytest.mark.parametrize("change", [split_long, collapse_short])
 def test_contact_lines_change_only_where_they_may(change):
     """Tents: three long edges on the wall, or six of which one is short."""

@@ -85,7 +85,11 @@ def found_of(simulation: Simulation) -> dict[str, np.ndarray]:
     return found | {"viscosity": simulation.fields.viscosity[None], "builds": np.array([[simulation.particles.builds]])}
 
 
-@pytest.mark.parametrize("scene", SCENES)
+# The second impact has all that the first has, and more terms.
+LONG = {"small_impact": pytest.mark.long}
+
+
+@pytest.mark.parametrize("scene", [pytest.param(name, marks=LONG.get(name, ())) for name in SCENES])
 def test_a_gpu_computes_what_threads_compute(scene, tmp_path):
     simulation = stirred(scene, "cpu")
     simulation.step(1e-3 * simulation.time_step())

@@ -11,6 +11,7 @@ from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_
 from reflowshock.particles.surface.level_set import (
     Grid,
     LevelSet,
+    depths,
     extract_surface,
     relax,
     signed_distance,
@@ -67,6 +68,20 @@ def test_signed_distance_of_a_net_is_that_of_the_sphere():
     exact = ball(grid, (0, 0, 0), R)
     points, triangles = relax(exact, *extract_surface(exact), ())
     assert np.abs(signed_distance(points, triangles, grid).values - exact.values).max() < 0.1 * spacing
+
+
+def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
+    """Two balls of one net that overlap: between their sheets the nearest one faces the wrong way."""
+    points, triangles = extract_surface(ball(grid_around_ball((0, 0, 0), R, R / 8), (0, 0, 0), R))
+    aside = np.array([0.8 * R, 0.0, 0.0])
+    both = np.concatenate((points - aside, points + aside)), np.concatenate((triangles, triangles + len(points)))
+    grid = Grid.around(both[0], R / 7)
+    level = signed_distance(*both, grid)
+    nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
+    exact = np.minimum(*(np.linalg.norm(nodes - centre, axis=1) - R for centre in (-aside, aside)))
+    clear = np.abs(exact) > 0.05 * R
+    assert np.array_equal(level.values.ravel()[clear] < 0.0, exact[clear] < 0.0)
+    assert np.array_equal(depths(nodes[clear], both) > 0.0, exact[clear] < 0.0)
 
 
 def test_smooth_union_closes_gaps_narrower_than_half_its_reach():

@@ -259,8 +259,41 @@ def test_products_show_the_whole_body(drops):
     )
 
 
-def test_a_particle_outside_is_lost():
-    drop = Section.filled(block(MERIDIAN, 1.0, 1.0, 7), MERIDIAN)
+@pytest.fixture(scope="module")
+def plane_drop():
+    """At rest with its weight, Bond number 1; of a volume that is no cube of a unit."""
+    drop = Drop(volume=2e-9, contact_angle=np.radians(120.0), particles_per_edge=9, section="plane")
+    solder = solder_of(drop).model_copy(update={"gravity": 4.985 / (8930.0 * drop.edge**2)})
+    effects = solder.effects.model_copy(update={"gravity": "on"})
+    return drop, drop_to_rest(drop, solder.model_copy(update={"effects": effects}))
+
+
+def test_a_drop_in_a_plane_comes_to_its_exact_shape(plane_drop):
+    _, found = plane_drop
+    metrics = {name: value for name, (value, _) in found.shape.metrics.items()}
+    assert metrics["at_rest"] == 1.0
+    assert metrics["particles_lost"] == 0.0
+    assert metrics["height"] == pytest.approx(found.reference.height, rel=2e-3)
+    assert metrics["max_width"] == pytest.approx(found.reference.max_width, rel=1e-3)
+    assert metrics["shape_error"] < 2e-3
+    assert abs(metrics["volume_drift"]) < 1e-12
+    assert abs(metrics["energy_imbalance"]) < 1e-4
+    assert abs(metrics["mean_pressure_error"]) < 2e-3
+
+
+def test_products_show_a_piece_as_deep_as_the_cube(plane_drop):
+    drop, found = plane_drop
+    shape = found.shape
+    assert np.unique(shape.surface_points[:, 1]) == pytest.approx([-0.5 * drop.edge, 0.5 * drop.edge])
+    assert shape.rings[0].size == 4
+    x, y = shape.points[shape.rings[0], :2].T
+    area = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    assert area == pytest.approx(np.ptp(x) * drop.edge)  # the liquid is on the left of the contact line
+
+
+@pytest.mark.parametrize("chain", [MERIDIAN, PLANE], ids=["meridian", "plane"])
+def test_a_particle_outside_is_lost(chain):
+    drop = Section.filled(block(chain, 1.0, 1.0, 7), chain)
     assert particles_lost(drop) == 0
     drop.points[-1] += [1.5, 0.0, 0.0]
     assert particles_lost(drop) == 1

@@ -151,15 +151,16 @@ def test_a_board_at_rest_is_drawn_as_it_is():
     assert exaggeration(0.1, 0.0) == 1.0
 
 
-def test_dollars_and_backslashes_are_no_formulas():
-    from reflowshock.workflow.report.drawing import STYLE, pyplot, svg
+def test_dollars_and_backslashes_are_no_formulas(tmp_path):
+    from reflowshock.workflow.report.drawing import STYLE, pyplot
 
     with pyplot.rc_context(STYLE):
         figure, axis = pyplot.subplots()
         axis.set(title=r"$\frac{$", xlabel=r"50 $ a $x^$")
         axis.plot([0, 1], label=r"$\nothing$")
         axis.legend()
-    assert svg(figure).startswith("<svg")
+    figure.savefig(tmp_path / "picture.png")
+    pyplot.close(figure)
 
 
 def test_pages_take_no_text_for_code(tmp_path):

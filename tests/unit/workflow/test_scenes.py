@@ -252,25 +252,26 @@ def test_the_scheme_is_ours_unless_the_seeds_is_asked_for():
 
 
 ISPG = ("drop.particles_per_edge=11",)
+HELD = "volume='1 mm^3',receding_angle='60 deg',advancing_angle='90 deg'"
 
 
 @pytest.mark.parametrize(
     ("setting", "place"),
     [
         ("drop={volume='1 mm^3',contact_angle='5 deg',pad_radius='2 mm'}", "contact angles outside 30 deg to 148 deg"),
-        ("drop.contact_angle=155 deg", "contact angles outside 30 deg to 148 deg"),
+        ("drop.contact_angle=155 deg", "contact angles outside 15 deg to 148 deg"),
         ("drop={volume='1 mm^3',particles_per_edge=13}", "13 particles along an edge of a free drop (for 7 to 11"),
         ("drop={volume='1 mm^3',symmetry='half'}", "parts of free drops"),
         ("drop.particles_per_edge=17", "17 particles along an edge (for 5 to 15 it is)"),
-        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=5}", "contact angles outside 30 deg to 148"),
+        ("drop={volume='1 mm^3',contact_angle='14 deg',particles_per_edge=5}", "contact angles outside 15 deg to 148"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',particles_per_edge=9}", "edge below 30 deg (for 5 to 7 it is)"),
+        ("drop={volume='1 mm^3',contact_angle='20 deg',symmetry='half'}", "contact angles outside 30 deg to 148 deg"),
+        ("drop={volume='1 mm^3',contact_angle='45 deg',section='plane'}", "contact angles outside 60 deg to 148 deg"),
         (
             "drop={volume='1 mm^3',receding_angle='20 deg',advancing_angle='60 deg',particles_per_edge=7}",
             "contact angles",
         ),
-        (
-            "drop={volume='1 mm^3',receding_angle='50 deg',advancing_angle='60 deg'}",
-            "11 particles along an edge (for 6 to 9",
-        ),
+        (f"drop={{{HELD}}}", "11 particles along an edge (for 6 to 9"),
     ],
 )
 def test_the_scheme_ispg_is_refused_where_it_is_not_verified(setting, place):
@@ -314,7 +315,7 @@ def test_a_drop_that_strikes_a_wall_is_refused_where_that_is_not_verified(settin
     ("setting", "message"),
     [
         ("solder.numerics.scheme=energy", 'needs the scheme "ispg"; allowed: ispg'),
-        ("drop.section=plane", "one of none, axisymmetric"),
+        ("drop.section=oblique", "one of none, axisymmetric, plane"),
         ("drop.pad_radius=0.4 mm", "not of a pad; allowed: none"),
         ("drop={volume='1 mm^3',section='axisymmetric'}", "not of a free drop; allowed: none"),
         ("drop.symmetry=half", "not of half of one; allowed: none"),
@@ -322,12 +323,15 @@ def test_a_drop_that_strikes_a_wall_is_refused_where_that_is_not_verified(settin
         ("drop.particles_per_edge=7", "7 particles along an edge (for 8 to 21 it is)"),
         ("solder.effects.inertia=off", "drops without inertia"),
         ("solder.wall=no-slip", "not of one that rubs on it; allowed: none"),
+        ("drop.speed=4.7 m/s", "an impact is not verified with a section"),
+        (f"drop={{{HELD},section='axisymmetric'}}", "hysteresis in section"),
     ],
 )
-def test_a_drop_is_refused_in_section_where_that_is_not_verified(setting, message):
-    asked = ["drop.section=axisymmetric", "solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
-    assert read_case(DROP, asked).drop.particles == 77
-    assert message in problems_of(DROP, *asked, setting)
+@pytest.mark.parametrize(("section", "particles"), [("axisymmetric", 77), ("plane", 121)])
+def test_a_drop_is_refused_in_section_where_that_is_not_verified(section, particles, setting, message):
+    asked = [f"drop.section={section}", "solder.numerics.scheme=ispg", "solder.effects.inertia=on"]
+    assert read_case(DROP, asked).drop.particles == particles
+    assert message in problems_of(DROP, *asked, setting.replace("axisymmetric", section))
 
 
 def test_the_scheme_ispg_takes_planes_of_symmetry():
@@ -343,6 +347,7 @@ def test_the_scheme_ispg_takes_planes_of_symmetry():
         (DROP, "solder.effects.inertia=on", "ispg", "costs less than tetrahedra"),
         (DROP, "solder.effects.inertia=off", "energy", "without inertia"),
         (DROP, "drop.section=axisymmetric", "ispg", "no other scheme"),
+        (DROP, "drop.section=plane", "ispg", "no other scheme"),
         (DROP, "drop.particles_per_edge=21", "energy", "(for 5 to 15 it is)"),
         (PAIR, "drops.spacing=0.07 mm", "energy", "(up to 2000 it is)"),
         (JOINT, "solder.wall=no-slip", "ispg", "costs less"),

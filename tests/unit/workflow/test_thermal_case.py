@@ -68,6 +68,7 @@ FAULTS = {
         [*PAPER, MOVED[0], 'thermal.corner_displacement="-0.25 mm"'],
         ['thermal.corner_displacement = "-0.25 mm"', "leaves 0.06 mm of the 0.31 mm gap", "> -0.2376 mm"],
     ),
+    "ispg": (["thermal.steps=1", "solder.numerics.scheme=ispg"], ['scheme = "ispg"', "load steps of [thermal]"]),
     "switch": (["thermal.effects.flexible=yes"], ["one of auto, on, off"]),
     "steps": (["thermal.steps=0"], [">= 1 and <= 200"]),
     "warped twice": (

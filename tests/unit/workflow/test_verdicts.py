@@ -40,6 +40,21 @@ def test_health_counts_them(records):
     assert health["joint_width_error_max"]["ok"]
 
 
+def test_joints_with_an_account_of_their_energy_are_judged_by_it(records):
+    assert "joint_particles_lost" not in findings.of_reflow(records, {}).health
+    moved = {"energy_imbalance": -1e-3, "particles_lost": 0.0, "at_rest": 1.0, "time_at_rest": 2e-3, "steps": 80.0}
+    moved |= {"viscous_loss": 1e-5, "smoothing_loss": 0.01}
+    for record in records.values():
+        record["metrics"] |= {name: {"value": value, "unit": ""} for name, value in moved.items()}
+    records["A4"]["metrics"] |= {"at_rest": {"value": 0.0}, "time_at_rest": {"value": float("nan")}}
+    found = findings.of_reflow(records, {})
+    assert found.health["joint_energy_imbalance_max"]["ok"] and found.health["joint_particles_lost"]["ok"]
+    assert (found.metrics["joints_at_rest"]["value"], found.metrics["joint_time_at_rest_max"]["value"]) == (3, 2e-3)
+    records["A1"]["metrics"] |= {"energy_imbalance": {"value": -0.03}, "particles_lost": {"value": 1.0}}
+    found = findings.of_reflow(records, {})
+    assert not found.health["joint_energy_imbalance_max"]["ok"] and not found.health["joint_particles_lost"]["ok"]
+
+
 def test_widths_are_judged_to_one_per_cent_and_counted(records):
     """A joint that leans has no reference, and is not counted as one that keeps to it."""
     assert findings.of_reflow(records, {}).metrics["joints_compared_in_width"]["value"] == 3

@@ -1,0 +1,264 @@
+"""Tables of particles/ispg/README.md: what the scheme ispg finds in every kind of scene, and what it costs.
+
+    PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/ispg_tables.py drops joints
+    ... benchmarks/ispg_tables.py --list                       (tables and their rows)
+    ... benchmarks/ispg_tables.py drops --only "7," --again    (rows whose name begins so; as if they were not stored)
+
+A row is a case of this repository with some settings, as `reflowshock run CASE --set ...` takes them, computed without
+products. Each is stored in results/ispg_tables.json as soon as it is there and is not computed again: after a change
+of the scheme give --again, or remove the file. All rows take an hour of one core. Seconds are those of the processor,
+without loading.
+"""
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
+from reflowshock.particles.scenes.drop_pair import pair_to_rest
+from reflowshock.particles.scenes.free_drop import solve_oscillation
+from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.solder import stages
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results" / "ispg_tables.json"
+Molten = DropCase | JointCase | DropsCase | OscillationCase
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A case with its settings, which are those of the option --set."""
+
+    name: str
+    case: str
+    settings: tuple[str, ...]
+
+
+MOVES = ("solder.numerics.scheme=ispg", "solder.effects.inertia=on", "solder.numerics.time_step_limit=100")
+PAPER = (*MOVES, "solder.parameters=paper")
+SLIP, NO_SLIP = ("solder.wall=slip", "solder.slip_length=0.05 mm"), ("solder.wall=no-slip",)
+WALLS = {"free slip": (), "slip": SLIP, "no slip": NO_SLIP}
+VOLUMES = (0.0141, 0.0564, 0.1077, 0.1218, 0.2298)  # of example 4.2 [mm^3]
+# Acceleration of 1 mm^3 at a Bond number of one, gamma / (rho V^(2/3)) [m/s^2].
+HEAVY = 4.985 / (8930.0 * 1e-6)
+
+
+def drop(count: int, degrees: float, *settings: str, name: str = "") -> Row:
+    """Example 4.1 at another angle and resolution."""
+    given = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
+    return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *given))
+
+
+def heavy(count: int, degrees: float, bond: float, *settings: str) -> Row:
+    """The same under its weight."""
+    weight = ("gravity=on", f"solder.gravity={bond * HEAVY:.6g} m/s^2")
+    return drop(count, degrees, *weight, *settings, name=f"Bond number {bond:g}")
+
+
+def between(count: int, receding: float, advancing: float, wall: str = "free slip", symmetry: str = "none") -> Row:
+    """The same cube on a wall with hysteresis."""
+    angles = f"receding_angle='{receding:g} deg',advancing_angle='{advancing:g} deg'"
+    table = f"drop={{volume='1 mm^3',{angles},particles_per_edge={count},symmetry='{symmetry}'}}"
+    name = f"{count}, {receding:g} to {advancing:g} deg, {wall}" + (f", {symmetry}" if symmetry != "none" else "")
+    return Row(name, "sessile_drop", (*PAPER, *WALLS[wall], table))
+
+
+def ball(volume: float, count: int, wall: str = "free slip") -> Row:
+    """Example 4.2 at another resolution."""
+    given = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
+    return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *given))
+
+
+def joint(spacing: float, name: str, *settings: str) -> Row:
+    """The joint of the case with other settings."""
+    return Row(f"{spacing} mm, {name}", "solder_joint", (*PAPER, f"joint.spacing={spacing} mm", *settings))
+
+
+def standing(spacing: float, standoff: float) -> Row:
+    """A joint between plates that hold still."""
+    return joint(spacing, f"{standoff:.2f} mm", f"joint.standoff={standoff} mm")
+
+
+def floating(free: str, *settings: str) -> Row:
+    """A package on one joint under 1 mN."""
+    return joint(0.06, free, f"joint.package={{load='1 mN',free={json.dumps(free.split(', '))}}}", *settings)
+
+
+def pulled(spacing: float, speed: float) -> Row:
+    """A package that is pulled off at a speed [mm/s]."""
+    return joint(spacing, f"{speed:g} mm/s", f"joint.path={{standoff='1.2 mm',speed='{speed:g} mm/s'}}")
+
+
+def swing(shells: int, steps: int) -> Row:
+    """A free drop of real solder, 0.1 R, two periods."""
+    count = 1 + sum(10 * shell**2 + 2 for shell in range(1, shells + 1))
+    given = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
+    return Row(f"{count}, {steps} steps a period", "oscillating_drop", ("oscillation.scheme=ispg", *given))
+
+
+def section(count: int, degrees: float, *settings: str, bond: float = 0.0) -> Row:
+    """The meridian of a drop."""
+    cut = ("drop.section=axisymmetric", *settings)
+    return heavy(count, degrees, bond, *cut) if bond else drop(count, degrees, *cut)
+
+
+def merging(spacing: float, on_wall: bool) -> Row:
+    """Drops of 0.5 and 0.25 mm^3 that become one."""
+    wall = ("drops.contact_angle=60 deg", "drops.distance=1.3 mm") if on_wall else ()
+    name = f"{spacing:.2f} mm, {'60 deg' if on_wall else 'free'}"
+    return Row(name, "coalescence", (*PAPER, "gravity=off", f"drops.spacing={spacing} mm", *wall))
+
+
+TABLES: dict[str, list[Row]] = {
+    "drops": [drop(count, angle) for count in (5, 7, 9, 11, 13, 15) for angle in (60, 120)]
+    + [drop(count, angle) for count in (7, 11) for angle in (30, 148)],
+    "free": [
+        Row(str(count), "sessile_drop", (*PAPER, f"drop={{volume='1 mm^3',particles_per_edge={count}}}"))
+        for count in (7, 9, 11)
+    ],
+    # The largest cube of 7 particles an edge is too coarse for its pad.
+    "pads": [ball(volume, 7) for volume in VOLUMES[:-1]]
+    + [ball(volume, 11) for volume in VOLUMES]
+    + [ball(VOLUMES[-1], 9), ball(VOLUMES[-1], 9, "no slip")]
+    + [ball(0.0564, 7, "no slip"), ball(0.0141, 7, "slip"), ball(0.1077, 7, "slip")],
+    "joints": [standing(0.04, standoff) for standoff in (0.30, 0.35, 0.40, 0.45, 0.50)]
+    + [
+        joint(0.04, "offset 0.07 mm", "joint.offset=0.07 mm"),
+        joint(0.06, "tilt 3 deg", "joint.tilt=3 deg"),
+        joint(0.06, "0.30 mm, tilt 5 deg", "joint.standoff=0.3 mm", "joint.tilt=5 deg"),
+        joint(0.06, "no slip", *NO_SLIP),
+        standing(0.06, 0.22),
+    ],
+    "floating": [
+        floating("lift"),
+        floating("lift, shift", "joint.offset=0.072 mm"),
+        floating("lift, turn", "joint.tilt=3 deg"),
+    ],
+    "pulled": [pulled(0.06, 1000), pulled(0.06, 200), pulled(0.04, 200), pulled(0.06, 20)],
+    "weight": [heavy(7, 60, 5), heavy(7, 120, 1), heavy(5, 60, 5), heavy(11, 60, 1)],
+    "friction": [
+        drop(count, angle, *WALLS[wall], name=wall)
+        for count in (7, 6, 11)
+        for angle in (60, 120)
+        for wall in ("slip", "no slip")
+    ],
+    "symmetry": [
+        drop(7, 60, "drop.symmetry=half", name="half"),
+        drop(7, 60, "drop.symmetry=quarter", name="quarter"),
+        drop(7, 120, "drop.symmetry=half", name="half"),
+        drop(7, 60, "drop.symmetry=quarter", *SLIP, name="quarter, slip"),
+        drop(11, 60, "drop.symmetry=quarter", name="quarter"),
+    ],
+    "hysteresis": [
+        *(between(count, *angles) for count in (6, 7) for angles in ((30, 60), (60, 120), (100, 130))),
+        between(7, 60, 120, symmetry="quarter"),
+        between(7, 60, 120, "slip"),
+        between(7, 30, 60, "no slip"),
+        between(9, 60, 120),
+    ],
+    "section": [section(count, angle) for count in (11, 21) for angle in (60, 120)]
+    + [section(11, 30), section(11, 148), section(11, 60, bond=5)],
+    "swings": [swing(shells, 30) for shells in (3, 4, 5, 6, 7, 8)] + [swing(shells, 100) for shells in (4, 6)],
+    "impact": [
+        drop(count, 90, "drop.speed=4.74 m/s", *NO_SLIP, name="4.74 m/s") for count in (7, 9)
+    ],
+    "merging": [merging(0.15, True), merging(0.15, False), merging(0.13, True), merging(0.1, False)],
+    "real": [
+        Row("5, 60 deg", "sessile_drop", (*MOVES[:2], "drop.particles_per_edge=5", "drop.contact_angle=60 deg")),
+    ],
+}  # fmt: skip
+# Columns that are printed: metric, its head, factor, digits.
+COLUMNS = (
+    ("particles", "particles", 1.0, "{:.0f}"),
+    ("height_error", "height", 100.0, "{:+.2f} %"),
+    ("max_width_error", "width", 100.0, "{:+.2f} %"),
+    ("shape_error", "shape", 100.0, "{:.3f} %"),
+    ("waist_error", "waist", 100.0, "{:+.3f} %"),
+    ("axial_force_error", "force", 100.0, "{:+.2f} %"),
+    ("time_at_rest", "at rest after", 1e3, "{:.1f} ms"),
+    ("steps", "steps", 1.0, "{:.0f}"),
+    ("volume_drift", "volume", 1.0, "{:.0e}"),
+    ("energy_imbalance", "imbalance", 100.0, "{:+.5f} %"),
+    ("period_error", "period", 100.0, "{:+.1f} %"),
+    ("decay_rate_error", "decay", 100.0, "{:+.0f} %"),
+    ("core_seconds", "core-s", 1.0, "{:.1f}"),
+)
+
+
+def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]:
+    """Compute a case: its metrics under the program's names, and its health checks."""
+    match case:
+        case DropCase():
+            found = drop_to_rest(case.drop, case.molten)
+            findings = stages.of_drop(found.shape.metrics, found.shape.verdict, found.effects)
+        case JointCase():
+            found = joint_to_rest(case.joint, case.molten)
+            findings = stages.of_joint(found.shape.metrics, found.shape.verdict, found.effects)
+        case DropsCase():
+            found = pair_to_rest(case.drops, case.molten)
+            findings = stages.of_drops(found.shape.metrics, 1, found.effects)
+        case OscillationCase():
+            findings = stages.of_oscillation(solve_oscillation(case.oscillation, case.molten).metrics, {})
+    return findings.metrics, findings.health
+
+
+def compute(row: Row) -> dict[str, Any]:
+    """Metrics of a row [SI units], its core-seconds, and the health checks that do not hold; or why there are none."""
+    begin = process_time()
+    try:
+        metrics, health = judged(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
+    except (CaseError, RuntimeError) as error:  # refused, no rest, or a solve that failed: a row, too
+        return {"error": f"{type(error).__name__}: {error}", "core_seconds": process_time() - begin}
+    found: dict[str, Any] = {name: given["value"] for name, given in metrics.items()}
+    unmet = [name for name, check in health.items() if not check["ok"]]
+    return found | {"core_seconds": process_time() - begin, "unmet": unmet}
+
+
+def line(name: str, found: dict[str, Any]) -> str:
+    """A row as it is printed."""
+    if "error" in found:
+        return f"| {name} | {found['error'][:120]} ({found['core_seconds']:.0f} core-s)"
+    cells = [f"{head} {text.format(factor * found[key])}" for key, head, factor, text in COLUMNS if key in found]
+    return f"| {name} | " + " | ".join(cells) + (f" | NOT MET: {found['unmet']}" if found["unmet"] else "")
+
+
+def warm() -> None:
+    """Load and compile what most rows share."""
+    compute(drop(5, 60, "solder.numerics.max_steps=3"))
+
+
+def main() -> None:
+    """Compute the rows that are named and not stored."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
+    parser.add_argument("--only", default="", metavar="BEGINNING", help="of the names of rows")
+    parser.add_argument("--again", action="store_true", help="rows that are stored, too")
+    parser.add_argument("--list", action="store_true", help="print what there is and compute nothing")
+    given = parser.parse_args()
+    unknown = set(given.tables) - set(TABLES)
+    if unknown:
+        parser.error(f"no table {', '.join(sorted(unknown))}; there are {', '.join(TABLES)}")
+    RESULTS.parent.mkdir(exist_ok=True)
+    stored = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    is_warm = given.list
+    for table in given.tables or TABLES:
+        print(table, flush=True)
+        rows = stored.setdefault(table, {})
+        for row in (row for row in TABLES[table] if row.name.startswith(given.only)):
+            if (row.name not in rows or given.again) and not given.list:
+                if not is_warm:
+                    warm()
+                    is_warm = True
+                rows[row.name] = compute(row)
+                RESULTS.write_text(json.dumps(stored, indent=1))
+            print(line(row.name, rows[row.name]) if row.name in rows else f"| {row.name} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

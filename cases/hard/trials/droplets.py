@@ -1,0 +1,311 @@
+"""Trials of delta-SPH: droplets, tanks and printed parts, judged by energy, momentum, volume, walls, exact shapes."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from reflowshock.arrays import Floats
+from reflowshock.cases.hard.trial import Measured, Trial
+from reflowshock.parameters import Parameters, changed
+from reflowshock.particles.parameters.droplets import Droplet, cap
+from reflowshock.particles.parameters.flows import DamBreak
+from reflowshock.particles.parameters.printing import Printing
+from reflowshock.quantity import Quantity
+
+if TYPE_CHECKING:
+    from reflowshock.particles.sph.fluid_state import Fields
+    from reflowshock.particles.sph.simulation import Simulation
+
+# Steps after which energy, momentum and the like are looked at.
+LOOK = 10
+# In spacings: particles that are farther outside their surface are lost.
+OUTSIDE = 1.0
+# Of the time: "at rest" are means over the last share, the beginning is forgotten after the first.
+LATE, EARLY = 0.9, 0.1
+
+
+class Unrest(Parameters):
+    """Disorder of the particles at the start.
+
+    ``displaced`` is how far each is moved along each axis at most, over the spacing; ``density`` by how much that of
+    each differs at most, over that at rest. Both are drawn evenly from a seed.
+    """
+
+    displaced: float = Field(0.0, ge=0, le=0.3)
+    density: float = Field(0.0, ge=0, le=0.05)
+    seed: int = Field(1, ge=0)
+
+    def disturb(self, fields: "Fields", fluids: int, spacing: float) -> None:
+        """Displace the particles of a liquid, a spacing apart [m], in two or three dimensions; change densities."""
+        random = np.random.default_rng(self.seed)
+        for place in fields[:3]:
+            if np.ptp(place) > 0.0:
+                place[:fluids] += self.displaced * spacing * random.uniform(-1.0, 1.0, fluids)
+        fields.density[:fluids] *= 1.0 + self.density * random.uniform(-1.0, 1.0, fluids)
+
+
+class DropletTrial(Parameters):
+    """A droplet, or two equal ones, for the duration of the scene.
+
+    The second one lands beside the first, or they fly against each other along x, each with a speed, their paths so
+    many diameters apart. Where ``ends`` is given the liquid may part into drops that are too small, with a message that
+    has these words; measures are then those of the time before.
+    """
+
+    droplet: Droplet
+    pair: Literal["none", "beside", "against"] = "none"
+    approach: Annotated[float, Quantity("m/s")] = Field(0.0, ge=0)
+    offset: float = Field(0.0, ge=0, le=1)
+    unrest: Unrest = Unrest()
+    ends: str = ""
+
+
+class TankTrial(Parameters):
+    """A column of liquid in a tank, in a plane; at rest at its wall, or thrown at the other one from the middle.
+
+    With ``undiffused`` it is computed a second time, without diffusion of density, to compare their noise.
+    """
+
+    dam_break: DamBreak
+    thrown: Annotated[float, Quantity("m/s")] = Field(0.0, ge=0)
+    unrest: Unrest = Unrest()
+    undiffused: bool = False
+
+    @model_validator(mode="after")
+    def _fits(self) -> "TankTrial":
+        if self.dam_break.width > self.dam_break.tank_length:
+            raise ValueError("the column is wider than the tank")
+        return self
+
+
+class PrintTrial(Parameters):
+    """Drops that are printed."""
+
+    printing: Printing
+
+
+@dataclass(slots=True)
+class Watch:
+    """What is looked at while a liquid moves; called in every step."""
+
+    simulation: "Simulation"
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._look()
+
+    def __call__(self, fraction: float) -> None:
+        """Look, where it is time."""
+        if self.simulation.steps % LOOK == 0 or fraction >= 1.0:
+            self._look()
+
+    def _look(self) -> None:
+        one = self.simulation
+        fields, liquid = one.fields, slice(one.fluids)
+        mass, law = fields.mass[liquid], one.law
+        weight = -law.gravity_z * float(mass @ fields.z[liquid])
+        tension = one.surface.energy if one.surface else 0.0
+        momentum = [float(mass @ speed[liquid]) for speed in fields[3:6]]
+        centre = [float(mass @ place[liquid]) / float(mass.sum()) for place in fields[:3]]
+        self.rows.append(
+            (
+                one.time, one.kinetic_energy + tension + weight + one.elastic_energy, one.fastest,
+                float(np.hypot(momentum[0], momentum[1])) if law.mirror else float(np.linalg.norm(momentum)),
+                float(np.abs(fields.density[liquid] / law.rest_density - 1.0).max()),
+                float(one.pressures.mean()), *centre,
+            )
+        )  # fmt: skip
+
+    def measured(self) -> dict[str, Measured]:
+        """Measures that all liquids have."""
+        time, energy, fastest, momentum, squeezed, pressure, *centre = np.array(self.rows).T
+        law, mass = self.simulation.law, float(self.simulation.fields.mass[: self.simulation.fluids].sum())
+        later = np.maximum.accumulate(energy[::-1])[::-1]
+        early, late = (time >= share * time[-1] for share in (EARLY, LATE))
+        middle = early & (time <= 2.0 * EARLY * time[-1])
+        aside = np.hypot(*(place - place[early][0] for place in centre[:2]))
+        return _pure(
+            steps=self.simulation.steps,
+            energy_over_start=energy.max() / energy[0] - 1.0,
+            energy_rise=(later - energy).max() / abs(energy[0]),
+            mach=fastest.max() / law.sound,
+            density_change=squeezed.max(),
+            momentum=np.abs(momentum - momentum[0]).max() / (mass * fastest.max()) if fastest.max() else 0.0,
+            speed_growth=fastest[late].mean() / fastest[middle].mean(),
+            pressure_drift=pressure[late].mean() / pressure[middle].mean() - 1.0,
+            drift_aside=aside[early].max() / law.spacing,
+            volume_drift=self._volume() / (self.simulation.fluids * law.spacing**law.dimension) - 1.0,
+        )
+
+    def _volume(self) -> float:
+        fields, liquid = self.simulation.fields, slice(self.simulation.fluids)
+        return float((fields.mass[liquid] / fields.density[liquid]).sum())
+
+
+def droplet(parameters: DropletTrial) -> dict[str, Measured]:
+    """Let one droplet or two move."""
+    from reflowshock.particles.scenes.droplet import follow
+    from reflowshock.particles.sph.surface_care import SurfaceLost
+
+    scene, simulation = parameters.droplet, droplets(parameters)
+    watch, count, shapes = Watch(simulation), 1 + (parameters.pair != "none"), {}
+    try:
+        result = follow(scene, simulation, watch)
+        shapes = _shape(parameters, result.history, result.metrics)
+    except SurfaceLost as error:
+        if not parameters.ends or parameters.ends not in str(error):
+            raise
+        watch(1.0)
+    surface = simulation.surface
+    assert surface is not None
+    return watch.measured() | shapes | _pure(
+        followed=simulation.time / scene.unit_of_time,
+        surface_volume=surface.volume / (count * scene.volume) - 1.0,
+        outside=_outside(simulation),
+        below_wall=float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
+        mergers=sum(one.after < one.before for one in surface.meetings),
+    )  # fmt: skip
+
+
+def droplets(parameters: DropletTrial) -> "Simulation":
+    """Set up one droplet or two, and their disorder."""
+    from reflowshock.particles.scenes.droplet import droplet as alone
+    from reflowshock.particles.sph import flow
+    from reflowshock.particles.sph.simulation import Simulation
+    from reflowshock.particles.sph.surface_care import EDGE
+
+    scene = parameters.droplet
+    one = alone(scene)
+    fields, surface = one.fields, one.surface
+    assert surface is not None
+    if parameters.pair != "none":
+        points, corners, triangles = np.array(fields[:3]), surface.points.copy(), surface.triangles.copy()
+        gap = 0.5 * EDGE * one.law.spacing
+        aside = np.array([0.5 * (np.ptp(corners[:, 0])) + gap, 0.5 * parameters.offset * scene.diameter, 0.0])
+        both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
+        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+        fields.u[:] = parameters.approach * np.repeat([1.0, -1.0], points.shape[1])
+        fields.w[:] = -scene.impact_speed
+        surface.points = corners - aside
+        surface.add(corners + aside, triangles)
+    parameters.unrest.disturb(fields, len(fields.x), one.law.spacing)
+    return Simulation(fields, len(fields.x), one.law, surface, flow.device_of(scene))
+
+
+def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, Measured]:
+    """Errors of the shape that all liquid together would have at rest, and what an impact spread to."""
+    scene, late = parameters.droplet, history["time"] >= LATE * history["time"][-1]
+    mean = {name: float(column[late].mean()) for name, column in history.items()}
+    size = 1.0 if parameters.pair == "none" else 2.0 ** (1.0 / 3.0)
+    found = {
+        "capillary_number": metrics["capillary_number"][0],
+        "parts": history["parts"][-1],
+        "spread_max": history["spread"].max(),
+    }
+    if not scene.has_wall:
+        pressure = mean["mean_pressure"] / scene.laplace_pressure * size - 1.0
+        return _pure(**found, pressure_error=pressure, roundness=mean["roundness"])
+    base, height = cap(scene.angle)
+    errors = {"base_error": mean["base"] / (size * base) - 1.0, "height_error": mean["height"] / (size * height) - 1.0}
+    return _pure(**found, **errors)
+
+
+def _outside(simulation: "Simulation") -> float:
+    """Share of the particles that are farther outside their surface than `OUTSIDE`."""
+    from reflowshock.particles.surface.cloud_level_set import mirrored
+    from reflowshock.particles.surface.level_set import depths
+
+    surface = simulation.surface
+    assert surface is not None
+    closed = surface.points, surface.triangles
+    closed = mirrored(*closed) if simulation.law.mirror else closed
+    inside = depths(np.stack(simulation.fields[:3], axis=1), closed)
+    return float((inside < -OUTSIDE * simulation.law.spacing).mean())
+
+
+def tank(parameters: TankTrial) -> dict[str, Measured]:
+    """Let a column in a tank flow, or rest; noise is that of the pressure about that at rest, over rho g H."""
+    found, noise = _tank(parameters)
+    if parameters.undiffused:
+        rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
+        found["noise_gain"] = Measured(_tank(rough)[1] / noise)
+    return found
+
+
+def _tank(parameters: TankTrial) -> tuple[dict[str, Measured], float]:
+    from reflowshock.particles.scenes.dam_break import dam, particles_lost
+    from reflowshock.particles.sph import flow
+    from reflowshock.particles.sph.simulation import Simulation
+
+    scene = parameters.dam_break
+    one = dam(scene)
+    if parameters.thrown:
+        one.fields.u[: one.fluids] = parameters.thrown
+        one.fields.x[: one.fluids] += 0.5 * (scene.tank_length - scene.width)
+    parameters.unrest.disturb(one.fields, one.fluids, one.law.spacing)
+    simulation = Simulation(one.fields, one.fluids, one.law, device=flow.device_of(scene))
+    watch, unit = Watch(simulation), scene.density * scene.gravity * scene.height
+
+    def errors(now: "Simulation") -> tuple[float, float, float]:
+        error = now.pressures / unit - 1.0 + now.fields.z[: now.fluids] / scene.height
+        return now.time, float(error.mean()), float(error.std())
+
+    history = flow.run_flow(simulation, scene.until, errors, watch).history(("time", "mean", "noise"))
+    late = history["time"] >= LATE * history["time"][-1]
+    noise = float(history["noise"][late].mean())
+    found = _pure(
+        noise=noise,
+        pressure_error=history["mean"][late].mean(),
+        particles_lost=particles_lost(scene, simulation),
+        speed_at_end=np.array(watch.rows)[-1, 2] / scene.fastest,
+    )
+    return watch.measured() | found, noise
+
+
+def printed(parameters: PrintTrial) -> dict[str, Measured]:
+    """Print a part; the largest speed is over that of sound, lengths over the diameter of a drop or the spacing."""
+    from scipy.spatial import cKDTree
+
+    from reflowshock.particles.printing.printing import solve_printing
+
+    scene = parameters.printing
+    result, part = solve_printing(scene)
+    points = result.pictures[-1].points
+    nearest = cKDTree(points).query(points, k=2)[0][:, 1]
+    names = ("volume_error", "volume_drift", "connected_parts_max", "mergers", "splits", "voids", "steps")
+    return _pure(
+        **{name: result.metrics[name][0] for name in names},
+        mach=result.history["largest_speed"].max() / scene.sound,
+        closest=nearest.min() / scene.spacing,
+        farthest=nearest.max() / scene.spacing,
+        below_wall=float((points[:, 2] < 0.0).sum()),
+        height=part.heights.max() / scene.length,
+    )
+
+
+def _pure(**values: float) -> dict[str, Measured]:
+    return {name: Measured(float(value)) for name, value in values.items()}
+
+
+def _names(text: str) -> dict[str, str]:
+    return dict.fromkeys(text.split(), "")
+
+
+MOTION = (
+    "steps energy_over_start energy_rise mach density_change momentum speed_growth pressure_drift drift_aside "
+    "volume_drift"
+)
+SHAPES = (
+    "followed surface_volume outside below_wall mergers capillary_number parts spread_max pressure_error roundness "
+    "base_error height_error"
+)
+PRINTED = (
+    "volume_error volume_drift connected_parts_max mergers splits voids steps mach closest farthest below_wall height"
+)
+TRIALS: dict[str, Trial] = {
+    "droplet": Trial(DropletTrial, droplet, _names(f"{MOTION} {SHAPES}")),
+    "tank": Trial(TankTrial, tank, _names(f"{MOTION} noise pressure_error particles_lost speed_at_end noise_gain")),
+    "print": Trial(PrintTrial, printed, _names(PRINTED)),
+}

@@ -1,0 +1,58 @@
+"""Joints of a package by the scheme ispg: each flows from its cone with inertia and rests where the default has it."""
+
+import json
+from math import pi
+
+import pytest
+
+from reflowshock.workflow.case.problems import CaseError
+from reflowshock.workflow.pipeline.reader import read_case
+from tests.support.workflow_command import SMALL_CASE, reflowshock
+
+SETTINGS = ("solder.numerics.scheme=ispg", "solder.effects.inertia=on")
+
+
+def metrics_of(folder):
+    joints = json.loads((folder / "reflow/joints.json").read_text())
+    return {name: {key: m["value"] for key, m in joint["metrics"].items()} for name, joint in joints.items()}
+
+
+def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_run, tmp_path):
+    solder = read_case(SMALL_CASE).solder
+    result = reflowshock("run", tmp_path, "--until", "reflow", settings=SETTINGS)
+    assert result.returncode == 0, result.stdout + result.stderr
+    found, default = metrics_of(tmp_path), metrics_of(first_run[0])
+    assert found.keys() == default.keys()
+    for name, joint in found.items():
+        assert joint["max_width"] == pytest.approx(default[name]["max_width"], rel=1e-4)
+        change = joint["axial_force"] - default[name]["axial_force"]
+        assert abs(change) < 1e-3 * pi * 0.24e-3 * solder.surface_tension
+        assert joint["at_rest"] == 1.0 and joint["particles_lost"] == 0.0
+        assert abs(joint["volume_drift"]) < 1e-9 and abs(joint["energy_imbalance"]) < 1e-6
+    told = json.loads((tmp_path / "reflow/stage.json").read_text())["metrics"]
+    assert told["joints_at_rest"]["value"] == len(found)
+
+
+def test_the_plan_names_the_scheme_and_its_cost(tmp_path):
+    plans = [json.loads(reflowshock("plan", tmp_path, "--json", settings=asked).stdout) for asked in (SETTINGS, ())]
+    by_ispg, by_default = (plan["stages"]["reflow"]["seconds"] for plan in plans)
+    assert by_ispg > by_default + 1.0
+    assert "particles each, by ISPG" in reflowshock("plan", tmp_path, settings=SETTINGS).stdout
+
+
+def test_it_is_the_default_with_inertia():
+    def scheme(*settings):
+        return read_case(SMALL_CASE, settings).solder.numerics.scheme
+
+    assert (scheme(), scheme(SETTINGS[1])) == ("energy", "ispg")
+    assert scheme(SETTINGS[1], "solder.numerics.scheme=energy") == "energy"
+
+
+def test_joints_without_inertia_are_refused():
+    with pytest.raises(CaseError, match="not verified for joints without inertia"):
+        read_case(SMALL_CASE, SETTINGS[:1])
+
+
+def test_joints_that_overflow_both_pads_are_refused():
+    with pytest.raises(CaseError, match="not verified for joints that overflow both pads"):
+        read_case(SMALL_CASE, (*SETTINGS, "solder.volume=0.26 mm^3"))

@@ -1,0 +1,51 @@
+"""Kernels are compiled by the first of all processes that needs them; the others wait and load what it has kept.
+
+Workers that begin together, and ranks that start together, need the same ones: each would compile them all.
+"""
+
+import fcntl
+import os
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_held: Counter[Path] = Counter()
+
+
+def compile_once() -> None:
+    """Let this process, and those that are forked from it, look again for a kernel when another has compiled it.
+
+    A kernel waits for those that it calls, which do not call it: processes never wait for each other in a circle.
+    """
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.dispatcher import Dispatcher
+
+    compile_alone = Dispatcher.compile
+    if compile_alone.__module__ == __name__:
+        return
+
+    def compile_kernel(self, signature):
+        folder = self._cache.cache_path
+        if folder is None:
+            return compile_alone(self, signature)
+        name = f"{self.py_func.__module__}.{self.py_func.__qualname__}.lock"
+        with global_compiler_lock, _alone(Path(folder, name)):
+            return compile_alone(self, signature)
+
+    Dispatcher.compile = compile_kernel
+
+
+@contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Hold a lock, once however often it is asked for."""
+    _held[path] += 1
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock = os.open(path, os.O_RDWR | os.O_CREAT)
+    try:
+        if _held[path] == 1:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+        _held[path] -= 1
