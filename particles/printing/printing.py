@@ -20,9 +20,9 @@ from reflowshock.particles.parameters.printing import Printing
 from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
 from reflowshock.particles.sph.flow import PICTURES, FlowResult, Metrics, Picture
-from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import SurfaceLost
+from reflowshock.particles.surface.closing import Meeting
 
 COLUMNS = ("time", "drops", "largest_speed", "kinetic_energy", "surface_energy", "height")
 # Steps after which the light is accounted for, and after which a row of the history is kept.
@@ -189,6 +189,7 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
     metrics: Metrics = measure_part(scene, deposit, part) | {
         "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
         "splits": (float(sum(one.after > one.before for one in meetings)), ""),
+        "spray_share": (deposit.surface.spray / (scene.drops * scene.drop.volume), ""),
         "solid_after": (deposit.time - run.since, "s"),
         "motion_left": (run.left, ""),
         "weber": (scene.drop.weber_number, ""),

@@ -18,6 +18,7 @@ from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
+from reflowshock.particles.surface.breakup import largest_part
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
 from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
@@ -25,7 +26,7 @@ from reflowshock.particles.surface.profile import width
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
-    "surface_energy", "surface_volume", "foot", "parts",
+    "surface_energy", "surface_volume", "foot", "parts", "spray", "shed",
 )  # fmt: skip
 # Share of the radius within which the pressure of a free drop is averaged: the surface is far.
 CORE = 0.5
@@ -58,7 +59,7 @@ def follow(
 
     Raises:
         FloatingPointError: a position is not finite.
-        SurfaceLost: the drop breaks into parts that are too small for its particles.
+        SurfaceLost: no particle is beside the surface any more.
     """
     try:
         run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
@@ -66,19 +67,17 @@ def follow(
         raise SurfaceLost(
             f"step {simulation.steps}, {1e6 * simulation.time:.4g} us, "
             f"{simulation.time / scene.unit_of_time:.2g} units of time: {error}; "
-            f"parts smaller than their particles are not followed: take more particles per diameter{_enough(scene)}"
+            "take more particles per diameter"
         ) from error
     history = run.history(COLUMNS)
-    words = {"outcome": outcome(history)} if scene.impact_speed else {}
+    words = {"outcome": outcome(history), "film": _film(scene)} if scene.impact_speed else {}
     return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
 
 
-def _enough(scene: Droplet) -> str:
-    """Tell with how many the film that an impact leaves is two particles thick."""
-    if not scene.impact_speed:
-        return ""
+def _film(scene: Droplet) -> str:
+    """Tell how thick the film is that an impact leaves, and with how many particles it has two."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
-    return f" ({2.0 / film:.0f} have two in the film of {film:.2g} diameters that the impact leaves)"
+    return f"{film:.2g} diameters thick: two particles with {2.0 / film:.0f} a diameter"
 
 
 def droplet(scene: Droplet) -> Simulation:
@@ -178,11 +177,13 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     distance = np.linalg.norm(surface.points - centre, axis=1)
     pressure = float((simulation.pressures[core] if core.any() else simulation.pressures).mean())
     return (
-        simulation.time, pressure, float(distance.max() / distance.min()), width(surface.points) / scene.diameter,
+        simulation.time, pressure, float(distance.max() / distance.min()),
+        width(largest_part(surface.points, surface.triangles)) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
         _height(scene, surface.points) / scene.diameter, simulation.fastest,
-        simulation.kinetic_energy, surface.energy, surface.volume / scene.volume,
+        simulation.kinetic_energy, surface.energy, (surface.volume + surface.spray) / scene.volume,
         2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(parts_of(surface.triangles)),
+        surface.spray / scene.volume, float(surface.shed),
     )  # fmt: skip
 
 
@@ -211,8 +212,10 @@ def outcome(history: Mapping[str, Floats]) -> str:
     if not wets.any():
         return "does not touch the wall"
     if wets[-1]:
-        return "a part rebounds" if in_parts else "stays on the wall"
-    return "rebounds in parts" if in_parts else "rebounds"
+        told = "a part rebounds" if in_parts else "stays on the wall"
+    else:
+        told = "rebounds in parts" if in_parts else "rebounds"
+    return f"{told}, sheds satellites" if history["shed"][-1] else told
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
@@ -231,6 +234,8 @@ def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
     found: Metrics = {
         "capillary_number": (fastest * scene.liquid_viscosity / scene.surface_tension, ""),
         "surface_volume_drift": (float(history["surface_volume"][-1] / history["surface_volume"][0] - 1.0), ""),
+        "spray_share": (float(history["spray"].max()), ""),
+        "parts_shed": (float(history["shed"][-1]), ""),
         "ohnesorge": (scene.ohnesorge, ""),
     }
     if not scene.has_wall:

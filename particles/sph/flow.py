@@ -14,11 +14,11 @@ from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
 from reflowshock.particles.parameters.flows import SphFlow
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
-from reflowshock.particles.sph.liquid_surface import Meeting
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Particles, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
 from reflowshock.particles.sph.threads import ThreadParticles
+from reflowshock.particles.surface.closing import Meeting
 
 PICTURES = 24
 SAMPLES = 2000

@@ -29,15 +29,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_beside, have_moved
+from reflowshock.particles.core.neighbours import have_moved
 from reflowshock.particles.core.surface_measure import area_gradient, surface_area, triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import grounds, surface_care, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.sph.thin_films import hold_films
-from reflowshock.particles.surface.closing import closed_level, narrowest_gap, parts_of
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops, mirrored
-from reflowshock.particles.surface.level_set import Grid, LevelSet, relax, signed_distance
+from reflowshock.particles.surface.breakup import are_outside, small_parts, unpinched
+from reflowshock.particles.surface.closing import Meeting, narrowest_gap, parts_of
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops
+from reflowshock.particles.surface.level_set import LevelSet
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 # In spacings of the particles: the skin of the lists.
@@ -49,18 +50,6 @@ MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
 FOOT, THIN = 2.0, 3.0
 # Steps after which triangles are evened out.
 CARE = 10
-# Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
-LOST_FILM = 0.03
-
-
-@dataclass(frozen=True, slots=True)
-class Meeting:
-    """Liquids that merged or parted: the step, parts of the surface before and after, change of surface energy [J]."""
-
-    step: int
-    before: int
-    after: int
-    energy: float
 
 
 @dataclass(slots=True)
@@ -76,11 +65,14 @@ class LiquidSurface:
         law: of the particles.
         rings: contact lines, anticlockwise about liquid, as vertices `(k,)`; found where triangles end.
         moves: number of steps.
-        rebuilds: how often it was made anew.
+        rebuilds: how often it was tried to make it anew.
+        waits: the step from which on that is tried again, and the last wait, in cares.
         ground: distance to solid bodies on which it may lie, negative in them; None where there are none.
         wetness: `(m,)` how much of each vertex is on them, 0 to 1; and their normals there, `(m, 3)`.
         meetings: liquids that merged or parted.
         pressure: that of the liquid over that of its particles [Pa].
+        shed: how often parts too small for particles were given up; these fly on as particles without a surface.
+        spray: what is outside all of it [m^3].
     """
 
     points: Floats
@@ -92,10 +84,13 @@ class LiquidSurface:
     rings: tuple[Indices, ...] = field(init=False)
     moves: int = 0
     rebuilds: int = 0
+    waits: tuple[int, int] = (0, 1)
     ground: LevelSet | None = None
     wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
     meetings: list[Meeting] = field(default_factory=list)
     pressure: float = 0.0
+    shed: int = 0
+    spray: float = 0.0
     _built_at: Floats = field(default_factory=lambda: np.empty((3, 0)))
     _lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.zeros(1, np.int32), np.empty(0, np.int32)))
     _shares: Floats = field(default_factory=lambda: np.empty((2, 0)))
@@ -107,16 +102,17 @@ class LiquidSurface:
         """All of it, for a checkpoint."""
         return {
             "points": self.points, "triangles": self.triangles, "rings": list(self.rings), "moves": self.moves,
-            "rebuilds": self.rebuilds, "built_at": self._built_at, "shares": self._shares,
-            "meetings": list(self.meetings), "pressure": self.pressure,
+            "rebuilds": self.rebuilds, "waits": self.waits, "built_at": self._built_at, "shares": self._shares,
+            "meetings": list(self.meetings), "pressure": self.pressure, "shed": self.shed, "spray": self.spray,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
-        self.moves, self.rebuilds = saved["moves"], saved["rebuilds"]
+        self.moves, self.rebuilds, self.waits = saved["moves"], saved["rebuilds"], tuple(saved["waits"])
         self._built_at, self._shares = saved["built_at"], saved["shares"]
         self.meetings, self.pressure = saved["meetings"], saved["pressure"]
+        self.shed, self.spray = saved["shed"], saved["spray"]
         self._find_wetness()
         if len(self.points):
             self._list(self._built_at)
@@ -186,12 +182,12 @@ class LiquidSurface:
             carriers: how many of them, the liquid's the first, carry the surface.
 
         Raises:
-            SurfaceLost: there are no particles beside a vertex.
+            SurfaceLost: there are no particles beside any of it.
         """
         self._update_lists([place[:carriers] for place in fields[:3]])
         self._cover(fields)
         weights = np.empty((2, 2, len(self._lists[1])))
-        if not surface_loops.find_weights(self.points, self._lists, fields, self.law, weights).all():
+        if not surface_loops.find_weights(self.points, self._lists, fields, self.law, weights).any():
             raise surface_care.SurfaceLost("the liquid has left its surface")
         self._shares = weights[0]
         outward = self._outward()
@@ -259,19 +255,10 @@ class LiquidSurface:
         return -float((forces * area).sum()) / square if square else 0.0
 
     def _cosines(self, outward: Floats, push: Floats) -> Floats:
-        """Cosines of the contact angle along a contact line `(k,)`.
-
-        Between advancing and receding angle the wall holds the line against what pulls at it: the free surface, and
-        the pressure of a liquid at rest below it.
-
-        Args:
-            outward: `(k, 2)` normal in the wall, as long as the line about each vertex [m].
-            push: `(k, 2)` forces on its vertices without that of the wall [N].
-        """
+        """Cosines of the contact angle along a contact line; see `surface_care.cosines_between`."""
         if self.bounds is None or not self.tension:
             return np.full(len(push), self.cosine)
-        needed = -(push * outward).sum(axis=1) / (self.tension * (outward**2).sum(axis=1))
-        return np.clip(needed, *self.bounds)
+        return surface_care.cosines_between(self.bounds, outward, push / self.tension)
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
         """Move with the velocities of the particles `(3, n)` [m/s] over a time step [s].
@@ -279,7 +266,7 @@ class LiquidSurface:
         Args:
             velocity: of the particles.
             time_step: over which.
-            volume: of the liquid before [m^3], which the surface encloses after its triangles were evened out.
+            volume: of the liquid within it before [m^3], which it encloses after its triangles were evened out.
         """
         surface_loops.carry(self._lists, self._shares, velocity, time_step, self.points)
         self.moves += 1
@@ -287,13 +274,14 @@ class LiquidSurface:
             self._wet()
         if self.moves % CARE == 0:
             self._care()
-            if self._meets():
-                self._make_anew(CLOSED)
-            elif self._leaves(velocity):
-                self._make_anew((-THIN,))
-            elif surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing):
-                self._make_anew()
-            self.enclose(volume)
+            if self.moves >= self.waits[0]:
+                if self._meets():
+                    self._make_anew(CLOSED)
+                elif self._leaves(velocity):
+                    self._make_anew((-THIN,))
+                elif surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing):
+                    self._make_anew()
+            self.enclose(volume - self._shed())
         self._find_wetness()
 
     def _update_lists(self, liquid: Sequence[Floats]) -> None:
@@ -305,7 +293,7 @@ class LiquidSurface:
     def _list(self, together: Floats) -> None:
         self._built_at, vertices = together, len(self.points)
         reach, places = SUPPORT * self.law.length + SKIN * self.law.spacing, np.ascontiguousarray(together.T)
-        self._lists = find_beside(places[:vertices], places[vertices:], reach)
+        self._lists = surface_care.beside(places[:vertices], places[vertices:], reach)
 
     def _wet(self) -> None:
         """Keep vertices above the wall, contact lines on it; triangles that have come down on it are wet."""
@@ -313,25 +301,24 @@ class LiquidSurface:
             self.points[ring, 2] = 0.0
         np.maximum(self.points[:, 2], 0.0, out=self.points[:, 2])
         flat = np.flatnonzero(surface_care.on_wall(self.points, self.triangles, self.law.spacing))
-        if len(flat) and not self._take(self.points, np.delete(self.triangles, flat, axis=0)):
-            for triangle in flat[::-1]:
-                self._take(self.points, np.delete(self.triangles, triangle, axis=0))
+        if len(flat):
+            self._take(self.points, np.delete(self.triangles, flat, axis=0))
 
-    def _take(self, points: Floats, triangles: Indices) -> bool:
-        """Become these triangles, with the vertices that they have; stay as it is where contact lines would meet."""
+    def _take(self, points: Floats, triangles: Indices) -> None:
+        """Become these triangles, with the vertices that they have; contact lines that meet in a point part there."""
         used, numbers = np.unique(triangles, return_inverse=True)
         triangles = numbers.reshape(-1, 3).astype(np.int32)
         try:
             rings = boundary_loops(triangles)
         except CannotRebuild:
-            return False
+            old, triangles = unpinched(triangles)
+            used, rings = used[old], boundary_loops(triangles)
         self.points, self.triangles, self.rings = points[used], triangles, rings
         for ring in self.rings:
             self.points[ring, 2] = 0.0
         self._built_at = np.empty((3, 0))
         self._lists = np.zeros(len(self.points) + 1, np.int32), np.empty(0, np.int32)
         self._find_wetness()
-        return True
 
     def _care(self) -> None:
         """Close dry spots, split and collapse edges, and even out triangles."""
@@ -346,6 +333,22 @@ class LiquidSurface:
             self.points, self.triangles = surface_care.evened_out(self.points, self.triangles, self.rings, lines)
         except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until they have parted
             return
+
+    def _shed(self) -> float:
+        """Follow parts that are too small for particles no more; return what they enclosed [m^3]."""
+        least = surface_care.FEWEST * self.law.spacing**3
+        is_small, volume = small_parts(self.points, self.triangles, least)
+        if is_small.any():
+            before, energy = parts_of(self.triangles), self.energy
+            self._take(self.points, self.triangles[~is_small])
+            self._note(before, energy)
+            self.shed, self.spray = self.shed + 1, self.spray + volume
+        return volume
+
+    def find_spray(self, liquid: Sequence[Floats], volumes: Floats) -> None:
+        """Find how much of the particles, at x, y, z `(3, n)` [m], of volumes `(n,)` [m^3], is outside all of it."""
+        outside = surface_care.OWN * self.law.spacing
+        self.spray = float(volumes[are_outside(np.stack(liquid, 1), self.points, self._normals(), outside)].sum())
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -370,24 +373,18 @@ class LiquidSurface:
 
     def _make_anew(self, gaps: Sequence[float] = (0.0,)) -> None:
         """Triangulate the same surface anew, without gaps narrower than the first of `gaps` [spacings] that it can."""
-        self.rebuilds += 1
-        before, energy = parts_of(self.triangles), self.energy
-        closed = mirrored(self.points, self.triangles) if self.law.mirror else (self.points, self.triangles)
-        distance = signed_distance(*closed, Grid.around(closed[0], surface_care.EDGE * self.law.spacing))
-        for gap in gaps:
-            level = closed_level(distance, gap * self.law.spacing) if gap else distance
-            try:
-                points, triangles, rings = surface_care.triangulated(level, bool(self.law.mirror))
-            except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
-                continue
-            wet = sum(area_within(points[ring]) for ring in rings)
-            if gap >= 0.0 and wet < (1.0 - LOST_FILM) * self.wetted_area:
-                continue
-            self._take(*relax(level, points, triangles, rings))
-            after = parts_of(self.triangles)
-            if gap or after != before:
-                self.meetings.append(Meeting(self.moves, before, after, self.energy - energy))
-            return
+        before, energy, (_, wait) = parts_of(self.triangles), self.energy, self.waits
+        new = surface_care.made_anew(self.points, self.triangles, bool(self.law.mirror), self.law.spacing, gaps)
+        wait = 1 if new else min(2 * wait, surface_care.LONGEST_WAIT)
+        self.rebuilds, self.waits = self.rebuilds + 1, (self.moves + wait * CARE, wait)
+        if new:
+            self._take(*new)
+            if any(gaps) or parts_of(self.triangles) != before:
+                self._note(before, energy)
+
+    def _note(self, before: int, energy: float) -> None:
+        """Keep what a change of the surface, which had so many parts and so much energy [J], has made of them."""
+        self.meetings.append(Meeting(self.moves, before, parts_of(self.triangles), self.energy - energy))
 
     def enclose(self, volume: float) -> None:
         """Move along the normals by one distance, contact lines along the wall, to enclose a volume [m^3]."""

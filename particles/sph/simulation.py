@@ -172,7 +172,7 @@ class Simulation:
         stand in, which keeps the order.
         """
         particles, law = self.particles, self.law
-        volume = self._volume_of_carriers() if self.surface and self.surface.needs_volume else 0.0
+        volume = self._volume_within() if self.surface and self.surface.needs_volume else 0.0
         particles.predict(time_step)
         if self.surface:
             velocity = particles.velocity
@@ -185,10 +185,13 @@ class Simulation:
         self.time += time_step
         self.steps += 1
 
-    def _volume_of_carriers(self) -> float:
-        """Of the particles that carry the surface [m^3]."""
-        carriers, fields = slice(self.fluids + self.held), self.fields
-        return float((fields.mass[carriers] / fields.density[carriers]).sum())
+    def _volume_within(self) -> float:
+        """Of the particles that carry the surface, but of those outside it [m^3]."""
+        carriers, fields, surface = slice(self.fluids + self.held), self.fields, self.surface
+        assert surface is not None
+        volumes = fields.mass[carriers] / fields.density[carriers]
+        surface.find_spray([place[carriers] for place in fields[:3]], volumes)
+        return float(volumes.sum()) - surface.spray
 
     def _find_rates(self) -> None:
         """Find the rates of the present fields."""

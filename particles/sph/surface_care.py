@@ -9,15 +9,31 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.neighbours import find_beside
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas
 from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields
-from reflowshock.particles.surface.cloud_level_set import area_within, between, boundary_loops
+from reflowshock.particles.surface.closing import closed_level
+from reflowshock.particles.surface.cloud_level_set import (
+    CannotRebuild,
+    area_within,
+    between,
+    boundary_loops,
+    mirrored,
+)
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, windings_on
+from reflowshock.particles.surface.level_set import (
+    Grid,
+    LevelSet,
+    extract_surface,
+    relax,
+    signed_distance,
+    windings_on,
+)
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 # In spacings of the particles: edges of triangles.
@@ -37,6 +53,12 @@ TOUCH, DRY = 0.3, 0.1
 COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
 # The same: distance of the nodes at which sheets that have crossed are looked for.
 OVERLAP = 0.5
+# In particles: smaller parts are no liquid with a surface; two particles across, a sphere has four, a cube eight.
+FEWEST = 8
+# Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
+LOST_FILM = 0.03
+# Cares that are let go, at most, after attempts at that in vain: their number doubles.
+LONGEST_WAIT = 4
 WALL = Plate.horizontal(0.0)
 
 
@@ -78,6 +100,49 @@ def triangulated(level: LevelSet, mirror: bool) -> tuple[Floats, Indices, tuple[
     if mirror:
         points, triangles = between(points, triangles, (WALL,), 1e-6 * level.grid.spacing)
     return points, triangles, boundary_loops(triangles)
+
+
+def made_anew(
+    points: Floats, triangles: Indices, mirror: bool, spacing: float, gaps: Sequence[float]
+) -> tuple[Floats, Indices] | None:
+    """Return points and triangles of the same surface from its distance, without gaps; None where it cannot be.
+
+    Args:
+        points: `(m, 3)` [m].
+        triangles: `(t, 3)`.
+        mirror: whether it ends on the wall z = 0.
+        spacing: [m].
+        gaps: in spacings; those narrower than the first of these that it can are closed. Negative: what is thinner
+            goes. 0: the surface as it is.
+    """
+    closed = mirrored(points, triangles) if mirror else (points, triangles)
+    distance = signed_distance(*closed, Grid.around(closed[0], EDGE * spacing))
+    wetted = sum(area_within(points[ring]) for ring in boundary_loops(triangles))
+    for gap in gaps:
+        level = closed_level(distance, gap * spacing) if gap else distance
+        try:
+            new_points, new_triangles, lines = triangulated(level, mirror)
+        except CannotRebuild:  # contact lines about to meet or to part: worn triangles serve until they have
+            continue
+        wet = sum(area_within(new_points[ring]) for ring in lines)
+        if gap < 0.0 or wet >= (1.0 - LOST_FILM) * wetted:
+            return relax(level, new_points, new_triangles, lines)
+    return None
+
+
+def cosines_between(bounds: tuple[float, float], outward: Floats, push: Floats) -> Floats:
+    """Cosines of the contact angle along a contact line, between those of the advancing and the receding angle.
+
+    In between the wall holds the line against what pulls at it: the free surface, and the pressure of a liquid at rest
+    below it.
+
+    Args:
+        bounds: both cosines.
+        outward: `(k, 2)` normal in the wall, as long as the line about each vertex [m].
+        push: `(k, 2)` forces on its vertices without that of the wall, over the surface tension [m].
+    """
+    needed = -(push * outward).sum(axis=1) / (outward**2).sum(axis=1)
+    return np.clip(needed, *bounds)
 
 
 def evened_out(
@@ -150,3 +215,20 @@ def strays(vertices: tuple[Floats, Floats], lists: tuple[Indices, Indices], fiel
     found = np.empty(len(vertices[0]))
     surface_loops.find_strays(vertices, lists, fields, cover, found)
     return found
+
+
+def beside(vertices: Floats, particles: Floats, reach: float) -> tuple[Indices, Indices]:
+    """Return offsets and indices of the particles within a reach [m] of each vertex, the nearest one where none is.
+
+    Args:
+        vertices: `(m, 3)` [m].
+        particles: `(n, 3)` [m].
+        reach: [m].
+    """
+    offsets, indices = find_beside(vertices, particles, reach)
+    is_alone = np.diff(offsets) == 0
+    if is_alone.any():
+        nearest = cKDTree(particles).query(vertices[is_alone])[1]
+        indices = np.insert(indices, offsets[:-1][is_alone], nearest.astype(indices.dtype))
+        offsets = offsets + np.concatenate(([0], np.cumsum(is_alone))).astype(offsets.dtype)
+    return offsets, indices

@@ -23,7 +23,8 @@ def find_weights(points, lists, fields, law, weights):
         fields: `Fields`.
         law: `Law`.
         weights: `(2, 2, pairs)`, written: second W [1/m^3], for components along a wall and for those across it, in
-            which images are reversed; first these over the sum of those along the wall at a vertex.
+            which images are reversed; first these over the sum of those along the wall at a vertex. Where there is no
+            particle within the support, the nearest one has all.
 
     Returns:
         That sum at each vertex `(m,)` [1/m^3].
@@ -31,11 +32,14 @@ def find_weights(points, lists, fields, law, weights):
     offsets, indices = lists
     inverse, levels = 1.0 / law.length, np.empty(points.shape[0])
     for v in prange(points.shape[0]):
-        level = 0.0
+        level, nearest, least = 0.0, -1, inf
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
             dx, dy, dz = points[v, 0] - fields.x[j], points[v, 1] - fields.y[j], points[v, 2] - fields.z[j]
-            own, image = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse), 0.0
+            distance = sqrt(dx * dx + dy * dy + dz * dz)
+            if distance < least:
+                nearest, least = k, distance
+            own, image = shape(law.kernel, False, distance * inverse), 0.0
             if law.mirror:
                 dz = points[v, 2] + fields.z[j]
                 image = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
@@ -43,7 +47,10 @@ def find_weights(points, lists, fields, law, weights):
             level += weights[1, 0, k]
         levels[v] = level
         for k in range(offsets[v], offsets[v + 1]):
-            weights[0, 0, k], weights[0, 1, k] = weights[1, 0, k] / level, weights[1, 1, k] / level
+            if level > 0.0:
+                weights[0, 0, k], weights[0, 1, k] = weights[1, 0, k] / level, weights[1, 1, k] / level
+            else:
+                weights[0, 0, k] = weights[0, 1, k] = 1.0 if k == nearest else 0.0
     return levels
 
 
@@ -98,4 +105,4 @@ def find_strays(vertices, lists, fields, cover, strays):
             aside2 = dx * dx + dy * dy + dz * dz - along * along
             if along < before:
                 top = max(top, along - bend * aside2)
-        strays[v] = max(top + least, min(top + most, 0.0)) if top > -inf else 0.0
+        strays[v] = max(top + least, min(top + most, 0.0), -most) if top > -inf else 0.0

@@ -1,5 +1,7 @@
 """Gaps in a liquid's surface, and the surface that closes them: liquids that meet become one."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
@@ -13,6 +15,16 @@ from reflowshock.particles.surface.level_set import LevelSet, extract_surface, s
 BLUNTINGS = 4
 # Cosine of the angle between the normals of vertices that face each other, at most.
 FACING = -0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Liquids that merged or parted: the step, parts of the surface before and after, change of surface energy [J]."""
+
+    step: int
+    before: int
+    after: int
+    energy: float
 
 
 def narrowest_gap(points: Floats, triangles: Indices, normals: Floats, gap: float, aside: float) -> float:

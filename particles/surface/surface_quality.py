@@ -11,6 +11,8 @@ from reflowshock.particles.core.surface_measure import area_vector
 SMOOTHING = 0.3
 FLIP_MARGIN = 1e-2
 FLIP_PASSES = 4
+# [m^2]: triangles that fold onto each other about a vertex give it no normal.
+LEAST = 1e-300
 
 
 @njit(cache=True)
@@ -53,8 +55,8 @@ def _centroid_offsets(points, triangles, count):
     for v in range(count):
         length = np.sqrt(normal[v, 0] ** 2 + normal[v, 1] ** 2 + normal[v, 2] ** 2)
         for d in range(3):
-            offset[v, d] /= area[v]
-            normal[v, d] /= length
+            offset[v, d] /= max(area[v], LEAST)
+            normal[v, d] /= max(length, LEAST)
     return offset, normal
 
 

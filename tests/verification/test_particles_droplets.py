@@ -111,6 +111,20 @@ def test_a_film_thinner_than_its_particles_spreads_on_and_keeps_them():
     assert (np.maximum.accumulate(total[::-1])[::-1] - total).max() < 0.01 * total[0]
 
 
+def test_an_impact_whose_satellites_are_too_small_for_particles_runs_on():
+    """At We 1000, Re 5000 the run ended after 0.8 to 1.1 D / U."""
+    result = struck(1000.0, 5000.0, 8, 2.5)
+    history = result.history
+    assert value(result, "parts_shed") > 0 and 0.01 < value(result, "spray_share") < 0.2
+    assert result.words["outcome"] == "stays on the wall, sheds satellites"
+    assert abs(value(result, "volume_drift")) < 0.01
+    assert history["surface_volume"] == pytest.approx(1.0, abs=0.03)  # evened out every ten steps
+    assert abs(value(result, "surface_volume_drift")) < 0.01
+    total = history["kinetic_energy"] + history["surface_energy"]
+    assert (np.maximum.accumulate(total[::-1])[::-1] - total).max() < 0.01 * total[0]
+    assert result.pictures[-1].points[:, 2].min() >= 0.0 and value(result, "film_over_spacing") < 0.5
+
+
 def test_the_energy_of_a_drop_that_is_let_go_only_falls():
     """A cube of ink: kinetic energy and that of its surface; what compression keeps is small."""
     history = solve_droplet(ink(10, 60e-6, start="cube")).history

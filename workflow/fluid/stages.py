@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.workflow.case.run import Findings, Run, at_most, metric
+from reflowshock.workflow.case.run import Findings, Run, at_least, at_most, metric
 from reflowshock.workflow.fluid.case import (
     DamBreakCase,
     DropletCase,
@@ -27,8 +27,13 @@ CHANNEL_LIMITS = {"volume_drift": VOLUME_DRIFT, "profile_error_at_end": PROFILE_
 VORTEX_LIMITS = {"volume_drift": VOLUME_DRIFT, "decay_rate_error": DECAY_ERROR}
 # Of a droplet: what its surface encloses, over the volume at the start; and where the exact shape at rest is known, its
 # pressure, roundness, width and height.
-DROPLET_LIMITS = {"volume_drift": VOLUME_DRIFT, "surface_volume_drift": 0.02}
-PART_LIMITS = {"volume_drift": 0.01, "volume_error": 0.01}  # of what particles and solid bodies have of the ink
+# What breaks off in parts too small for particles flies on without tension: as much as volumes may be wrong by.
+SPRAY = 0.01
+# Of the film of an impact, in spacings: particles of a thinner one are 1.4 spacings apart, half as many as they need.
+THINNEST_FILM = 0.5
+DROPLET_LIMITS = {"volume_drift": VOLUME_DRIFT, "surface_volume_drift": 0.02, "spray_share": SPRAY}
+# Of a printed part: what particles and solid bodies have of the ink.
+PART_LIMITS = {"volume_drift": 0.01, "volume_error": 0.01, "spray_share": SPRAY}
 REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "height_error": 0.02}
 
 
@@ -38,7 +43,10 @@ def flow_droplet(run: Run[DropletCase], folder: Path) -> Findings:
 
     known = rest_metrics(run.case.droplet)
     limits = DROPLET_LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
-    return _flow(run, folder, solve_droplet, limits)
+    found = _flow(run, folder, solve_droplet, limits)
+    if film := found.metrics.get("film_over_spacing"):
+        found.health["film_over_spacing"] = at_least(film["value"], THINNEST_FILM)
+    return found
 
 
 def flow_printing(run: Run[PrintingCase], folder: Path) -> Findings:

@@ -171,7 +171,7 @@ def test_liquid_that_left_its_surface_is_refused():
         lost.add_to(simulation.rates, simulation.fields, simulation.fluids)
 
 
-def test_a_film_too_thin_for_its_particles_ends_the_run_in_words(monkeypatch):
+def test_a_surface_without_particles_ends_the_run_in_words(monkeypatch):
     def tear(self, time_step):
         self.steps = 7
         raise SurfaceLost("torn")
@@ -210,16 +210,18 @@ def test_a_drop_that_does_not_wet_its_wall_rebounds():
 
 
 @pytest.mark.parametrize(
-    ("foot", "parts", "words"),
+    ("foot", "parts", "shed", "words"),
     [
-        ((0.0, 0.0), 1, "does not touch the wall"),
-        ((0.0, 0.9), 1, "stays on the wall"),
-        ((0.9, 0.3), 2, "a part rebounds"),
-        ((0.9, 0.0), 3, "rebounds in parts"),
+        ((0.0, 0.0), 1, 0, "does not touch the wall"),
+        ((0.0, 0.9), 1, 0, "stays on the wall"),
+        ((0.9, 0.3), 2, 0, "a part rebounds"),
+        ((0.9, 0.0), 3, 0, "rebounds in parts"),
+        ((0.0, 0.9), 1, 2, "stays on the wall, sheds satellites"),
     ],
 )
-def test_what_became_of_a_drop_is_told_in_words(foot, parts, words):
-    assert outcome({"foot": np.array(foot), "parts": np.array([1.0, parts])}) == words
+def test_what_became_of_a_drop_is_told_in_words(foot, parts, shed, words):
+    history = {"foot": np.array(foot), "parts": np.array([1.0, parts]), "shed": np.array([0.0, shed])}
+    assert outcome(history) == words
 
 
 def test_threads_change_no_droplet(every_thread):

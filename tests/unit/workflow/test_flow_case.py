@@ -129,6 +129,16 @@ def test_a_spacing_that_a_drop_does_not_resolve_is_refused(tmp_path):
         read_case(tmp_path / "case.toml", [], True)
 
 
+@pytest.mark.parametrize(("degrees", "across", "would_do"), [(30, 10, 12), (45, 8, 9), (37, 10, 11)])
+def test_a_cap_of_too_few_particles_is_refused_with_the_number_that_would_do(degrees, across, would_do):
+    """The widths of these caps are 9, 14 and 3 % off."""
+    angle, number = f"droplet.contact_angle={degrees} deg", "droplet.numerics.particles_per_diameter="
+    with pytest.raises(CaseError, match=rf"too large for the cap of {degrees} deg.*, {would_do} a diameter"):
+        read_case(CAP, [angle, f"{number}{across}"], True)
+    read_case(CAP, [angle, f"{number}{would_do}"], True)
+    read_case(CAP, [angle, f"{number}{across}", "droplet.speed=3 m/s"], True)
+
+
 @pytest.mark.parametrize(
     "path", [DAM, CHANNEL, VORTICES, FREE, CAP, IMPACT], ids=["dam", "channel", "vortices", "free", "cap", "impact"]
 )

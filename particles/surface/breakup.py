@@ -1,0 +1,82 @@
+"""Surfaces that break up: parts that hang together in a vertex alone, parts that are too small, points outside."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.surface.closing import groups, part_of_vertex
+
+
+def unpinched(triangles: Indices) -> tuple[Indices, Indices]:
+    """Give every fan of triangles about a vertex a vertex of its own, where they share that vertex and no edge.
+
+    So contact lines that meet in a point part there, or become one.
+
+    Args:
+        triangles: `(t, 3)`, an edge in at most two of them, in opposite senses.
+
+    Returns:
+        The old vertex that each new one is at `(k,)`, and triangles `(t, 3)` of new vertices.
+    """
+    corners = np.arange(triangles.size).reshape(-1, 3)
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    size = int(triangles.max(initial=0)) + 1
+    vertex = triangles.ravel().astype(np.int64)
+    there, back = vertex[start] * size + vertex[end], vertex[end] * size + vertex[start]
+    order = np.argsort(there)
+    place = np.minimum(np.searchsorted(there[order], back), len(order) - 1)
+    mate = order[place]
+    paired = there[mate] == back
+    mate = mate[paired]
+    fan = groups(np.concatenate((start[paired], end[paired])), np.concatenate((end[mate], start[mate])), triangles.size)
+    old = np.empty(int(fan.max(initial=-1)) + 1, np.int32)
+    old[fan] = vertex
+    return old, fan.reshape(-1, 3).astype(np.int32)
+
+
+def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Floats]:
+    """Find the connected parts of a surface that the wall z = 0 closes.
+
+    Args:
+        points: `(m, 3)` [m].
+        triangles: `(t, 3)`, outward oriented.
+
+    Returns:
+        The part of each triangle `(t,)`, from 0 on, and what each part encloses [m^3].
+    """
+    part = part_of_vertex(triangles, len(points))[triangles[:, 0]]
+    volumes = np.zeros(int(part.max()) + 1)
+    np.add.at(volumes, part, np.linalg.det(points[triangles]) / 6.0)
+    return part, volumes
+
+
+def largest_part(points: Floats, triangles: Indices) -> Floats:
+    """Vertices `(k, 3)` of the part that encloses most; arguments as above."""
+    part, volumes = volumes_of_parts(points, triangles)
+    return points[np.unique(triangles[part == volumes.argmax()])]
+
+
+def small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArray[np.bool_], float]:
+    """Find the parts that enclose less than a volume [m^3]; the largest never is one. Other arguments as above.
+
+    Returns:
+        Whether each triangle is of such a part `(t,)`, and what these enclose together [m^3].
+    """
+    part, volumes = volumes_of_parts(points, triangles)
+    is_small = volumes < least
+    is_small[volumes.argmax()] = False
+    return is_small[part], float(volumes[is_small].sum())
+
+
+def are_outside(places: Floats, points: Floats, normals: Floats, distance: float) -> NDArray[np.bool_]:
+    """Whether places `(n, 3)` are farther than a distance outside the nearest vertex of a surface `(n,)`; all in m.
+
+    Args:
+        places: to judge.
+        points: vertices `(m, 3)`.
+        normals: outward ones there `(m, 3)`.
+        distance: at least a few tenths of an edge, since the nearest vertex stands for the surface.
+    """
+    nearest = cKDTree(points).query(places)[1]
+    return ((places - points[nearest]) * normals[nearest]).sum(axis=1) > distance
