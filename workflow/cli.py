@@ -249,7 +249,8 @@ def clean(
 def stress_test(
     cases: Annotated[list[Path] | None, typer.Argument(metavar="CASES", help="hard cases (default: all)")] = None,
     family: Annotated[
-        list[str] | None, typer.Option(metavar="FAMILY", help="reflow, elements, coupling, remesh, droplets (default: all)")
+        list[str] | None,
+        typer.Option(metavar="FAMILY", help="reflow, elements, coupling, remesh, droplets (default: all)"),
     ] = None,
     random: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="random cases (default: 200, none beside given CASES)")
