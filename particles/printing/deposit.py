@@ -61,6 +61,7 @@ class Deposit:
         order: which particles those of the simulation are.
         heat: of these particles; None where nothing freezes.
         time: [s].
+        spray: largest share of the liquid, with what is held with it, that was outside its surface at a time.
     """
 
     scene: Printing
@@ -76,6 +77,7 @@ class Deposit:
     order: Indices = field(default_factory=lambda: np.empty(0, np.int64))
     heat: Heat | None = None
     time: float = 0.0
+    spray: float = 0.0
     law: Law = field(init=False)
     start: tuple[Floats, tuple[Floats, Indices], float] = field(init=False)
 
@@ -96,7 +98,7 @@ class Deposit:
             "fields": self.fields._asdict(), "state": self.state, "dose": self.dose, "drop": self.drop,
             "enthalpy": self.enthalpy, "heat_listed_at": self.heat.rows.built_at if self.heat else None,
             "bodies": [body._asdict() for body in self.bodies],
-            "surface": self.surface.saved(), "order": self.order, "time": self.time,
+            "surface": self.surface.saved(), "order": self.order, "time": self.time, "spray": self.spray,
             "simulation": self.simulation.saved() if self.simulation else None,
         }  # fmt: skip
 
@@ -104,7 +106,7 @@ class Deposit:
         """Continue from what `saved` returned."""
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
-        self.enthalpy = saved["enthalpy"]
+        self.enthalpy, self.spray = saved["enthalpy"], saved["spray"]
         for body in saved["bodies"]:
             self._add_body(CuredBody(**body))
         self.surface.restore(saved["surface"])
@@ -204,6 +206,8 @@ class Deposit:
         if self.heat:
             self.heat.conduct(self.simulation.fields, time_step)
         self.time += time_step
+        carriers = self.simulation.fluids + self.simulation.held
+        self.spray = max(self.spray, self.surface.spray / (carriers * self.law.spacing**3))
         return time_step
 
     def update(self) -> None:

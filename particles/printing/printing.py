@@ -82,6 +82,9 @@ def solve_printing(
 ) -> tuple[FlowResult, Part]:
     """Print a part.
 
+    Its metric `spray_share` is the largest share of the liquid of a time, not of all that is printed, that was outside
+    its surface: so it tells of one drop that splashes among many.
+
     Raises:
         FloatingPointError: a position is not finite.
         SurfaceLost: liquid breaks into parts that are too small for its particles.
@@ -189,7 +192,7 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
     metrics: Metrics = measure_part(scene, deposit, part) | {
         "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
         "splits": (float(sum(one.after > one.before for one in meetings)), ""),
-        "spray_share": (deposit.surface.spray / (scene.drops * scene.drop.volume), ""),
+        "spray_share": (deposit.spray, ""),
         "solid_after": (deposit.time - run.since, "s"),
         "motion_left": (run.left, ""),
         "weber": (scene.drop.weber_number, ""),

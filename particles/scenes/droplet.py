@@ -59,7 +59,7 @@ def follow(
 
     Raises:
         FloatingPointError: a position is not finite.
-        SurfaceLost: no particle is beside the surface any more.
+        SurfaceLost: the liquid has left its surface, or that is none any more.
     """
     try:
         run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
@@ -77,7 +77,7 @@ def follow(
 def _film(scene: Droplet) -> str:
     """Tell how thick the film is that an impact leaves, and with how many particles it has two."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
-    return f"{film:.2g} diameters thick: two particles with {2.0 / film:.0f} a diameter"
+    return f"{film:.2g} D thick; {2.0 / film:.0f} particles a diameter put two across it"
 
 
 def droplet(scene: Droplet) -> Simulation:
@@ -227,13 +227,19 @@ def rest_metrics(scene: Droplet) -> tuple[str, ...]:
 
 
 def _metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
-    """What the drop became: means over the last tenth of the time, in which it is to be at rest."""
+    """What the drop became: means over the last tenth of the time, in which it is to be at rest.
+
+    `surface_volume_drift` is the largest change of what the surface encloses, with the spray, at any time sampled: when
+    triangles are evened out, every few steps, it is set to the volume of the particles. `parts_shed` counts events, in
+    each of which one part or several were given up.
+    """
     late = history["time"] >= 0.9 * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
     fastest = float(history["largest_speed"][late].max())
+    change = history["surface_volume"] / history["surface_volume"][0] - 1.0
     found: Metrics = {
         "capillary_number": (fastest * scene.liquid_viscosity / scene.surface_tension, ""),
-        "surface_volume_drift": (float(history["surface_volume"][-1] / history["surface_volume"][0] - 1.0), ""),
+        "surface_volume_drift": (float(change[np.abs(change).argmax()]), ""),
         "spray_share": (float(history["spray"].max()), ""),
         "parts_shed": (float(history["shed"][-1]), ""),
         "ohnesorge": (scene.ohnesorge, ""),

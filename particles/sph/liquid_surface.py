@@ -21,8 +21,9 @@ On a solid body (`ground`) the surface stays closed: where it lies on it its ten
 gamma, along the ground, which makes the contact angle there as on the wall.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ from reflowshock.particles.sph import grounds, surface_care, surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.sph.thin_films import hold_films
-from reflowshock.particles.surface.breakup import are_outside, small_parts, unpinched
+from reflowshock.particles.surface.breakup import are_outside, small_parts, with_contact_lines
 from reflowshock.particles.surface.closing import Meeting, narrowest_gap, parts_of
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops
 from reflowshock.particles.surface.level_set import LevelSet
@@ -43,11 +44,11 @@ from reflowshock.particles.surface.surface_quality import vertex_normals
 
 # In spacings of the particles: the skin of the lists.
 SKIN = 0.5
-# The same: gaps narrower than the first close, and with them all that are narrower than the second; wider ones are
-# tried where contact lines would meet in a point.
-MEETING, CLOSED = 1.0, (2.0, 2.4, 2.8)
-# The same: a foot narrower than the first leaves the wall, with all liquid that is thinner than the second.
-FOOT, THIN = 2.0, 3.0
+# The same: gaps narrower than the first close, a foot narrower than the second leaves the wall where liquid moves away.
+MEETING, FOOT = 1.0, 2.0
+# The same: which gaps close where the surface is made anew for a reason; wider ones are tried where contact lines would
+# meet in a point. Negative: liquid that is thinner goes.
+GAPS = {"meets": (2.0, 2.4, 2.8), "leaves": (-3.0,), "worn": (0.0,)}
 # Steps after which triangles are evened out.
 CARE = 10
 
@@ -66,12 +67,12 @@ class LiquidSurface:
         rings: contact lines, anticlockwise about liquid, as vertices `(k,)`; found where triangles end.
         moves: number of steps.
         rebuilds: how often it was tried to make it anew.
-        waits: the step from which on that is tried again, and the last wait, in cares.
+        waits: for each reason in `GAPS`, the step from which on it is tried again, and the last wait, in cares.
         ground: distance to solid bodies on which it may lie, negative in them; None where there are none.
         wetness: `(m,)` how much of each vertex is on them, 0 to 1; and their normals there, `(m, 3)`.
         meetings: liquids that merged or parted.
         pressure: that of the liquid over that of its particles [Pa].
-        shed: how often parts too small for particles were given up; these fly on as particles without a surface.
+        shed: events in which parts too small for particles were given up, which fly on as particles without a surface.
         spray: what is outside all of it [m^3].
     """
 
@@ -84,7 +85,7 @@ class LiquidSurface:
     rings: tuple[Indices, ...] = field(init=False)
     moves: int = 0
     rebuilds: int = 0
-    waits: tuple[int, int] = (0, 1)
+    waits: dict[str, tuple[int, int]] = field(default_factory=dict)
     ground: LevelSet | None = None
     wetness: tuple[Floats, Floats] = field(default_factory=lambda: (np.empty(0), np.empty((0, 3))))
     meetings: list[Meeting] = field(default_factory=list)
@@ -102,14 +103,14 @@ class LiquidSurface:
         """All of it, for a checkpoint."""
         return {
             "points": self.points, "triangles": self.triangles, "rings": list(self.rings), "moves": self.moves,
-            "rebuilds": self.rebuilds, "waits": self.waits, "built_at": self._built_at, "shares": self._shares,
+            "rebuilds": self.rebuilds, "waits": dict(self.waits), "built_at": self._built_at, "shares": self._shares,
             "meetings": list(self.meetings), "pressure": self.pressure, "shed": self.shed, "spray": self.spray,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
-        self.moves, self.rebuilds, self.waits = saved["moves"], saved["rebuilds"], tuple(saved["waits"])
+        self.moves, self.rebuilds, self.waits = saved["moves"], saved["rebuilds"], saved["waits"]
         self._built_at, self._shares = saved["built_at"], saved["shares"]
         self.meetings, self.pressure = saved["meetings"], saved["pressure"]
         self.shed, self.spray = saved["shed"], saved["spray"]
@@ -167,7 +168,7 @@ class LiquidSurface:
 
     def lie_on(self, ground: LevelSet | None) -> None:
         """Lie from now on on this ground; the particles that carry it may be others, too."""
-        self.ground = ground
+        self.ground, self.spray = ground, 0.0
         self._take(self.points, self.triangles)
 
     def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
@@ -182,13 +183,14 @@ class LiquidSurface:
             carriers: how many of them, the liquid's the first, carry the surface.
 
         Raises:
-            SurfaceLost: there are no particles beside any of it.
+            SurfaceLost: there are no particles beside much of it.
         """
         self._update_lists([place[:carriers] for place in fields[:3]])
         self._cover(fields)
         weights = np.empty((2, 2, len(self._lists[1])))
-        if not surface_loops.find_weights(self.points, self._lists, fields, self.law, weights).any():
-            raise surface_care.SurfaceLost("the liquid has left its surface")
+        levels = surface_loops.find_weights(self.points, self._lists, fields, self.law, weights)
+        if (alone := float((levels == 0.0).mean())) > surface_care.MOST_ALONE:
+            raise surface_care.SurfaceLost(f"the liquid has left its surface, {alone:.0%} of it")
         self._shares = weights[0]
         outward = self._outward()
         found = np.zeros((2, 3, carriers))
@@ -274,13 +276,7 @@ class LiquidSurface:
             self._wet()
         if self.moves % CARE == 0:
             self._care()
-            if self.moves >= self.waits[0]:
-                if self._meets():
-                    self._make_anew(CLOSED)
-                elif self._leaves(velocity):
-                    self._make_anew((-THIN,))
-                elif surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing):
-                    self._make_anew()
+            self._renew(velocity)
             self.enclose(volume - self._shed())
         self._find_wetness()
 
@@ -306,13 +302,10 @@ class LiquidSurface:
 
     def _take(self, points: Floats, triangles: Indices) -> None:
         """Become these triangles, with the vertices that they have; contact lines that meet in a point part there."""
-        used, numbers = np.unique(triangles, return_inverse=True)
-        triangles = numbers.reshape(-1, 3).astype(np.int32)
         try:
-            rings = boundary_loops(triangles)
-        except CannotRebuild:
-            old, triangles = unpinched(triangles)
-            used, rings = used[old], boundary_loops(triangles)
+            used, triangles, rings = with_contact_lines(triangles)
+        except CannotRebuild as error:
+            raise surface_care.SurfaceLost("more than two sheets of the liquid's surface meet in an edge") from error
         self.points, self.triangles, self.rings = points[used], triangles, rings
         for ring in self.rings:
             self.points[ring, 2] = 0.0
@@ -339,9 +332,7 @@ class LiquidSurface:
         least = surface_care.FEWEST * self.law.spacing**3
         is_small, volume = small_parts(self.points, self.triangles, least)
         if is_small.any():
-            before, energy = parts_of(self.triangles), self.energy
             self._take(self.points, self.triangles[~is_small])
-            self._note(before, energy)
             self.shed, self.spray = self.shed + 1, self.spray + volume
         return volume
 
@@ -371,12 +362,27 @@ class LiquidSurface:
         is_thin = 0.0 < self.wetted_area < 0.25 * np.pi * (FOOT * self.law.spacing) ** 2
         return is_thin and self.ground is None and bool(velocity[2].mean() > 0.0)
 
-    def _make_anew(self, gaps: Sequence[float] = (0.0,)) -> None:
-        """Triangulate the same surface anew, without gaps narrower than the first of `gaps` [spacings] that it can."""
-        before, energy, (_, wait) = parts_of(self.triangles), self.energy, self.waits
+    def _is_worn(self) -> bool:
+        """Whether its triangles do not serve any more."""
+        return surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing)
+
+    def _renew(self, velocity: Floats) -> None:
+        """Make it anew for the first reason that holds, of those that were not tried in vain of late."""
+        reasons: dict[str, Callable[[], bool]] = {
+            "meets": self._meets, "leaves": partial(self._leaves, velocity), "worn": self._is_worn,
+        }  # fmt: skip
+        for reason, holds in reasons.items():
+            if self.moves >= self.waits.get(reason, (0, 1))[0] and holds():
+                self._make_anew(reason)
+                return
+
+    def _make_anew(self, reason: str) -> None:
+        """Triangulate the same surface anew, for one of the reasons in `GAPS`."""
+        before, energy, gaps = parts_of(self.triangles), self.energy, GAPS[reason]
+        _, wait = self.waits.get(reason, (0, 1))
         new = surface_care.made_anew(self.points, self.triangles, bool(self.law.mirror), self.law.spacing, gaps)
         wait = 1 if new else min(2 * wait, surface_care.LONGEST_WAIT)
-        self.rebuilds, self.waits = self.rebuilds + 1, (self.moves + wait * CARE, wait)
+        self.rebuilds, self.waits[reason] = self.rebuilds + 1, (self.moves + wait * CARE, wait)
         if new:
             self._take(*new)
             if any(gaps) or parts_of(self.triangles) != before:
@@ -388,10 +394,5 @@ class LiquidSurface:
 
     def enclose(self, volume: float) -> None:
         """Move along the normals by one distance, contact lines along the wall, to enclose a volume [m^3]."""
-        enclosed, gradient = volume_and_gradient(self.points, self.triangles, (), ())
-        for ring in self.rings:
-            gradient[ring, 2] = 0.0
-        size = np.linalg.norm(gradient, axis=1)
-        normals = gradient / np.maximum(size, 1e-300)[:, None]
-        self.points += (volume - enclosed) / size.sum() * normals
+        self.points += surface_care.swelling(self.points, self.triangles, self.rings, volume)
         np.maximum(self.points[:, 2], 0.0 if self.law.mirror else -np.inf, out=self.points[:, 2])

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.core.surface_measure import triangle_areas
+from reflowshock.particles.core.surface_measure import triangle_areas, volume_and_gradient
 from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields
 from reflowshock.particles.surface.closing import closed_level
@@ -55,6 +55,9 @@ COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
 OVERLAP = 0.5
 # In particles: smaller parts are no liquid with a surface; two particles across, a sphere has four, a cube eight.
 FEWEST = 8
+# Of the vertices: with more that have no particle in reach, and follow the nearest one, it is not the liquid's surface
+# any more. An impact of Weber number 1000 whose rim breaks up has 0.003 of them at most.
+MOST_ALONE = 0.1
 # Of the wetted area: a surface made anew on a grid, which lacks more of it, has lost a film thinner than its cells.
 LOST_FILM = 0.03
 # Cares that are let go, at most, after attempts at that in vain: their number doubles.
@@ -63,7 +66,7 @@ WALL = Plate.horizontal(0.0)
 
 
 class SurfaceLost(ArithmeticError):
-    """Vertices of the surface have no particles beside them: the liquid has left it."""
+    """The liquid has left its surface, or that is none any more."""
 
 
 def changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
@@ -189,6 +192,18 @@ def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacin
     return not low * even < area.mean() < high * even or bool(
         (4.0 * np.sqrt(3.0) * area / square).min() < LOWEST_QUALITY
     )
+
+
+def swelling(points: Floats, triangles: Indices, rings: Sequence[Indices], volume: float) -> Floats:
+    """Return how vertices are to move `(m, 3)` [m], all as far along their normals, to enclose a volume [m^3].
+
+    Args: as `evened_out`; contact lines move along the wall.
+    """
+    enclosed, gradient = volume_and_gradient(points, triangles, (), ())
+    for ring in rings:
+        gradient[ring, 2] = 0.0
+    size = np.linalg.norm(gradient, axis=1)
+    return (volume - enclosed) / size.sum() * gradient / np.maximum(size, 1e-300)[:, None]
 
 
 def on_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bool_]:

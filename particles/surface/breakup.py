@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.surface.closing import groups, part_of_vertex
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops
 
 
 def unpinched(triangles: Indices) -> tuple[Indices, Indices]:
@@ -35,6 +36,27 @@ def unpinched(triangles: Indices) -> tuple[Indices, Indices]:
     return old, fan.reshape(-1, 3).astype(np.int32)
 
 
+def with_contact_lines(triangles: Indices) -> tuple[Indices, Indices, tuple[Indices, ...]]:
+    """Number the vertices that triangles have, and find contact lines; where these meet in a point they part there.
+
+    Args:
+        triangles: `(t, 3)`.
+
+    Returns:
+        The old vertex that each new one is at `(k,)`, triangles `(t, 3)` of new vertices, contact lines of them.
+
+    Raises:
+        CannotRebuild: more than two triangles meet in an edge.
+    """
+    used, numbers = np.unique(triangles, return_inverse=True)
+    triangles = numbers.reshape(-1, 3).astype(np.int32)
+    try:
+        return used, triangles, boundary_loops(triangles)
+    except CannotRebuild:
+        old, triangles = unpinched(triangles)
+        return used[old], triangles, boundary_loops(triangles)
+
+
 def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Floats]:
     """Find the connected parts of a surface that the wall z = 0 closes.
 
@@ -43,7 +65,7 @@ def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Float
         triangles: `(t, 3)`, outward oriented.
 
     Returns:
-        The part of each triangle `(t,)`, from 0 on, and what each part encloses [m^3].
+        The part of each triangle `(t,)`, from 0 on, and what each part encloses [m^3], cavities less than nothing.
     """
     part = part_of_vertex(triangles, len(points))[triangles[:, 0]]
     volumes = np.zeros(int(part.max()) + 1)
@@ -60,11 +82,13 @@ def largest_part(points: Floats, triangles: Indices) -> Floats:
 def small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArray[np.bool_], float]:
     """Find the parts that enclose less than a volume [m^3]; the largest never is one. Other arguments as above.
 
+    A cavity, which encloses less than nothing, is none.
+
     Returns:
         Whether each triangle is of such a part `(t,)`, and what these enclose together [m^3].
     """
     part, volumes = volumes_of_parts(points, triangles)
-    is_small = volumes < least
+    is_small = (volumes >= 0.0) & (volumes < least)
     is_small[volumes.argmax()] = False
     return is_small[part], float(volumes[is_small].sum())
 

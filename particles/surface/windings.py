@@ -10,26 +10,31 @@ from numba import njit
 
 
 @njit(cache=True)
-def _is_left(points, start, end, x, y):
-    """Whether x, y is left of an edge seen from above; both triangles at the edge get the same answer."""
-    a, b = points[min(start, end)], points[max(start, end)]
-    return ((b[0] - a[0]) * (y - a[1]) >= (b[1] - a[1]) * (x - a[0])) == (start < end)
+def _passes(a, b, x, y):
+    """Whether an edge from a to b, seen from above, passes x, y on the side of larger x: up (1), down (-1) or not (0).
+
+    Of its ends one is above y and one is not. So what is exactly on an edge, or on a vertex however many triangles meet
+    there, is as what is just beside it. Both triangles at an edge get the same answer, but for its sign.
+    """
+    if (a[1] <= y) == (b[1] <= y):
+        return 0
+    low, high, sign = (a, b, 1) if a[1] <= y else (b, a, -1)
+    return sign if (high[0] - low[0]) * (y - low[1]) > (high[1] - low[1]) * (x - low[0]) else 0
 
 
 @njit(cache=True)
 def _crossing(points, corners, x, y):
     """Whether the vertical through x, y leaves a body through a triangle (1), enters (-1) or misses it (0); where."""
-    i, j, k = corners
-    left = _is_left(points, i, j, x, y)
-    if _is_left(points, j, k, x, y) != left or _is_left(points, k, i, x, y) != left:
+    a, b, c = points[corners[0]], points[corners[1]], points[corners[2]]
+    sign = _passes(a, b, x, y) + _passes(b, c, x, y) + _passes(c, a, x, y)
+    if sign == 0:
         return 0, 0.0
-    a, b, c = points[i], points[j], points[k]
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     if area == 0.0:
-        return 1 if left else -1, (a[2] + b[2] + c[2]) / 3.0
+        return sign, (a[2] + b[2] + c[2]) / 3.0
     second = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
     third = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
-    return 1 if left else -1, a[2] + second * (b[2] - a[2]) + third * (c[2] - a[2])
+    return sign, a[2] + second * (b[2] - a[2]) + third * (c[2] - a[2])
 
 
 @njit(cache=True)

@@ -25,15 +25,15 @@ DECAY_ERROR = 0.05  # of the rate at which vortices die out
 DAM_LIMITS = {"volume_drift": VOLUME_DRIFT, "particles_lost": LOST, "energy_rise": ENERGY_RISE}
 CHANNEL_LIMITS = {"volume_drift": VOLUME_DRIFT, "profile_error_at_end": PROFILE_ERROR}
 VORTEX_LIMITS = {"volume_drift": VOLUME_DRIFT, "decay_rate_error": DECAY_ERROR}
-# Of a droplet: what its surface encloses, over the volume at the start; and where the exact shape at rest is known, its
-# pressure, roundness, width and height.
 # What breaks off in parts too small for particles flies on without tension: as much as volumes may be wrong by.
 SPRAY = 0.01
 # Of the film of an impact, in spacings: particles of a thinner one are 1.4 spacings apart, half as many as they need.
 THINNEST_FILM = 0.5
+# Of a droplet: what its surface encloses, over that at the start, at any time.
 DROPLET_LIMITS = {"volume_drift": VOLUME_DRIFT, "surface_volume_drift": 0.02, "spray_share": SPRAY}
-# Of a printed part: what particles and solid bodies have of the ink.
+# Of a printed part: what particles and solid bodies have of the ink; what is outside the surface of what is liquid.
 PART_LIMITS = {"volume_drift": 0.01, "volume_error": 0.01, "spray_share": SPRAY}
+# Of a droplet whose exact shape at rest is known.
 REST_LIMITS = {"pressure_error": 0.02, "roundness": 1.02, "base_error": 0.02, "height_error": 0.02}
 
 

@@ -50,8 +50,7 @@ class DropletTrial(Parameters):
     """A droplet, or two equal ones, for the duration of the scene.
 
     The second one lands beside the first, or they fly against each other along x, each with a speed, their paths so
-    many diameters apart. Where ``ends`` is given the liquid may part into drops that are too small, with a message that
-    has these words; measures are then those of the time before.
+    many diameters apart.
     """
 
     droplet: Droplet
@@ -59,7 +58,6 @@ class DropletTrial(Parameters):
     approach: Annotated[float, Quantity("m/s")] = Field(0.0, ge=0)
     offset: float = Field(0.0, ge=0, le=1)
     unrest: Unrest = Unrest()
-    ends: str = ""
 
 
 class TankTrial(Parameters):
@@ -147,22 +145,16 @@ class Watch:
 def droplet(parameters: DropletTrial) -> dict[str, Measured]:
     """Let one droplet or two move."""
     from reflowshock.particles.scenes.droplet import follow
-    from reflowshock.particles.sph.surface_care import SurfaceLost
 
     scene, simulation = parameters.droplet, droplets(parameters)
-    watch, count, shapes = Watch(simulation), 1 + (parameters.pair != "none"), {}
-    try:
-        result = follow(scene, simulation, watch)
-        shapes = _shape(parameters, result.history, result.metrics)
-    except SurfaceLost as error:
-        if not parameters.ends or parameters.ends not in str(error):
-            raise
-        watch(1.0)
+    watch, count = Watch(simulation), 1 + (parameters.pair != "none")
+    result = follow(scene, simulation, watch)
+    shapes = _shape(parameters, result.history, result.metrics)
     surface = simulation.surface
     assert surface is not None
     return watch.measured() | shapes | _pure(
         followed=simulation.time / scene.unit_of_time,
-        surface_volume=surface.volume / (count * scene.volume) - 1.0,
+        surface_volume=(surface.volume + surface.spray) / (count * scene.volume) - 1.0,
         outside=_outside(simulation),
         below_wall=float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
         mergers=sum(one.after < one.before for one in surface.meetings),

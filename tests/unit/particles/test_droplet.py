@@ -190,7 +190,7 @@ def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     assert len(surface.rings) == 1
     area, volume = surface.wetted_area, surface.volume
     assert area > 0.1
-    surface._make_anew()
+    surface._make_anew("worn")
     assert surface.rebuilds == 1
     assert surface.wetted_area == pytest.approx(area, rel=0.2)  # a foot of a spacing is closed, of 8 across
     assert surface.volume == pytest.approx(volume, rel=0.03)

@@ -65,6 +65,21 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     assert gaps.min() > scene.spacing
 
 
+def test_the_largest_spray_of_a_print_is_kept():
+    deposit = Deposit(printing())
+    deposit.add_drop((0.0, 0.0))
+    liquid = deposit.simulation.fluids * deposit.law.spacing**3
+    for share in (0.25, 0.125):
+        deposit.surface.spray = share * liquid
+        deposit.step(1.0)
+    assert deposit.spray == pytest.approx(0.25)
+    again = Deposit(printing())
+    again.restore(deposit.saved())
+    assert again.spray == deposit.spray
+    again.add_drop((23e-6, 0.0))
+    assert again.surface.spray == 0.0 and again.spray == deposit.spray
+
+
 def test_one_thread_and_two_print_the_same_bits():
     found = []
     for threads in (1, 2):
@@ -114,6 +129,7 @@ def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
         assert np.array_equal(column, continued.history[name]), name
     assert np.array_equal(whole.pictures[-1].points, continued.pictures[-1].points)
     assert np.array_equal(part.heights, same.heights)
+    assert whole.metrics["spray_share"] == continued.metrics["spray_share"]
     metrics = {name: value for name, (value, _) in whole.metrics.items()}
     assert metrics["drops"] == 2 and abs(metrics["volume_error"]) < 0.01 and abs(metrics["volume_drift"]) < 0.01
     assert metrics["roughness_sa"] > 0.0 and metrics["connected_parts_max"] in (1.0, 2.0)

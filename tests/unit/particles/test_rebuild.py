@@ -1,3 +1,5 @@
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from reflowshock.particles.surface.level_set import (
     relax,
     signed_distance,
     smooth_union,
+    windings_on,
 )
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
@@ -82,6 +85,23 @@ def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     clear = np.abs(exact) > 0.05 * R
     assert np.array_equal(level.values.ravel()[clear] < 0.0, exact[clear] < 0.0)
     assert np.array_equal(depths(nodes[clear], both) > 0.0, exact[clear] < 0.0)
+
+
+def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
+    """An octahedron: all triangles of its upper half meet above its centre, and edges lie above its axes."""
+    corners = np.concatenate((np.eye(3), -np.eye(3)))
+    sides = np.array([[x, y, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)], np.int32)
+    inward = np.linalg.det(corners[sides]) < 0.0
+    sides[inward] = sides[inward][:, ::-1]
+    grid = Grid(np.full(3, -1.5), 0.5, (7, 7, 7))
+    nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1)
+    distance = np.abs(nodes).sum(axis=-1) - 1.0
+    clear = distance != 0.0
+    for order in permutations(range(6)):
+        place = np.array(order, np.int32)
+        surface = corners[place], np.argsort(place).astype(np.int32)[sides]
+        assert np.array_equal(windings_on(grid, *surface)[clear], (distance < 0.0)[clear])
+        assert np.array_equal(depths(nodes[clear], surface) > 0.0, distance[clear] < 0.0)
 
 
 def test_smooth_union_closes_gaps_narrower_than_half_its_reach():
