@@ -141,10 +141,10 @@ class LaggedCholesky:
     def _factor(self, matrix: Band) -> None:
         """Factor a matrix, whose rows are overwritten."""
         matrix.rows[:, -1] += SHIFT
-        self.root, failed = lapack.spbtrf(matrix.rows.T, lower=0, overwrite_ab=1)
-        self.scale, self.order = matrix.scale[matrix.order], matrix.order
+        root, failed = lapack.spbtrf(matrix.rows.T, lower=0, overwrite_ab=1)
         if failed:
-            raise SolveFailed(f"Cholesky factors of {len(self.order)} pressures: pivot {failed} is not positive")
+            raise SolveFailed(f"Cholesky factors of {len(matrix.order)} pressures: pivot {failed} is not positive")
+        self.root, self.scale, self.order = root, matrix.scale[matrix.order], matrix.order
 
     def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
         """Solve with the factors that are kept."""

@@ -46,6 +46,8 @@ def test_it_is_the_default_with_inertia():
 
     assert (scheme(), scheme(SETTINGS[1])) == ("energy", "ispg")
     assert scheme(SETTINGS[1], "solder.numerics.scheme=energy") == "energy"
+    assert scheme("solder.process_time=1 ms") == "ispg"
+    assert scheme(SETTINGS[1], "solder.volume=0.26 mm^3") == "energy"
 
 
 def test_joints_without_inertia_are_refused():

@@ -33,7 +33,7 @@ from reflowshock.workflow.case.forecast import (
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.reflow.forecast import forecast_heated
-from reflowshock.workflow.reflow.joints import distinct_joints, joint_geometries
+from reflowshock.workflow.reflow.joints import distinct_joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +63,10 @@ class PackageForecast:
 
 def forecast(case: PackageCase) -> PackageForecast:
     """Predict sizes, time steps and cost of a run."""
-    from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
-    geometries = joint_geometries(pad_table(case.package, case.board, case.warpage))
+    geometries = case.joints
     given = () if case.thermal else case.package.surfaces
     flowing = {name: geometry for name, geometry in geometries.items() if name not in given}
     distinct = [group.geometry for group in distinct_joints(flowing)]

@@ -11,9 +11,8 @@ from reflowshock.workflow.board_drop.forecast import step_problems
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
 from reflowshock.workflow.package import given_surfaces
-from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.package.case import BoardDropCase, PackageCase, joint_geometries
 from reflowshock.workflow.reflow import forecast as reflow_forecast
-from reflowshock.workflow.reflow.joints import joint_geometries
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.geometry import JointGeometry

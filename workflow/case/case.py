@@ -1,7 +1,7 @@
 """What all kinds of case have in common."""
 
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from reflowshock.parameters import Parameters
 from reflowshock.workflow.case.names import Name
@@ -60,6 +60,10 @@ class Case(Parameters):
     def completed(cls, table: dict) -> dict:
         """Return the table of a case file with the defaults that depend on which tables it has."""
         return table
+
+    def resolved(self) -> Self:
+        """The case with what its file leaves open and its scene decides."""
+        return self
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

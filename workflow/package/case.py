@@ -1,17 +1,24 @@
 """The cases of a package on a board: its joints reflowed; then the board dropped, where a shock is given."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.fittings import BoardFittings
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
+from reflowshock.parameters import changed
 from reflowshock.particles.parameters.solder import Reflow, Solder
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import beside
 from reflowshock.workflow.package import given_surfaces
+
+if TYPE_CHECKING:
+    from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.particles.core.geometry import JointGeometry
 
 # Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
 LARGE_STEPS = 100.0
@@ -86,6 +93,16 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
 BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
+def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
+    """Return the geometry of each joint of a pad table, by name."""
+    from reflowshock.particles.core.geometry import JointGeometry
+
+    return {
+        pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package, pad.offset, pad.tilt)
+        for pad in pads
+    }
+
+
 class PackageCase(Case):
     """A package on a board, whose joints are reflowed and meshed."""
 
@@ -106,22 +123,33 @@ class PackageCase(Case):
 
     @classmethod
     def completed(cls, table: dict) -> dict:
-        """With temperatures take large time steps: load steps are at rest, only the shape there counts.
-
-        Without, and with inertia, take the scheme ispg, which costs less than tetrahedra.
-        """
+        """With temperatures take large time steps: load steps are at rest, only the shape there counts."""
         solder = table.get("solder")
-        if not isinstance(solder, dict):
+        if "thermal" not in table or not isinstance(solder, dict):
             return table
-        numerics, effects = solder.get("numerics", {}), solder.get("effects")
-        chosen: dict[str, object] = {}
-        if "thermal" in table:
-            chosen["time_step_limit"] = LARGE_STEPS
-        elif isinstance(effects, dict) and effects.get("inertia") == "on":
-            chosen["scheme"] = "ispg"
-        if not chosen or not isinstance(numerics, dict):
+        numerics = solder.get("numerics", {})
+        if not isinstance(numerics, dict):
             return table
-        return table | {"solder": solder | {"numerics": chosen | numerics}}
+        return table | {"solder": solder | {"numerics": {"time_step_limit": LARGE_STEPS} | numerics}}
+
+    def resolved(self) -> Self:
+        """With inertia, and without a scheme given, take ispg where it is verified: it costs less than tetrahedra."""
+        from reflowshock.meshing.board.checks import problems
+        from reflowshock.particles.parameters.joint_checks import unverified_joints
+
+        if self.thermal or "scheme" in self.solder.numerics.model_fields_set:
+            return self
+        if problems(self.package, self.board, self.warpage):
+            return self
+        ispg = changed(self.solder, "numerics.scheme", "ispg")
+        return self if unverified_joints(self.joints.values(), ispg) else self.model_copy(update={"solder": ispg})
+
+    @property
+    def joints(self) -> "dict[str, JointGeometry]":
+        """Geometry of each joint, by name, where temperatures move nothing."""
+        from reflowshock.meshing.board.pads import pad_table
+
+        return joint_geometries(pad_table(self.package, self.board, self.warpage))
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

@@ -76,10 +76,11 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
         return [joint[name]["value"] for joint in joints if name in joint]
 
     imbalance, lost = worst(values("energy_imbalance")), sum(values("particles_lost"))
+    resting = int(sum(values("at_rest")))
     times = [time for time in values("time_at_rest") if time == time]
     return Findings(
         metrics={
-            "joints_at_rest": metric(int(sum(values("at_rest")))),
+            "joints_at_rest": metric(resting),
             "joint_time_at_rest_max": metric(worst(times), "s"),
             "joint_steps_max": metric(max(values("steps"), default=0)),
             "joint_energy_imbalance_max": metric(imbalance),
@@ -90,6 +91,7 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
         health={
             "joint_energy_imbalance_max": at_most(imbalance, ENERGY_IMBALANCE),
             "joint_particles_lost": at_most(int(lost), 0),
+            "joints_in_motion": at_most(len(joints) - resting, 0),
         },
     )
 

@@ -62,6 +62,7 @@ def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: di
     except ValidationError as error:
         problems += translate(kind, error, table, {problem.key for problem in problems})
     if case is not None and not problems:
+        case = case.resolved()
         problems = gate.problems_of(case, leave)
     if case is None or problems:
         raise CaseError(str(path), problems)

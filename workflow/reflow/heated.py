@@ -11,13 +11,13 @@ from reflowshock.fem import statics
 from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.workflow.case.run import Run, at_most, metric
-from reflowshock.workflow.package.case import PackageCase
+from reflowshock.workflow.package.case import PackageCase, joint_geometries
 from reflowshock.workflow.process.terminal import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import JointArray, Left, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed, scale_of, start
 from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
-from reflowshock.workflow.reflow.joints import Alike, joint_geometries
+from reflowshock.workflow.reflow.joints import Alike
 from reflowshock.workflow.reflow.pool import Shares
 from reflowshock.workflow.reflow.processes import open_pool
 from reflowshock.workflow.reflow.rigid_balance import RigidBalance

@@ -38,16 +38,6 @@ def records() -> tuple[type, ...]:
     return JointReflow, JointGeometry, Solder, JointShape, Snapshot
 
 
-def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
-    """Return the geometry of each joint of a pad table, by name."""
-    from reflowshock.particles.core.geometry import JointGeometry
-
-    return {
-        pad.name: JointGeometry(pad.gap, pad.wetted_radius_board, pad.wetted_radius_package, pad.offset, pad.tilt)
-        for pad in pads
-    }
-
-
 @dataclass(frozen=True, slots=True)
 class Alike:
     """Joints that are alike but for how they lie.

@@ -9,7 +9,7 @@ import numpy as np
 
 from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.package import findings
-from reflowshock.workflow.package.case import PackageCase
+from reflowshock.workflow.package.case import PackageCase, joint_geometries
 from reflowshock.workflow.package.given_surfaces import given_records
 from reflowshock.workflow.process.products import write_json
 from reflowshock.workflow.process.terminal import progress_bar
@@ -75,7 +75,7 @@ def reflow(run: Run[PackageCase], folder: Path) -> Findings:
 
 def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
     """Each distinct joint once, between plates that are where the pad table has them; none whose surface is given."""
-    geometries = pool.joint_geometries(pads)
+    geometries = joint_geometries(pads)
     given = run.case.package.surfaces
     groups = pool.distinct_joints({name: geometries[name] for name in geometries if name not in given})
     distinct = {group.name: group.geometry for group in groups}

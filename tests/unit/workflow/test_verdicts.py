@@ -50,6 +50,7 @@ def test_joints_with_an_account_of_their_energy_are_judged_by_it(records):
     found = findings.of_reflow(records, {})
     assert found.health["joint_energy_imbalance_max"]["ok"] and found.health["joint_particles_lost"]["ok"]
     assert (found.metrics["joints_at_rest"]["value"], found.metrics["joint_time_at_rest_max"]["value"]) == (3, 2e-3)
+    assert found.health["joints_in_motion"]["value"] == 1 and not found.health["joints_in_motion"]["ok"]
     records["A1"]["metrics"] |= {"energy_imbalance": {"value": -0.03}, "particles_lost": {"value": 1.0}}
     found = findings.of_reflow(records, {})
     assert not found.health["joint_energy_imbalance_max"]["ok"] and not found.health["joint_particles_lost"]["ok"]
