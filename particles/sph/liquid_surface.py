@@ -110,7 +110,7 @@ class LiquidSurface:
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
-        self.moves, self.rebuilds, self.waits = saved["moves"], saved["rebuilds"], saved["waits"]
+        self.moves, self.rebuilds, self.waits = saved["moves"], saved["rebuilds"], dict(saved["waits"])
         self._built_at, self._shares = saved["built_at"], saved["shares"]
         self.meetings, self.pressure = saved["meetings"], saved["pressure"]
         self.shed, self.spray = saved["shed"], saved["spray"]
