@@ -25,7 +25,7 @@ from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
 from reflowshock.particles.surface.closing import without_slits
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, cloud_from_level_set
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, lidded
 from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
@@ -139,7 +139,10 @@ def _keep_centre(old: Sequence[Moving], new: Sequence[Moving]) -> None:
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
     """Surface of a body, with its mirror image behind each wall: points `(n, 3)` [m] and triangles.
 
-    It is closed on one wall; between two it ends far behind them.
+    On one wall that closes it; between two it has lids far behind them.
+
+    Raises:
+        CannotRebuild: contact lines meet in a point.
     """
     count, triangles = body.cloud.surface_count, body.triangles
     points, faces = [body.points[:count]], [triangles]
@@ -151,7 +154,8 @@ def closed_surface(body: Body) -> tuple[Floats, Indices]:
         mirrored = points[0] * np.array([1.0, 1.0, -1.0]) + 2.0 * plate.origin * np.array([0.0, 0.0, 1.0])
         points.append(mirrored)
         faces.append(image[triangles][:, ::-1])
-    return np.concatenate(points), np.concatenate(faces)
+    all_faces = np.concatenate(faces)
+    return lidded(np.concatenate(points), all_faces, boundary_loops(all_faces))
 
 
 def _walls(body: Body) -> tuple[Plate, ...]:

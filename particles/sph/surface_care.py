@@ -23,6 +23,7 @@ from reflowshock.particles.surface.cloud_level_set import (
     area_within,
     between,
     boundary_loops,
+    lidded,
     mirrored,
 )
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
@@ -85,12 +86,10 @@ def without_dry_spots(
     spots = [ring for ring in rings if -(spacing**2) < area_within(points[ring]) < 0.0]
     if not spots:
         return None
-    points = np.concatenate((points, [points[ring].mean(axis=0) for ring in spots]))
-    lids = []
-    for number, ring in enumerate(spots, len(points) - len(spots)):
-        points[ring, 2] = points[number, 2] = TOUCH * spacing
-        lids.append(np.stack((np.roll(ring, -1), ring, np.full_like(ring, number)), axis=1))
-    return points, np.concatenate((triangles, *lids)).astype(np.int32)
+    points, triangles = lidded(points, triangles, spots)
+    for middle, ring in enumerate(spots, len(points) - len(spots)):
+        points[ring, 2] = points[middle, 2] = TOUCH * spacing
+    return points, triangles
 
 
 def triangulated(level: LevelSet, mirror: bool) -> tuple[Floats, Indices, tuple[Indices, ...]]:

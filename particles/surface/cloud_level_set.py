@@ -94,6 +94,18 @@ def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
     return tuple(loops)
 
 
+def lidded(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[Floats, Indices]:
+    """Return points and triangles of a surface with lids on rings, as `boundary_loops` has them: fans about middles."""
+    if not rings:
+        return points, triangles
+    middles = [points[ring].mean(axis=0) for ring in rings]
+    lids = [
+        np.stack((np.roll(ring, -1), ring, np.full_like(ring, middle)), axis=1)
+        for middle, ring in enumerate(rings, len(points))
+    ]
+    return np.concatenate((points, middles)), np.concatenate((triangles, *lids)).astype(np.int32)
+
+
 def _snap(points: Floats, ring: Indices, plate: Plate, spacing: float) -> Indices:
     """Put vertices of a contact line that are near the edge of a pad on it; return them."""
     local, caught = plate.local(points[ring]), np.zeros(len(ring), bool)
