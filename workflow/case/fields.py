@@ -146,7 +146,8 @@ def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]
         model = model_of(field, value)
         if model is None:
             return value
-        defaults = field.default.model_dump() if isinstance(field.default, model) else {}
+        # What the default leaves to its model is left to it here, too: so it is known what a case has set.
+        defaults = field.default.model_dump(exclude_unset=True) if isinstance(field.default, model) else {}
         return defaults | to_si_table(model, value, key + ".", problems)
     return value
 
