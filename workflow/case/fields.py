@@ -146,8 +146,10 @@ def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]
         model = model_of(field, value)
         if model is None:
             return value
-        # What the default leaves to its model is left to it here, too: so it is known what a case has set.
-        defaults = field.default.model_dump(exclude_unset=True) if isinstance(field.default, model) else {}
+        given = field.default.model_dump() if isinstance(field.default, model) else {}
+        # Its kind apart, what is the model's own default is left to it: so it is known what a case has set.
+        own = model.model_fields
+        defaults = {name: one for name, one in given.items() if name == "kind" or one != own[name].default}
         return defaults | to_si_table(model, value, key + ".", problems)
     return value
 
