@@ -7,7 +7,6 @@ its gradient are exactly those of the surface.
 """
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
@@ -16,6 +15,7 @@ from reflowshock.arrays import Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, thick_cells
+from reflowshock.particles.core.windings import winding_numbers
 
 Mask = NDArray[np.bool_]
 
@@ -117,28 +117,3 @@ def _cones(triangles: Indices, start: int, wall: NDArray[np.int8]) -> Indices:
     apex = np.asarray(votes.argmax(axis=1)).ravel()[part].astype(np.int32)
     cones = np.column_stack((apex, triangles))
     return cones[(triangles != apex[:, None]).all(axis=1)]
-
-
-@njit(cache=True, parallel=True)
-def winding_numbers(points, corners):
-    """Turns of a surface around each point, `(n,)`: 1 inside, 0 outside, up to rounding.
-
-    Solid angles of triangles after van Oosterom & Strackee (1983).
-
-    Args:
-        points: `(n, 3)` [m].
-        corners: `(t, 3, 3)` of the triangles, outward oriented [m].
-    """
-    result = np.zeros(points.shape[0])
-    for i in prange(points.shape[0]):
-        total = 0.0
-        for t in range(corners.shape[0]):
-            ax, ay, az = corners[t, 0] - points[i]
-            bx, by, bz = corners[t, 1] - points[i]
-            cx, cy, cz = corners[t, 2] - points[i]
-            a, b, c = np.sqrt(ax**2 + ay**2 + az**2), np.sqrt(bx**2 + by**2 + bz**2), np.sqrt(cx**2 + cy**2 + cz**2)
-            triple = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-            ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
-            total += np.arctan2(triple, a * b * c + ab * c + bc * a + ca * b)
-        result[i] = total / (2.0 * np.pi)
-    return result

@@ -87,7 +87,7 @@ def solve_printing(
 
     Raises:
         FloatingPointError: a position is not finite.
-        SurfaceLost: liquid breaks into parts that are too small for its particles.
+        SurfaceLost: the liquid has left its surface, or that is none any more.
     """
     run = PrintRun(Deposit(scene))
     saved = checkpoint.read((Picture, Meeting)) if checkpoint else None

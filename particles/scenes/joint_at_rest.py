@@ -112,10 +112,13 @@ def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: fl
     if "standoff" not in shape.history:
         return shape
     standoff, way = shape.history["standoff"], np.sign(joint.places[-1].gap - joint.standoff)
-    knots = np.linspace(standoff.min(), standoff.max(), KNOTS)
-    meridians = [reference_meridian(replace(joint.geometry, gap=gap), solder, weight) for gap in knots]
-    pulls = [np.nan if meridian is None or way == 0.0 else -way * meridian.axial_force for meridian in meridians]
-    return replace(shape, history=shape.history | {"pull_exact": np.interp(standoff, knots, pulls)})
+    pull = np.full_like(standoff, np.nan)
+    if way:
+        knots = np.linspace(standoff.min(), standoff.max(), KNOTS)
+        meridians = [reference_meridian(replace(joint.geometry, gap=gap), solder, weight) for gap in knots]
+        pulls = [np.nan if meridian is None else -way * meridian.axial_force for meridian in meridians]
+        pull = np.interp(standoff, knots, pulls)
+    return replace(shape, history=shape.history | {"pull_exact": pull})
 
 
 def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> Metrics:

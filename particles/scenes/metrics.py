@@ -11,7 +11,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
-from reflowshock.particles.discretisation.inner_tetrahedra import winding_numbers
+from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.ledger import total_losses
 from reflowshock.particles.parameters.solder import Solder

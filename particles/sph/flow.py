@@ -253,9 +253,9 @@ def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> Flo
     """Return what a run found, with the metrics that all flows have."""
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields
-    volume = fields.mass[:fluids] / fields.density[:fluids]
+    at_start = fluids * simulation.law.spacing**simulation.law.dimension
     shared = {
-        "volume_drift": (float(volume.sum() / (fluids * simulation.law.spacing**simulation.law.dimension) - 1.0), ""),
+        "volume_drift": (simulation.volume / at_start - 1.0, ""),
         "particles": (float(fluids), ""),
         "steps": (float(simulation.steps), ""),
         "particle_steps_per_second": (simulation.steps * fluids / run.seconds, "1/s"),

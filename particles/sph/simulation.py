@@ -127,6 +127,11 @@ class Simulation:
         return 0.5 * float(fields.mass[: self.fluids] @ (u * u + v * v + w * w))
 
     @property
+    def volume(self) -> float:
+        """Of the particles of the liquid [m^3]."""
+        return float((self.fields.mass[: self.fluids] / self.fields.density[: self.fluids]).sum())
+
+    @property
     def elastic_energy(self) -> float:
         """Of the compression of the liquid [J]: the work of pressure from the density at rest on."""
         density, mass = (one[: self.fluids] for one in (self.fields.density, self.fields.mass))

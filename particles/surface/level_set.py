@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.surface import windings
+from reflowshock.particles.core import windings
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 RELAXATIONS = 30
@@ -94,10 +94,9 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
 
 def depths(points: Floats, surface: tuple[Floats, Indices]) -> Floats:
     """How deep points `(n, 3)` are inside a closed surface, negative outside, `(n,)` [m]; arguments as above."""
-    found = np.zeros(len(points), np.int32)
-    windings.about(points, *surface, found)
-    distance = _distance(pyvista.PolyData(points), *surface)
-    return np.where(found > 0, distance, -distance)
+    corners, triangles = surface
+    distance = _distance(pyvista.PolyData(points), corners, triangles)
+    return np.where(windings.winding_numbers(points, corners[triangles]) > 0.5, distance, -distance)
 
 
 def _distance(nodes: pyvista.DataSet, points: Floats, triangles: Indices) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from reflowshock.arrays import Floats
-from reflowshock.cases.hard.trial import Measured, Trial
+from reflowshock.cases.hard.trial import Trial, pure_trial
 from reflowshock.parameters import Parameters, changed
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flows import DamBreak
@@ -116,7 +116,7 @@ class Watch:
             )
         )  # fmt: skip
 
-    def measured(self) -> dict[str, Measured]:
+    def measured(self) -> dict[str, float]:
         """Measures that all liquids have."""
         time, energy, fastest, momentum, squeezed, pressure, *centre = np.array(self.rows).T
         law, mass = self.simulation.law, float(self.simulation.fields.mass[: self.simulation.fluids].sum())
@@ -124,25 +124,21 @@ class Watch:
         early, late = (time >= share * time[-1] for share in (EARLY, LATE))
         middle = early & (time <= 2.0 * EARLY * time[-1])
         aside = np.hypot(*(place - place[early][0] for place in centre[:2]))
-        return _pure(
-            steps=self.simulation.steps,
-            energy_over_start=energy.max() / energy[0] - 1.0,
-            energy_rise=(later - energy).max() / abs(energy[0]),
-            mach=fastest.max() / law.sound,
-            density_change=squeezed.max(),
-            momentum=np.abs(momentum - momentum[0]).max() / (mass * fastest.max()) if fastest.max() else 0.0,
-            speed_growth=fastest[late].mean() / fastest[middle].mean(),
-            pressure_drift=pressure[late].mean() / pressure[middle].mean() - 1.0,
-            drift_aside=aside[early].max() / law.spacing,
-            volume_drift=self._volume() / (self.simulation.fluids * law.spacing**law.dimension) - 1.0,
-        )
-
-    def _volume(self) -> float:
-        fields, liquid = self.simulation.fields, slice(self.simulation.fluids)
-        return float((fields.mass[liquid] / fields.density[liquid]).sum())
+        return {
+            "steps": self.simulation.steps,
+            "energy_over_start": energy.max() / energy[0] - 1.0,
+            "energy_rise": (later - energy).max() / abs(energy[0]),
+            "mach": fastest.max() / law.sound,
+            "density_change": squeezed.max(),
+            "momentum": np.abs(momentum - momentum[0]).max() / (mass * fastest.max()) if fastest.max() else 0.0,
+            "speed_growth": fastest[late].mean() / fastest[middle].mean(),
+            "pressure_drift": pressure[late].mean() / pressure[middle].mean() - 1.0,
+            "drift_aside": aside[early].max() / law.spacing,
+            "volume_drift": self.simulation.volume / (self.simulation.fluids * law.spacing**law.dimension) - 1.0,
+        }
 
 
-def droplet(parameters: DropletTrial) -> dict[str, Measured]:
+def droplet(parameters: DropletTrial) -> dict[str, float]:
     """Let one droplet or two move."""
     from reflowshock.particles.scenes.droplet import follow
 
@@ -152,13 +148,13 @@ def droplet(parameters: DropletTrial) -> dict[str, Measured]:
     shapes = _shape(parameters, result.history, result.metrics)
     surface = simulation.surface
     assert surface is not None
-    return watch.measured() | shapes | _pure(
-        followed=simulation.time / scene.unit_of_time,
-        surface_volume=(surface.volume + surface.spray) / (count * scene.volume) - 1.0,
-        outside=_outside(simulation),
-        below_wall=float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
-        mergers=sum(one.after < one.before for one in surface.meetings),
-    )  # fmt: skip
+    return watch.measured() | shapes | {
+        "followed": simulation.time / scene.unit_of_time,
+        "surface_volume": (surface.volume + surface.spray) / (count * scene.volume) - 1.0,
+        "outside": _outside(simulation),
+        "below_wall": float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
+        "mergers": sum(one.after < one.before for one in surface.meetings),
+    }  # fmt: skip
 
 
 def droplets(parameters: DropletTrial) -> "Simulation":
@@ -186,7 +182,7 @@ def droplets(parameters: DropletTrial) -> "Simulation":
     return Simulation(fields, len(fields.x), one.law, surface, flow.device_of(scene))
 
 
-def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, Measured]:
+def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, float]:
     """Errors of the shape that all liquid together would have at rest, and what an impact spread to."""
     scene, late = parameters.droplet, history["time"] >= LATE * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
@@ -198,10 +194,10 @@ def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[s
     }
     if not scene.has_wall:
         pressure = mean["mean_pressure"] / scene.laplace_pressure * size - 1.0
-        return _pure(**found, pressure_error=pressure, roundness=mean["roundness"])
+        return found | {"pressure_error": pressure, "roundness": mean["roundness"]}
     base, height = cap(scene.angle)
     errors = {"base_error": mean["base"] / (size * base) - 1.0, "height_error": mean["height"] / (size * height) - 1.0}
-    return _pure(**found, **errors)
+    return found | errors
 
 
 def _outside(simulation: "Simulation") -> float:
@@ -217,16 +213,16 @@ def _outside(simulation: "Simulation") -> float:
     return float((inside < -OUTSIDE * simulation.law.spacing).mean())
 
 
-def tank(parameters: TankTrial) -> dict[str, Measured]:
+def tank(parameters: TankTrial) -> dict[str, float]:
     """Let a column in a tank flow, or rest; noise is that of the pressure about that at rest, over rho g H."""
     found, noise = _tank(parameters)
     if parameters.undiffused:
         rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
-        found["noise_gain"] = Measured(_tank(rough)[1] / noise)
+        found["noise_gain"] = _tank(rough)[1] / noise
     return found
 
 
-def _tank(parameters: TankTrial) -> tuple[dict[str, Measured], float]:
+def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
     from reflowshock.particles.scenes.dam_break import dam, particles_lost
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
@@ -247,16 +243,16 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, Measured], float]:
     history = flow.run_flow(simulation, scene.until, errors, watch).history(("time", "mean", "noise"))
     late = history["time"] >= LATE * history["time"][-1]
     noise = float(history["noise"][late].mean())
-    found = _pure(
-        noise=noise,
-        pressure_error=history["mean"][late].mean(),
-        particles_lost=particles_lost(scene, simulation),
-        speed_at_end=np.array(watch.rows)[-1, 2] / scene.fastest,
-    )
+    found = {
+        "noise": noise,
+        "pressure_error": history["mean"][late].mean(),
+        "particles_lost": particles_lost(scene, simulation),
+        "speed_at_end": np.array(watch.rows)[-1, 2] / scene.fastest,
+    }
     return watch.measured() | found, noise
 
 
-def printed(parameters: PrintTrial) -> dict[str, Measured]:
+def printed(parameters: PrintTrial) -> dict[str, float]:
     """Print a part; the largest speed is over that of sound, lengths over the diameter of a drop or the spacing."""
     from scipy.spatial import cKDTree
 
@@ -267,22 +263,14 @@ def printed(parameters: PrintTrial) -> dict[str, Measured]:
     points = result.pictures[-1].points
     nearest = cKDTree(points).query(points, k=2)[0][:, 1]
     names = ("volume_error", "volume_drift", "connected_parts_max", "mergers", "splits", "voids", "steps")
-    return _pure(
+    return {
         **{name: result.metrics[name][0] for name in names},
-        mach=result.history["largest_speed"].max() / scene.sound,
-        closest=nearest.min() / scene.spacing,
-        farthest=nearest.max() / scene.spacing,
-        below_wall=float((points[:, 2] < 0.0).sum()),
-        height=part.heights.max() / scene.length,
-    )
-
-
-def _pure(**values: float) -> dict[str, Measured]:
-    return {name: Measured(float(value)) for name, value in values.items()}
-
-
-def _names(text: str) -> dict[str, str]:
-    return dict.fromkeys(text.split(), "")
+        "mach": result.history["largest_speed"].max() / scene.sound,
+        "closest": nearest.min() / scene.spacing,
+        "farthest": nearest.max() / scene.spacing,
+        "below_wall": float((points[:, 2] < 0.0).sum()),
+        "height": part.heights.max() / scene.length,
+    }
 
 
 MOTION = (
@@ -297,7 +285,9 @@ PRINTED = (
     "volume_error volume_drift connected_parts_max mergers splits voids steps mach closest farthest below_wall height"
 )
 TRIALS: dict[str, Trial] = {
-    "droplet": Trial(DropletTrial, droplet, _names(f"{MOTION} {SHAPES}")),
-    "tank": Trial(TankTrial, tank, _names(f"{MOTION} noise pressure_error particles_lost speed_at_end noise_gain")),
-    "print": Trial(PrintTrial, printed, _names(PRINTED)),
+    "droplet": pure_trial(DropletTrial, "droplets:droplet", f"{MOTION} {SHAPES}"),
+    "tank": pure_trial(
+        TankTrial, "droplets:tank", f"{MOTION} noise pressure_error particles_lost speed_at_end noise_gain"
+    ),
+    "print": pure_trial(PrintTrial, "droplets:printed", PRINTED),
 }

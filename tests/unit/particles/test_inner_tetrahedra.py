@@ -8,9 +8,10 @@ from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_clou
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import cell_volumes, volume_gradients
+from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
 from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
-from reflowshock.particles.discretisation.inner_tetrahedra import fill, winding_numbers
+from reflowshock.particles.discretisation.inner_tetrahedra import fill
 
 CLOUDS = {
     "ball": lambda: sphere_cloud(1.0, 3),

@@ -1,4 +1,4 @@
-"""How often a closed surface winds round points: the signs of its crossings above them, summed.
+"""How often a surface winds round points: by solid angles; for the nodes of a grid by its crossings above them, summed.
 
 The winding number does not ask which triangle is nearest. So it holds where a surface is folded, or sheets of it have
 crossed, as they do for some steps where a narrow groove closes; there the nearest sheet may face the wrong way.
@@ -6,7 +6,8 @@ crossed, as they do for some steps where a narrow groove closes; there the neare
 
 from math import ceil, floor
 
-from numba import njit
+import numpy as np
+from numba import njit, prange
 
 
 @njit(cache=True)
@@ -38,16 +39,6 @@ def _crossing(points, corners, x, y):
 
 
 @njit(cache=True)
-def about(places, points, triangles, found):
-    """Add the windings round places `(n, 3)` to what is found `(n,)`."""
-    for n in range(places.shape[0]):
-        for t in range(triangles.shape[0]):
-            sign, height = _crossing(points, triangles[t], places[n, 0], places[n, 1])
-            if height > places[n, 2]:
-                found[n] += sign
-
-
-@njit(cache=True)
 def on_grid(points, triangles, origin, spacing, found):
     """Add the windings round the nodes of a grid to what is found, an array of its counts."""
     last_x, last_y, last_z = found.shape[0] - 1, found.shape[1] - 1, found.shape[2] - 1
@@ -62,3 +53,28 @@ def on_grid(points, triangles, origin, spacing, found):
                     found[column, row, below] += sign
     for level in range(last_z - 1, -1, -1):
         found[:, :, level] += found[:, :, level + 1]
+
+
+@njit(cache=True, parallel=True)
+def winding_numbers(points, corners):
+    """Turns of a surface around each point, `(n,)`: 1 inside, 0 outside, up to rounding.
+
+    Solid angles of triangles after van Oosterom & Strackee (1983).
+
+    Args:
+        points: `(n, 3)` [m].
+        corners: `(t, 3, 3)` of the triangles, outward oriented [m].
+    """
+    result = np.zeros(points.shape[0])
+    for i in prange(points.shape[0]):
+        total = 0.0
+        for t in range(corners.shape[0]):
+            ax, ay, az = corners[t, 0] - points[i]
+            bx, by, bz = corners[t, 1] - points[i]
+            cx, cy, cz = corners[t, 2] - points[i]
+            a, b, c = np.sqrt(ax**2 + ay**2 + az**2), np.sqrt(bx**2 + by**2 + bz**2), np.sqrt(cx**2 + cy**2 + cz**2)
+            triple = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+            ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
+            total += np.arctan2(triple, a * b * c + ab * c + bc * a + ca * b)
+        result[i] = total / (2.0 * np.pi)
+    return result
