@@ -54,7 +54,7 @@ class PlaceByModule:
         if VARIABLE not in os.environ or not function.__module__.startswith(PACKAGES):
             return None
         place = cls(function, file)
-        return place if _is_made(Path(place.get_cache_path())) else None
+        return place if _is_ready(place.get_cache_path()) else None
 
     def get_cache_path(self) -> str:
         """Return its folder."""
@@ -71,6 +71,11 @@ class PlaceByModule:
     def get_disambiguator(self) -> str:
         """Return what tells kernels of one name in a file apart."""
         return str(inspect.unwrap(self._function).__code__.co_firstlineno)
+
+
+@cache
+def _is_ready(folder: str) -> bool:
+    return _is_made(Path(folder))
 
 
 @cache
