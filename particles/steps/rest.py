@@ -227,8 +227,8 @@ def _step(flow: LiquidFlow) -> StepRecord:
         with threads_for(len(flow.body.points)):
             return flow.step()
     except (ArithmeticError, SolveFailed, StepCollapsed) as error:
-        if flow.solver.flaw is not None:
-            raise SchemeBroke(f"{where}: {flow.solver.flaw} ({type(error).__name__}: {error})") from error
+        if flow.solver.traits.flaw is not None:
+            raise SchemeBroke(f"{where}: {flow.solver.traits.flaw} ({type(error).__name__}: {error})") from error
         if not isinstance(error, SolveFailed | ZeroDivisionError):
             raise
         raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
