@@ -43,16 +43,28 @@ def on_grid(points, triangles, origin, spacing, found):
     """Add the windings round the nodes of a grid to what is found, an array of its counts."""
     last_x, last_y, last_z = found.shape[0] - 1, found.shape[1] - 1, found.shape[2] - 1
     for t in range(triangles.shape[0]):
-        corner = (points[triangles[t]] - origin) / spacing
-        for column in range(max(0, floor(corner[:, 0].min())), min(last_x, ceil(corner[:, 0].max())) + 1):
-            for row in range(max(0, floor(corner[:, 1].min())), min(last_y, ceil(corner[:, 1].max())) + 1):
+        first_column, end_column = _nodes_beside(points, triangles[t], 0, origin, spacing)
+        first_row, end_row = _nodes_beside(points, triangles[t], 1, origin, spacing)
+        for column in range(max(0, first_column), min(last_x + 1, end_column)):
+            for row in range(max(0, first_row), min(last_y + 1, end_row)):
                 x, y = origin[0] + spacing * column, origin[1] + spacing * row
                 sign, height = _crossing(points, triangles[t], x, y)
                 below = min(last_z, ceil((height - origin[2]) / spacing) - 1)
                 if sign != 0 and below >= 0:
                     found[column, row, below] += sign
-    for level in range(last_z - 1, -1, -1):
-        found[:, :, level] += found[:, :, level + 1]
+    for column in range(last_x + 1):
+        for row in range(last_y + 1):
+            for level in range(last_z - 1, -1, -1):
+                found[column, row, level] += found[column, row, level + 1]
+
+
+@njit(cache=True)
+def _nodes_beside(points, corners, axis, origin, spacing):
+    """First node of a grid along an axis that is near a triangle, and the one behind the last."""
+    a = (points[corners[0], axis] - origin[axis]) / spacing
+    b = (points[corners[1], axis] - origin[axis]) / spacing
+    c = (points[corners[2], axis] - origin[axis]) / spacing
+    return floor(min(a, b, c)), ceil(max(a, b, c)) + 1
 
 
 @njit(cache=True, parallel=True)

@@ -120,7 +120,7 @@ def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
     rows.update(fields[:3])
     inner = np.flatnonzero((np.abs(fields.x - 0.5) < 0.3) & (np.abs(fields.z - 0.5) < 0.3))
     for i in inner[::7]:
-        found = rates_of(i, simulation.fluids, rows.of(i), fields, law)
+        found = rates_of(np.uint64(i), simulation.fluids, rows.of(i), fields, law)
         assert found[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
         assert abs(found[0]) < 1e-12 * law.sound / law.length
     assert solved((1e-3, 0.0, 1e-3, 0.0, 0.0, 0.0), (1.0, 0.0, 1.0), 2) == (0.0, 0.0, 0.0)
@@ -142,9 +142,9 @@ def test_the_reproducing_gradient_is_exact_for_linear_densities_at_surfaces_and_
     rows = Rows(law, lattice.shape[1])
     rows.update(fields[:3])
     for i in range(lattice.shape[1]):
-        found = rates_of(i, lattice.shape[1], rows.of(i), fields, law)
+        found = rates_of(np.uint64(i), lattice.shape[1], rows.of(i), fields, law)
         assert found[4:7] == pytest.approx(tuple(slopes), abs=1e-9)
-    alone = rates_of(0, lattice.shape[1], rows.of(0)[:3], fields, law)
+    alone = rates_of(np.uint64(0), lattice.shape[1], rows.of(0)[:3], fields, law)
     assert alone[4:7] == (0.0, 0.0, 0.0)  # too few neighbours
 
 
