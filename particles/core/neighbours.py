@@ -1,6 +1,6 @@
 """Neighbour lists: cell grid, compressed rows, Verlet skin."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any
@@ -148,14 +148,11 @@ def _in_blocks(
 
 
 @njit(cache=True, parallel=True)
-def _fill_rows(places, within, grid, rows, counts):
-    """Write who is near each place into rows of equal length, how many into counts; return the largest of these.
-
-    ``within``: the radius, and how many points see and are seen by all.
-    """
-    (radius, movers), points, most = within, grid[1].shape[0], 0
+def _fill_rows(places, radius, grid, rows, counts):
+    """Write who of a grid is near each place into rows of equal length, how many into counts; the largest of these."""
+    points, most = grid[1].shape[0], 0
     for i in prange(places.shape[0]):
-        counts[i] = visit(places[i], (-1, points if i < movers else movers), radius, grid, rows[i])
+        counts[i] = visit(places[i], (-1, points), radius, grid, rows[i])
         most = max(most, counts[i])
     return most
 
@@ -213,14 +210,23 @@ def list_beside(places: Points, points: Points, radius: float, movers: int, rows
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    grid, counts = _grid(places, points, radius), np.empty(len(places), np.int32)
-    most = rows.shape[1]
+    grid, counts, most = _grid(places, points, radius), np.empty(len(places), np.int32), rows.shape[1]
+    sides = [(slice(movers), grid)]
+    if movers < len(places):  # the same cells without the other points, which few of the other places are near
+        sides.append((slice(movers, None), _with_points(points[:movers], *grid[3:])))
     if len(rows) == len(places) and most:
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     while len(rows) != len(places) or most >= rows.shape[1]:  # the last place of a row is there for what does not fit
         rows = np.empty((len(places), max(most + most // SPARE + 1, FEWEST)), np.int32)
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     return rows, counts
+
+
+def _fill(
+    sides: Sequence[tuple[slice, tuple[Any, ...]]], places: Points, radius: float, rows: Indices, counts: Indices
+) -> int:
+    """Fill the rows of places from the grid that each side of them sees; return the largest count."""
+    return max(_fill_rows(places[side], radius, grid, rows[side], counts[side]) for side, grid in sides)
 
 
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
@@ -229,7 +235,11 @@ def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
     if astray or _extent(places)[2]:
         raise FloatingPointError("find_neighbours: a particle position is not finite")
     origin, size = np.array(low), radius / REACH
-    shape = ((np.array(high) - origin) / size).astype(np.int64) + 1
+    return _with_points(points, origin, size, ((np.array(high) - origin) / size).astype(np.int64) + 1)
+
+
+def _with_points(points: Points, origin: Points, size: float, shape: Indices) -> tuple[Any, ...]:
+    """Points in the cells of a grid."""
     return (*_sort_into_cells(points, origin, size, shape, get_num_threads()), origin, size, shape)
 
 
