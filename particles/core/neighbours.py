@@ -19,6 +19,8 @@ REACH = 2
 BLOCK = 8192
 # Rows of equal length have at least so many places, and the so manieth part more than they need.
 FEWEST, SPARE = 32, 8
+# What makes no arrays counts no references to those it is given, on which threads would wait for each other.
+uncounted = njit(cache=True, _nrt=False)
 
 
 @njit(cache=True, parallel=True)
@@ -54,7 +56,7 @@ def _sort_into_cells(points, origin, size, shape, parts):
     return start, order, places
 
 
-@njit(cache=True)
+@uncounted
 def cell_of(place, origin, size, shape):
     """Cell of a place, the nearest one where it is outside the grid."""
     x = min(max(int((place[0] - origin[0]) / size), 0), shape[0] - 1)
@@ -63,7 +65,7 @@ def cell_of(place, origin, size, shape):
     return x, y, z
 
 
-@njit(cache=True)
+@uncounted
 def _columns(place, grid):
     """Cells around a place: first and last along x, y and z, the last one excluded."""
     _, _, _, origin, size, shape = grid
@@ -73,7 +75,7 @@ def _columns(place, grid):
     return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
 
 
-@njit(cache=True)
+@uncounted
 def _candidates(place, grid):
     """Number of points in the cells around a place."""
     start, shape = grid[0], grid[5]
@@ -86,7 +88,7 @@ def _candidates(place, grid):
     return count
 
 
-@njit(cache=True)
+@uncounted
 def visit(place, left_out, radius, grid, found):
     """Write the points near a place into found and return their number; where there are more than room, not the rest.
 
