@@ -169,7 +169,7 @@ class ThreadParticles:
     def find_rates(self) -> None:
         """Find the rates of the liquid, and before them what walls and its viscosity are."""
         fluids, lists, fields, law = self._fluids, self.rows.lists, self.fields, self._law
-        _cover_walls(self._walls(), fluids, lists, fields, law, fields.wall_share)
+        _cover_walls((self._walls(), fluids), lists, fields, law, fields.wall_share)
         if law.rheology:
             _find_viscosities(fluids, lists, fields, law, fields.viscosity)
         _find_rates(fluids, lists, fields, law, self.rates)
@@ -265,8 +265,8 @@ def _find_drifts(fluids, lists, fields, law, middle):
 
 
 @threaded
-def _cover_walls(walls, fluids, lists, fields, law, shares):
-    rows, counts = lists
+def _cover_walls(which, lists, fields, law, shares):
+    (walls, fluids), (rows, counts) = which, lists
     for n in prange(walls.shape[0]):
         k = walls[n]
         i = fluids + k
