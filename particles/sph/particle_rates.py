@@ -16,9 +16,11 @@ from reflowshock.particles.sph.smoothing import shape, slope
 FEWEST_MOMENTS = 0.05
 # Of the matrix of the linear fit: with a larger condition number, or fewer neighbours, the slope is none (Shepard).
 LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
-compiled = njit(cache=True, error_model="numpy")
+# What makes no arrays counts no references to those it is given: for every particle that was a tenth of a step, and
+# threads waited for each other's counts.
+compiled = njit(cache=True, error_model="numpy", _nrt=False)
 # Sums may be taken in any order, so that several pairs are computed at a time; the order does not depend on threads.
-summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}, _nrt=False)
 
 
 @compiled
