@@ -19,6 +19,8 @@ REACH = 2
 BLOCK = 8192
 # Rows of equal length have at least so many places, and the so manieth part more than they need.
 FEWEST, SPARE = 32, 8
+# What makes no arrays counts no references to those it is given, on which threads would wait for each other.
+uncounted = njit(cache=True, _nrt=False)
 
 
 @njit(cache=True, parallel=True)
@@ -54,7 +56,7 @@ def _sort_into_cells(points, origin, size, shape, parts):
     return start, order, places
 
 
-@njit(cache=True)
+@uncounted
 def cell_of(place, origin, size, shape):
     """Cell of a place, the nearest one where it is outside the grid."""
     x = min(max(int((place[0] - origin[0]) / size), 0), shape[0] - 1)
@@ -63,7 +65,7 @@ def cell_of(place, origin, size, shape):
     return x, y, z
 
 
-@njit(cache=True)
+@uncounted
 def _columns(place, grid):
     """Cells around a place: first and last along x, y and z, the last one excluded."""
     _, _, _, origin, size, shape = grid
@@ -73,7 +75,7 @@ def _columns(place, grid):
     return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
 
 
-@njit(cache=True)
+@uncounted
 def _candidates(place, grid):
     """Number of points in the cells around a place."""
     start, shape = grid[0], grid[5]
@@ -86,7 +88,7 @@ def _candidates(place, grid):
     return count
 
 
-@njit(cache=True)
+@uncounted
 def visit(place, left_out, radius, grid, found):
     """Write the points near a place into found and return their number; where there are more than room, not the rest.
 
@@ -148,15 +150,11 @@ def _in_blocks(
 
 
 @njit(cache=True, parallel=True)
-def _fill_rows(places, within, grid, rows, counts):
-    """Write who is near each place into rows of equal length, how many into counts; return the largest of these.
-
-    ``within``: the radius, and how many points see and are seen by all.
-    """
-    (radius, movers), points, most = within, grid[1].shape[0], 0
+def _fill_rows(places, radius, grid, rows, counts):
+    """Write who of a grid is near each place into rows of equal length, how many into counts; the largest of these."""
+    points, most = grid[1].shape[0], 0
     for i in prange(places.shape[0]):
-        left_out = (np.int64(-1), points if i < movers else movers)
-        counts[i] = visit(places[i], left_out, radius, grid, rows[i])
+        counts[i] = visit(places[i], (np.int64(-1), points), radius, grid, rows[i])
         most = max(most, counts[i])
     return most
 
@@ -214,14 +212,23 @@ def list_beside(places: Points, points: Points, radius: float, movers: int, rows
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    grid, counts = _grid(places, points, radius), np.empty(len(places), np.int32)
-    most = rows.shape[1]
+    grid, counts, most = _grid(places, points, radius), np.empty(len(places), np.int32), rows.shape[1]
+    sides = [(slice(movers), grid)]
+    if movers < len(places):  # the same cells without the other points, which few of the other places are near
+        sides.append((slice(movers, None), _with_points(points[:movers], *grid[3:])))
     if len(rows) == len(places) and most:
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     while len(rows) != len(places) or most >= rows.shape[1]:  # the last place of a row is there for what does not fit
         rows = np.empty((len(places), max(most + most // SPARE + 1, FEWEST)), np.int32)
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     return rows, counts
+
+
+def _fill(
+    sides: Sequence[tuple[slice, tuple[Any, ...]]], places: Points, radius: float, rows: Indices, counts: Indices
+) -> int:
+    """Fill the rows of places from the grid that each side of them sees; return the largest count."""
+    return max(_fill_rows(places[side], radius, grid, rows[side], counts[side]) for side, grid in sides)
 
 
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
@@ -230,7 +237,11 @@ def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
     if astray or _extent(places)[2]:
         raise FloatingPointError("find_neighbours: a particle position is not finite")
     origin, size = np.array(low), radius / REACH
-    shape = ((np.array(high) - origin) / size).astype(np.int64) + 1
+    return _with_points(points, origin, size, ((np.array(high) - origin) / size).astype(np.int64) + 1)
+
+
+def _with_points(points: Points, origin: Points, size: float, shape: Indices) -> tuple[Any, ...]:
+    """Points in the cells of a grid."""
     return (*_sort_into_cells(points, origin, size, shape, get_num_threads()), origin, size, shape)
 
 

@@ -10,6 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core import windings
+from reflowshock.particles.surface import near_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 if TYPE_CHECKING:
@@ -94,6 +95,13 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
 
     nodes = pyvista.ImageData(dimensions=grid.counts, spacing=(grid.spacing,) * 3, origin=grid.origin)
     distance = _distance(nodes, points, triangles).reshape(grid.counts, order="F")
+    return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
+
+
+def within_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
+    """Return what `signed_distance` does; nodes farther from the surface than a band [m] are told as that far."""
+    distance = np.full(grid.counts, band)
+    near_distance.narrow(points, triangles, grid.origin, grid.spacing, distance)
     return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
 
 
