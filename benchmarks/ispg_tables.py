@@ -215,7 +215,8 @@ def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]
             found = pair_to_rest(case.drops, case.molten)
             findings = stages.of_drops(found.shape.metrics, 1, found.effects)
         case OscillationCase():
-            findings = stages.of_oscillation(solve_oscillation(case.oscillation, case.molten).metrics, {})
+            found = solve_oscillation(case.oscillation, case.molten)
+            findings = stages.of_oscillation(found.metrics, {}, case.oscillation.scheme)
     return findings.metrics, findings.health
 
 
