@@ -131,6 +131,7 @@ def _joined(first: Run, last: Run) -> Run:
         seconds=first.seconds + last.seconds,
         ruptured=last.ruptured,
         calm=last.calm,
+        at_rest=last.at_rest,
     )
 
 
