@@ -9,7 +9,7 @@ import numpy as np
 from numba import get_num_threads, njit, prange
 from numpy.typing import NDArray
 
-from reflowshock.arrays import Indices
+from reflowshock.arrays import Floats, Indices
 
 Points = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def _fill_rows(places, radius, grid, rows, counts):
     """Write who of a grid is near each place into rows of equal length, how many into counts; the largest of these."""
     points, most = grid[1].shape[0], 0
     for i in prange(places.shape[0]):
-        counts[i] = visit(places[i], (-1, points), radius, grid, rows[i])
+        counts[i] = visit(places[i], (np.int64(-1), points), radius, grid, rows[i])
         most = max(most, counts[i])
     return most
 
@@ -245,11 +245,11 @@ def _with_points(points: Points, origin: Points, size: float, shape: Indices) ->
     return (*_sort_into_cells(points, origin, size, shape, get_num_threads()), origin, size, shape)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _extent(points):
     """Least and largest coordinates of points `(n, 3)`, and how many are not finite."""
     (low_x, low_y, low_z), (high_x, high_y, high_z), astray = (inf, inf, inf), (-inf, -inf, -inf), 0
-    for i in prange(points.shape[0]):
+    for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         astray += not isfinite(x + y + z)
         low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
@@ -257,20 +257,27 @@ def _extent(points):
     return (low_x, low_y, low_z), (high_x, high_y, high_z), astray
 
 
-@njit(cache=True, parallel=True)
-def have_moved(points, built_at, skin):
+def have_moved(points: Sequence[Floats] | Floats, built_at: Sequence[Floats] | Floats, skin: float) -> bool:
     """Whether a list made of other places may lack pairs: one has moved by half a skin or more from all.
 
     What moves all of them alike changes no distance. ``points`` and ``built_at`` have x, y and z of all, `(3, n)`.
     """
+    x, y, z = map(np.ascontiguousarray, points)  # one kernel for all layouts
+    before_x, before_y, before_z = map(np.ascontiguousarray, built_at)
+    return _have_moved((x, y, z), (before_x, before_y, before_z), skin)
+
+
+@njit(cache=True)
+def _have_moved(points, built_at, skin):
+    """`have_moved` of three arrays each."""
     count, (low_x, low_y, low_z), (high_x, high_y, high_z) = len(points[0]), (inf, inf, inf), (-inf, -inf, -inf)
-    for i in prange(count):
+    for i in range(count):
         x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
         low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
         high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
     mean_x, mean_y, mean_z = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z)
     far = 0
-    for i in prange(count):
+    for i in range(count):
         x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
         square = (x - mean_x) ** 2 + (y - mean_y) ** 2 + (z - mean_z) ** 2
         far += not square <= (0.5 * skin) ** 2  # what is no number has moved, too

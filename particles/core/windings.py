@@ -70,8 +70,10 @@ def on_grid(points, triangles, origin, spacing, found):
                 below = min(last_z, ceil((height - origin[2]) / spacing) - 1)
                 if sign != 0 and below >= 0:
                     found[column, row, below] += sign
-    for level in range(last_z - 1, -1, -1):
-        found[:, :, level] += found[:, :, level + 1]
+    for column in range(last_x + 1):
+        for row in range(last_y + 1):
+            for level in range(last_z - 1, -1, -1):
+                found[column, row, level] += found[column, row, level + 1]
 
 
 @njit(cache=True)
