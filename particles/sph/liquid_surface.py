@@ -343,8 +343,8 @@ class LiquidSurface:
 
     def find_spray(self, liquid: Sequence[Floats], volumes: Floats) -> None:
         """Find how much of the particles, at x, y, z `(3, n)` [m], of volumes `(n,)` [m^3], is outside all of it."""
-        outside = surface_care.OWN * self.law.spacing
-        self.spray = float(volumes[are_outside(np.stack(liquid, 1), self.points, self._normals(), outside)].sum())
+        surface, outside = (self.points, self.triangles), surface_care.OWN * self.law.spacing
+        self.spray = float(volumes[are_outside(np.stack(liquid, 1), surface, self._normals(), outside)].sum())
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.

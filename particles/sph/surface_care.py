@@ -15,6 +15,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas, volume_and_gradient
+from reflowshock.particles.core.windings import Windings
 from reflowshock.particles.sph import surface_loops
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.surface.closing import closed_level
@@ -33,7 +34,6 @@ from reflowshock.particles.surface.level_set import (
     extract_surface,
     relax,
     signed_distance,
-    windings_on,
 )
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
@@ -191,8 +191,8 @@ def _blunting(line: Floats) -> Floats:
 
 def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
     """Whether sheets of a surface have crossed: it winds round some liquid twice, or round air inside out."""
-    found = windings_on(Grid.around(points, OVERLAP * spacing), points, triangles)
-    return bool(found.max() > 1 or found.min() < 0)
+    least, most = Windings.of(points, triangles, OVERLAP * spacing).bounds
+    return most > 1 or least < 0
 
 
 def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float) -> bool:
