@@ -22,7 +22,8 @@ def supports(count, points, lists, spacing):
     """
     offsets, indices, reach = lists
     squares, lengths = np.zeros(count), np.ones(count, np.int64)
-    for i in prange(count):
+    for row in prange(count):
+        i = np.int64(row)  # as an unsigned index it would have all that is called compiled once more
         own, support = indices[offsets[i] : offsets[i + 1]], (SUPPORT * spacing) ** 2
         near, within = _count_within(points, i, own, support / WIDER**2), _count_within(points, i, own, support)
         if near < FEWEST and len(own) >= FEWEST:
@@ -69,7 +70,8 @@ def with_rows(lists, rows, others):
     """Lists of neighbours in which some rows are others, which list the point itself, too."""
     (offsets, indices), (starts, found) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
-    number[rows] = np.arange(rows.shape[0])
+    for r in range(rows.shape[0]):
+        number[rows[r]] = r
     result, ends = np.empty(indices.shape[0] + found.shape[0], np.int32), np.zeros_like(offsets)
     at = 0
     for i in range(number.shape[0]):
@@ -144,7 +146,8 @@ def shape_rows(points, lists, squares, starts, shares):
     count = squares.shape[0]
     columns, weights = np.empty(starts[count], np.int32), np.empty((starts[count], 4))
     density = np.zeros(count)
-    for i in prange(count):
+    for row in prange(count):
+        i = np.int64(row)
         support, at = np.sqrt(squares[i]), starts[i]
         columns[at] = i
         for k in range(offsets[i], offsets[i + 1]):
@@ -266,7 +269,9 @@ def reflected(field, source, reflection):
     """A vector field `(n, 3)` with its images `(n + g, 3)`."""
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
-    result[:count] = field
+    for i in range(count):
+        for c in range(3):
+            result[i, c] = field[i, c]
     for g in range(source.shape[0]):
         for c in range(3):
             total = 0.0
