@@ -43,6 +43,7 @@ from reflowshock.particles.discretisation.lagged_cholesky import (
     Tolerance,
     conjugate_gradients,
 )
+from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
@@ -216,13 +217,25 @@ class GalerkinEquations:
         volumes = self.space.volumes
         missing = rate * volumes / volumes.sum() - self.constraint(start)
         enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        images = self._image_rates()
-        return factors.solve(
-            lambda pressure: self._admitted_rates(drive(self.push(pressure), images @ pressure), images),
-            self.pressure_matrix,
-            missing,
-            Tolerance(VOLUME_TOLERANCE, enough),
-        )
+        return factors.solve(*self.pressure_equation(drive), missing, Tolerance(VOLUME_TOLERANCE, enough))
+
+    def pressure_equation(self, drive: Drive) -> tuple[Apply, Callable[[], Band]]:
+        """Rates of volume under pressures, A, and what makes a band of it to factor.
+
+        The band is without what nodal integration misses, and has K by its diagonal only. Plates that float add a rank
+        each to A.
+        """
+        space, images, riders = self.space, self._image_rates(), self.space.riders
+        rates = PairRates(*kernels.admitted_rates(space.rows, space.images, space.volumes, self.admitted))
+        missed = space.volumes / space.volumes.sum(), kernels.projected(self.admitted, self.unbalanced)
+        still = np.zeros_like(self.walls)
+        moved = [drive(still, unit) for unit in np.eye(len(images))]
+        columns = np.array([self._admitted_rates(field, images) for field in moved]).reshape(-1, len(still)).T
+        core = np.zeros((0, 0)) if riders is None else np.linalg.inv([riders.rates(field) for field in moved])
+        stiff = np.repeat(self.masses / self.time_step, 3)
+        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
+        operator = SchurComplement.of(rates, missed, self.inertia, (columns, core))
+        return operator, lambda: rates.band(stiff.reshape(-1, 3), space.order)
 
     def _admitted_rates(self, field: Floats, images: Floats) -> Floats:
         """Rates of volume `(n,)` of a velocity that walls admit, with those of images `(k, n)` of plates that float."""
@@ -271,14 +284,6 @@ class GalerkinEquations:
             return {wall: np.zeros(6) for wall in floating}
         found = np.tensordot(riders.rates(velocity), riders.twists, 1)
         return {wall: found[wall] for wall in floating}
-
-    def pressure_matrix(self) -> Band:
-        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal."""
-        space, stiff = self.space, np.repeat(self.masses / self.time_step, 3)
-        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
-        roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
-        rows, scale = kernels.pressure_matrix(space.rows, space.images, space.volumes, roots, space.order)
-        return Band(rows, scale, space.order)
 
     @property
     def given(self) -> Floats:
