@@ -327,12 +327,8 @@ class GalerkinEquations:
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
         """What a velocity loses to the friction on v1, the start."""
-        space = self.space
-        before, after = space.rough(start), space.rough(field)
-        inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
-        sliding = (start - before - self.walls) * (field - after - self.walls)
-        on_walls = float((self.drag[:, None] * sliding).sum())
-        return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
+        smoothing, on_walls, inside = self.space.lost_power((start, field), self.factors, self.walls)
+        return LostPower(viscous=inside + on_walls, smoothing=smoothing)
 
     def reaction(
         self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
@@ -371,15 +367,6 @@ class GalerkinEquations:
         """
         done, way = self.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
         return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
-
-    def _stress(self, gradient: Floats) -> Floats:
-        """Viscous stress times volume `(n, 3, 3)` [N m]."""
-        factor = self.fluid.viscosity * self.space.volumes
-        return factor[:, None, None] * (gradient + gradient.transpose(0, 2, 1))
-
-    def _friction(self, rough: Floats) -> Floats:
-        """Resistance to velocities `(n, 3)` that the shape functions do not show [N]."""
-        return (self.fluid.smoothing * self.masses)[:, None] * rough
 
 
 def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
