@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, lapack
+from scipy.linalg import lapack
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.discretisation.lagged_cholesky import Band
@@ -48,14 +48,13 @@ class SchurComplement:
     Attributes:
         rates: G, its columns in the order of S.
         inertia: m / dt + dt K.
-        low: `(n, r)` columns of what is low in rank.
-        core: `(r, r)` among them.
+        low, across: `(n, r)` and `(r, n)`, whose product is what is low in rank.
     """
 
     rates: PairRates
     inertia: StiffMass
     low: Floats
-    core: Floats
+    across: Floats
 
     @classmethod
     def of(
@@ -75,14 +74,14 @@ class SchurComplement:
         shares, gradient = missed[0], missed[1].reshape(-1, 1)
         answer = inertia.bare(gradient)
         fields = np.concatenate((answer, inertia.moved), axis=1)
-        moved = np.array(
-            [_rates(rates.starts, rates.columns, rates.entries, field.reshape(-1, 3)) for field in fields.T]
-        )
-        moved[1:] += np.outer(gradient[:, 0] @ inertia.moved, shares)
-        pairs = np.array([[float(gradient[:, 0] @ answer[:, 0]), 1.0], [1.0, 0.0]])
-        low = np.concatenate((shares[None], moved, more[0].T)).T
+        moved = _rates_of_all(rates.starts, rates.columns, rates.entries, fields)
+        moved[:, 1:] += np.outer(shares, gradient[:, 0] @ inertia.moved)
+        low, last, pairs = np.column_stack((shares, moved, more[0])), 2 + len(inertia.core), more[1]
+        core = np.zeros((low.shape[1],) * 2)
+        core[0, 0], core[0, 1], core[1, 0] = gradient[:, 0] @ answer[:, 0], 1.0, 1.0
+        core[2:last, 2:last], core[last:, last:] = -inertia.core, pairs
         ordered = PairRates(rates.starts, place[rates.columns], rates.entries)
-        return cls(ordered, inertia, low, block_diag(pairs, -inertia.core, more[1]))
+        return cls(ordered, inertia, low, core @ low.T)
 
     def __call__(self, pressure: Floats) -> Floats:
         """Rates of volume `(n,)` under pressures `(n,)`."""
@@ -90,20 +89,32 @@ class SchurComplement:
         forces = _forces(rates.starts, rates.columns, rates.entries, pressure)
         forces[size:] /= inertia.inertia[size:]
         forces[:size] = lapack.dpbtrs(inertia.factors.root, forces[:size], lower=0, overwrite_b=1)[0]
-        reached = _rates(rates.starts, rates.columns, rates.entries, forces.reshape(-1, 3))
-        return reached + self.low @ (self.core @ (pressure @ self.low))
+        reached = _rates(rates.starts, rates.columns, rates.entries, forces)
+        return reached + self.low @ (self.across @ pressure)
 
 
 @njit(cache=True, fastmath={"contract"})
 def _rates(starts, columns, entries, field):
-    """G v `(n,)` of velocities `(n, 3)`."""
+    """G v `(n,)` of a velocity `(3 n,)` by particle."""
     result = np.empty(starts.shape[0] - 1)
     for i in range(result.shape[0]):
         total = 0.0
         for k in range(starts[i], starts[i + 1]):
-            j = columns[k]
-            total += entries[k, 0] * field[j, 0] + entries[k, 1] * field[j, 1] + entries[k, 2] * field[j, 2]
+            at = 3 * columns[k]
+            total += entries[k, 0] * field[at] + entries[k, 1] * field[at + 1] + entries[k, 2] * field[at + 2]
         result[i] = total
+    return result
+
+
+@njit(cache=True, fastmath={"contract"})
+def _rates_of_all(starts, columns, entries, fields):
+    """The same of m velocities `(3 n, m)`, `(n, m)`."""
+    result = np.zeros((starts.shape[0] - 1, fields.shape[1]))
+    for i in range(result.shape[0]):
+        for k in range(starts[i], starts[i + 1]):
+            at, x, y, z = 3 * columns[k], entries[k, 0], entries[k, 1], entries[k, 2]
+            for m in range(fields.shape[1]):
+                result[i, m] += x * fields[at, m] + y * fields[at + 1, m] + z * fields[at + 2, m]
     return result
 
 

@@ -232,10 +232,14 @@ class GalerkinEquations:
         moved = [drive(still, unit) for unit in np.eye(len(images))]
         columns = np.array([self._admitted_rates(field, images) for field in moved]).reshape(-1, len(still)).T
         core = np.zeros((0, 0)) if riders is None else np.linalg.inv([riders.rates(field) for field in moved])
+        operator = SchurComplement.of(rates, missed, self.inertia, (columns, core))
+        return operator, lambda: rates.band(self._stiffness_of_particles(), space.order)
+
+    def _stiffness_of_particles(self) -> Floats:
+        """The diagonal of m / dt + dt K, `(n, 3)` [kg/s]."""
         stiff = np.repeat(self.masses / self.time_step, 3)
         stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
-        operator = SchurComplement.of(rates, missed, self.inertia, (columns, core))
-        return operator, lambda: rates.band(stiff.reshape(-1, 3), space.order)
+        return stiff.reshape(-1, 3)
 
     def _admitted_rates(self, field: Floats, images: Floats) -> Floats:
         """Rates of volume `(n,)` of a velocity that walls admit, with those of images `(k, n)` of plates that float."""
