@@ -1,11 +1,13 @@
 """Droplets and the dam break beside other codes: OpenFOAM's interFoam (volume of fluid) and PySPH (delta-SPH's kin).
 
-    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py            (both, ten minutes; results/droplet_peers.json)
-    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py dam_break  (one of them)
+    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py         (all, half an hour; results/droplet_peers.json)
+    PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py impact  (one of them)
 
 `impact`: drops that strike a wall that holds the liquid, 90 degrees, at Weber and Reynolds numbers: width over time,
 its largest, seconds of one core. interFoam solves a wedge of a body of revolution with air, 40 cells a diameter: one
 layer of cells against particles in three dimensions, which is to its advantage. It is the Debian package openfoam.
+`widths`: why both spread wider than measured drops do: the largest width with 20 to 60 cells a diameter, with the
+contact angle that advances, which is that of measured drops, and by correlations with both angles; a picture.
 `dam_break`: the front of a column twice as high as wide against Martin & Moyce (1952), seconds a particle-step; both
 with as many particles in the height, the same kernel and length of it, and the speed of sound. PySPH's example has a
 stiffer equation of state, an artificial viscosity of 0.1 in place of 0.02, and no diffusion of density; with 80
@@ -22,6 +24,7 @@ import venv
 from math import sqrt
 from pathlib import Path
 from time import process_time
+from typing import NamedTuple
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
@@ -34,6 +37,7 @@ from benchmarks.support.interfoam import Wedge
 from benchmarks.support.tables import write_tables
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
+from reflowshock.particles.reference.impact_spread import laan, of_measured, pasandideh_fard, roisman, wildeman
 from reflowshock.particles.scenes.dam_break import solve_dam_break
 from reflowshock.particles.scenes.droplet import solve_droplet
 from reflowshock.particles.sph.surface_care import SurfaceLost
@@ -45,14 +49,30 @@ FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "pysph" / "bin" / "python"
 INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072}
 SOLDER = {"diameter": 78e-6, "density": 8150.0, "surface_tension": 0.55}
-# Liquid, Weber and Reynolds number, time to follow [D / U], particles a diameter.
+
+
+class Impact(NamedTuple):
+    """Liquid, Weber and Reynolds number, how many D / U it is followed for, particles a diameter."""
+
+    liquid: dict
+    weber: float
+    reynolds: float
+    units: float
+    across: int
+
+
 IMPACTS = {
-    "ink, We 8, Re 7.7": (INK, 8.0, 7.7, 1.8, 14),
-    "solder, We 2.4, Re 280": (SOLDER, 2.4, 280.0, 1.5, 14),
-    "solder, We 30, Re 500": (SOLDER, 30.0, 500.0, 2.5, 14),
-    "solder, We 100, Re 1000": (SOLDER, 100.0, 1000.0, 2.5, 20),
+    "ink, We 8, Re 7.7": Impact(INK, 8.0, 7.7, 1.8, 14),
+    "solder, We 2.4, Re 280": Impact(SOLDER, 2.4, 280.0, 1.5, 14),
+    "solder, We 30, Re 500": Impact(SOLDER, 30.0, 500.0, 2.5, 20),
+    "solder, We 100, Re 1000": Impact(SOLDER, 100.0, 1000.0, 2.5, 20),
+    "solder, We 300, Re 2000": Impact(SOLDER, 300.0, 2000.0, 3.5, 20),
 }
+# The fastest ones, which film and rim stop.
+FAST = list(IMPACTS)[2:]
 CELLS, SAMPLES = 40, 100
+# Contact angles [degrees], static and as it advances; cells a diameter with the first.
+ANGLES, FINENESS = (90.0, 120.0), (20, 40, 60)
 # Column of PySPH's example [m]; heights of columns in particles.
 WIDTH, HEIGHT, TANK = 1.0, 2.0, 4.0
 IN_HEIGHT, FOLLOWED = (40, 60), 0.47
@@ -63,40 +83,52 @@ MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
 
 def impact() -> dict:
     """Every impact by both, and their widths over time as a picture."""
-    found = {name: one_impact(*given) for name, given in IMPACTS.items()}
+    found = {name: one_impact(given) for name, given in IMPACTS.items()}
     draw(found)
     return found
 
 
 def draw(found: dict) -> None:
-    """Draw widths over time, a panel an impact."""
-    figure, panels = plt.subplots(1, len(found), figsize=(4.0 * len(found), 3.2), sharey=True, layout="constrained")
+    """Draw widths over time, a panel an impact, and where the correlations of measured drops lie."""
+    figure, panels = plt.subplots(1, len(found), figsize=(3.2 * len(found), 3.2), sharey=True, layout="constrained")
     for panel, (name, sides) in zip(panels, found.items(), strict=True):
         for side, label, line in (("delta_sph", "delta-SPH, 3D", "-"), ("interfoam", "interFoam, wedge", "--")):
             row = sides[side]
             if row is not None and "time" in row:
                 panel.plot(row["time"], row["spread"], line, label=label)
+        if between := of_measured(*IMPACTS[name][1:3], np.radians(ANGLES[0])):
+            panel.axhspan(*between, color="grey", alpha=0.25, linewidth=0.0, label="correlations of measured drops")
         panel.set(title=name, xlabel="time (D / U)")
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest width over D")
-    panels[-1].legend()
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     RESULTS.parent.mkdir(exist_ok=True)
-    figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
+    figure.savefig(RESULTS.with_suffix(".png"), dpi=100)
 
 
-def one_impact(liquid: dict, weber: float, reynolds: float, units: float, across: int) -> dict:
+def one_impact(given: Impact) -> dict:
     """Width over time by both, in diameters and D / U, and its largest."""
-    numerics = DropletNumerics(particles_per_diameter=across)
-    scene = Droplet(weber=weber, reynolds=reynolds, duration=1.0, **liquid, numerics=numerics)
-    scene = scene.model_copy(update={"duration": units * scene.unit_of_time})
+    scene = struck(given, ANGLES[0])
+    return {"delta_sph": impact_by_particles(scene), "interfoam": impact_by_interfoam(scene, CELLS)}
+
+
+def struck(given: Impact, advancing: float) -> Droplet:
+    """A drop that strikes a wall; where its contact line advances, the angle there is so many degrees."""
+    numerics = DropletNumerics(particles_per_diameter=given.across)
+    angles = {"contact_angle": np.radians(ANGLES[0]), "advancing_angle": np.radians(advancing)}
+    scene = Droplet(weber=given.weber, reynolds=given.reynolds, **angles, **given.liquid, numerics=numerics)
+    return scene.model_copy(update={"duration": given.units * scene.unit_of_time})
+
+
+def impact_by_particles(scene: Droplet) -> dict:
+    """Width over time by this program."""
     start = process_time()
     try:
         history = solve_droplet(scene).history
-        time, spread = history["time"] / scene.unit_of_time, history["spread"]
-        particles = {"particles": scene.particles} | row(time, spread, process_time() - start)
     except SurfaceLost as error:
-        particles = {"particles": scene.particles, "seconds": process_time() - start, "broke": str(error)}
-    return {"delta_sph": particles, "interfoam": impact_by_interfoam(scene)}
+        return {"particles": scene.particles, "seconds": process_time() - start, "broke": str(error)}
+    time, spread = history["time"] / scene.unit_of_time, history["spread"]
+    return {"particles": scene.particles} | row(time, spread, process_time() - start)
 
 
 def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
@@ -106,22 +138,22 @@ def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
     return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | kept
 
 
-def impact_by_interfoam(scene: Droplet) -> dict | None:
-    """The same drop by interFoam; None where it is not installed."""
+def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
+    """The same drop by interFoam, with so many cells a diameter; None where it is not installed."""
     if shutil.which("interFoam") is None:
         print("interFoam is not installed (Debian package openfoam): nothing to compare with")
         return None
-    cell = scene.diameter / CELLS
-    wedge = Wedge(cell, columns=2 * CELLS, rows=int(1.5 * CELLS))
+    cell, units = scene.diameter / cells, scene.until / scene.unit_of_time
+    wedge = Wedge(cell, columns=int((0.8 + 0.45 * units) * cells), rows=int(1.3 * cells))
     given = {
-        "contactAngle": np.degrees(scene.angle),
+        "contactAngle": np.degrees(scene.advancing),
         "onWall": "noSlip",
         "solderViscosity": scene.liquid_viscosity / scene.density,
         "solderDensity": scene.density,
         "surfaceTension": scene.surface_tension,
         "endTime": scene.duration,
         "writeInterval": scene.duration / SAMPLES,
-        "firstStep": 1e-4 * scene.unit_of_time / CELLS,
+        "firstStep": 1e-4 * scene.unit_of_time / cells,
         "largestStep": capillary_limit(scene.density, cell, scene.surface_tension),
     }
     start = (
@@ -149,6 +181,48 @@ def reach(alpha: np.ndarray, wedge: Wedge) -> float:
             share = (inner - 0.5) / (inner - outer)
             largest = max(largest, float(middles[last] + share * (middles[last + 1] - middles[last])))
     return largest
+
+
+def widths() -> dict:
+    """Largest widths of the fastest impacts: with more cells, with the angle that advances, by correlations."""
+    found = {name: widths_of(IMPACTS[name]) for name in FAST}
+    draw_widths(found)
+    return found
+
+
+def widths_of(given: Impact) -> dict:
+    """Of one impact: by both with both angles, by interFoam with fewer and more cells, by correlations."""
+    numbers, static = given[1:3], ANGLES[0]
+    found: dict = {one.__name__: one(*numbers) for one in (roisman, laan)}
+    for angle in ANGLES:
+        scene, fineness = struck(given, angle), FINENESS if angle == static else (CELLS,)
+        found[f"{angle:.0f} degrees"] = {
+            "delta_sph": impact_by_particles(scene),
+            "interfoam": {cells: impact_by_interfoam(scene, cells) for cells in fineness},
+        } | {one.__name__: one(*numbers, np.radians(angle)) for one in (pasandideh_fard, wildeman)}
+    return found
+
+
+def draw_widths(found: dict) -> None:
+    """Draw largest widths over the contact angle that advances, a panel an impact."""
+    figure, panels = plt.subplots(1, len(found), figsize=(4.0 * len(found), 3.4), layout="constrained")
+    degrees = np.linspace(ANGLES[0], 180.0, 46)
+    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+        numbers = IMPACTS[name][1:3]
+        for one, label in ((pasandideh_fard, "measured: Pasandideh-Fard"), (wildeman, "computed: Wildeman")):
+            panel.plot(degrees, [one(*numbers, np.radians(angle)) for angle in degrees], label=label)
+        for one, line in ((roisman, ":"), (laan, "-.")):
+            panel.axhline(one(*numbers), color="C0", linestyle=line, label=f"measured: {one.__name__.title()}")
+        for angle in ANGLES:
+            row, first = sides[f"{angle:.0f} degrees"], angle == ANGLES[0]
+            panel.plot(angle, row["delta_sph"]["spread_max"], "C3o", label="delta-SPH" if first else None)
+            if (finest := list(row["interfoam"].values())[-1]) is not None:
+                panel.plot(angle, finest["spread_max"], "kx", label="interFoam, finest" if first else None)
+        panel.set(title=name, xlabel="contact angle that advances (degrees)")
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("largest width over D")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.savefig(RESULTS.with_name("droplet_widths.png"), dpi=100)
 
 
 def dam_break() -> dict:
@@ -220,4 +294,4 @@ def install() -> bool:
 
 
 if __name__ == "__main__":
-    write_tables(__doc__.splitlines()[0], {"impact": impact, "dam_break": dam_break}, RESULTS)
+    write_tables(__doc__.splitlines()[0], {"impact": impact, "widths": widths, "dam_break": dam_break}, RESULTS)

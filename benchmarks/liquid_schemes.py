@@ -70,7 +70,8 @@ def solder(ohnesorge: float) -> Fluid:
 def neck(points: np.ndarray, triangles: np.ndarray) -> float:
     """Radius of the smallest cross-section between the drops, which lie along x, over R; as a disc."""
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
-    return float(np.sqrt(section_areas(points[:, [1, 2, 0]], triangles, heights).min() / pi)) / RADIUS
+    turned = np.ascontiguousarray(points[:, [1, 2, 0]])
+    return float(np.sqrt(section_areas(turned, triangles, heights).min() / pi)) / RADIUS
 
 
 def state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:

@@ -247,4 +247,5 @@ def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.flo
     elasticity = shapes.elasticity[shapes.material] * size.prod(axis=1)[:, None, None]
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))
     blocks = parity_blocks(element_stiffness(shapes))
-    return np.column_stack([elasticity[:, rows, columns], *(blocks[:, parity, entries] for parity, entries in HIGHER)])
+    parts = [elasticity[:, rows, columns], *(blocks[:, parity, entries] for parity, entries in HIGHER)]
+    return np.ascontiguousarray(np.column_stack(parts))

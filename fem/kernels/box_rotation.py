@@ -226,10 +226,10 @@ def spread_shape(constants, scale, k):
 
 @njit(cache=True)
 def box_energies(w, lane, k):
-    """Return the energies [J] of the mean strains and of the higher modes of a lane."""
+    """Return the energies [J] of the mean strains and of the higher modes of a lane with 27 constants."""
     higher, r = 0.0, nine(w, ROTATION + lane)
     u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
-    t = stress(k, u)
+    t = stress(k[:9], u)
     mean = 0.5 * (t[0] * (u[0] - 1.0) + t[1] * (u[1] - 1.0) + t[2] * (u[2] - 1.0))
     mean += t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
     a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
@@ -299,7 +299,7 @@ def row_energies(rows, scales, constants, displacement):
             write_deformation(k, w)
             rotate(w[DEFORMATION:])
             for lane in range(min(LANES, count - start)):
-                energies = box_energies(w, lane, constants[shape])
+                energies = box_energies(w, lane, own_constants(k, lane))
                 mean += energies[0]
                 higher += energies[1]
     return mean, higher
@@ -343,7 +343,7 @@ def block_energies(cells, filled, constants, displacement):
         transform_corners(w)
         write_deformation(constants[b], w)
         rotate(w[DEFORMATION:])
-        for lane in range(filled[b]):
+        for lane in range(np.int64(filled[b])):
             energies = box_energies(w, lane, own_constants(constants[b], lane))
             mean += energies[0]
             higher += energies[1]

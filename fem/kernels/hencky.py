@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from reflowshock.fem.kernels.hexahedron import add_product, condense, new_strain_bench, write_strains
+from reflowshock.fem.kernels.hexahedron import add_product, condense, copy_square, new_strain_bench, write_strains
 from reflowshock.fem.kernels.nonlinear_one_point import carried
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
 
@@ -57,7 +57,7 @@ class ElementState(NamedTuple):
 @njit(cache=True)
 def hencky(strain, law, stress, tangent):
     """Write stress ``(6,)`` [Pa] and tangent ``(6, 6)`` [Pa] at a strain ``(6,)``; return the plastic strain."""
-    tangent[:] = law.elasticity
+    copy_square(law.elasticity, tangent)
     stress[:] = 0.0
     for i in range(6):
         for j in range(6):
@@ -66,8 +66,10 @@ def hencky(strain, law, stress, tangent):
     if constants[FIRST_YIELD] == np.inf:
         return 0.0
     mean = (stress[0] + stress[1] + stress[2]) / 3.0
-    stress[:3] -= mean
-    square = np.sum(stress[:3] ** 2) + 2.0 * np.sum(stress[3:] ** 2)
+    square = 0.0
+    for i in range(3):
+        stress[i] -= mean
+        square += stress[i] ** 2 + 2.0 * stress[3 + i] ** 2
     trial = np.sqrt(1.5 * square)
     flow = plastic_increment(trial, 0.0, constants, np.inf)
     if flow > 0.0:
@@ -75,8 +77,10 @@ def hencky(strain, law, stress, tangent):
         hardening = constants[2] * constants[3] * flow ** (constants[3] - 1.0)
         along = 1.0 - lost - hardening / (constants[0] + hardening)
         soften(stress, 2.0 / 3.0 * constants[0] * lost, 2.0 / 3.0 * constants[0] * along / square, tangent)
-        stress *= 1.0 - lost
-    stress[:3] += mean
+        for i in range(6):
+            stress[i] *= 1.0 - lost
+    for i in range(3):
+        stress[i] += mean
     return flow
 
 
@@ -93,7 +97,9 @@ def soften(deviator, across, along, tangent):
     for i in range(6):
         for j in range(6):
             tangent[i, j] -= along * deviator[i] * deviator[j]
-    tangent[:3, :3] += across / 3.0
+    for i in range(3):
+        for j in range(3):
+            tangent[i, j] += across / 3.0
     for i in range(6):
         tangent[i, i] -= across * (1.0 if i < 3 else 0.5)
 
@@ -126,7 +132,7 @@ def add_points(shape, unknowns, law, state):
         product[:] = 0.0
         add_product(tangent, strain, 1.0, product)
         add_product(strain.T, product, weight, state.tangent)
-    return scale[NODAL:].max() if len(unknowns) > NODAL else 0.0
+    return largest_of(scale[NODAL:])
 
 
 @njit(cache=True)
@@ -135,21 +141,58 @@ def relax_modes(shape, unknowns, law, state):
 
     The energy is convex: a step that ends beyond the least energy on its way is cut where the slope changes sign.
     """
-    scale = add_points(shape, unknowns, law, state)
+    scale, step, start = add_points(shape, unknowns, law, state), np.empty(ALL - NODAL), np.empty(ALL - NODAL)
+    rest, modes = state.force[NODAL:], unknowns[NODAL:]
     for _ in range(MODE_ITERATIONS):
-        rest = state.force[NODAL:]
-        if np.abs(rest).max() <= MODE_CONVERGED * scale:
+        if largest_of(rest) <= MODE_CONVERGED * scale:
             return True
-        step = np.linalg.solve(state.tangent[NODAL:, NODAL:].copy(), -rest)
-        slope, start, length = np.sum(step * rest), unknowns[NODAL:].copy(), 1.0
+        for k in range(len(rest)):
+            step[k], start[k] = -rest[k], modes[k]
+        solve(state.tangent[NODAL:, NODAL:], step)
+        slope, length = product(step, rest), 1.0
         for _ in range(LINE_SEARCHES):
-            unknowns[NODAL:] = start + length * step
+            for k in range(len(modes)):
+                modes[k] = start[k] + length * step[k]
             scale = add_points(shape, unknowns, law, state)
-            after = np.sum(step * rest)
+            after = product(step, rest)
             if after <= -OVERSHOOT * slope:
                 break
             length *= slope / (slope - after)
     return False
+
+
+@njit(cache=True)
+def largest_of(values):
+    """Return the largest magnitude, 0 where there is no value; no number where one is none."""
+    largest = 0.0
+    for value in values:
+        largest = largest if abs(value) <= largest else abs(value)
+    return largest
+
+
+@njit(cache=True)
+def product(left, right):
+    """Return the product of two vectors."""
+    total = 0.0
+    for k in range(len(left)):
+        total += left[k] * right[k]
+    return total
+
+
+@njit(cache=True)
+def solve(matrix, right):
+    """Solve a symmetric positive definite system in place (Gauss)."""
+    size = len(right)
+    for pivot in range(size):
+        for i in range(pivot + 1, size):
+            factor = matrix[i, pivot] / matrix[pivot, pivot]
+            right[i] -= factor * right[pivot]
+            for j in range(pivot + 1, size):
+                matrix[i, j] -= factor * matrix[pivot, j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            right[i] -= matrix[i, j] * right[j]
+        right[i] /= matrix[i, i]
 
 
 @njit(cache=True)
@@ -170,13 +213,15 @@ def hexahedra(corners, displacement, materials, states):
     force, tangent = np.empty(ALL), np.empty((ALL, ALL))
     for e in range(len(corners)):
         write_strains(corners[e], bench, shape.strain, shape.weight)
-        unknowns[:NODAL], unknowns[NODAL:] = displacement[e], 0.0
+        for k in range(ALL):
+            unknowns[k] = displacement[e, k] if k < NODAL else 0.0
         law = PointLaw(elasticity[material[e]], plastic[material[e]])
         if not relax_modes(shape, unknowns, law, ElementState(states.points[e], force, tangent)):
             return e
-        states.force[e] = force[:NODAL]
+        for k in range(NODAL):
+            states.force[e, k] = force[k]
         condense(tangent, NODAL)
-        states.tangent[e] = tangent[:NODAL, :NODAL]
+        copy_square(tangent, states.tangent[e])
     return len(corners)
 
 

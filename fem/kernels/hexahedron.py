@@ -188,7 +188,15 @@ def stiffness(points, elasticity, material, result):
             add_product(elasticity[material[e]], strain[g], 1.0, stress)
             add_product(strain[g].T, stress, weights[g], full)
         condense(full, 24)
-        result[e] = full[:24, :24]
+        copy_square(full, result[e])
+
+
+@njit(cache=True)
+def copy_square(source, result):
+    """Copy the upper left part of a matrix; assigned as a slice it would take Numba seconds to compile its message."""
+    for i in range(result.shape[0]):
+        for j in range(result.shape[1]):
+            result[i, j] = source[i, j]
 
 
 @njit(cache=True)
@@ -210,8 +218,11 @@ def geometry(points, nodal_volume, gradient):
         for g in range(8):
             determinant = invert_jacobian(points[e], GAUSS_DERIVATIVES[g], jacobian, inverse)
             add_product(GAUSS_DERIVATIVES[g], inverse, determinant, gradient[e])
-            nodal_volume[e] += determinant * GAUSS_VALUES[g]
+            for a in range(8):
+                nodal_volume[e, a] += determinant * GAUSS_VALUES[g, a]
             volume += determinant
             lowest[e] = min(lowest[e], determinant)
-        gradient[e] /= volume
+        for a in range(8):
+            for i in range(3):
+                gradient[e, a, i] /= volume
     return lowest

@@ -210,7 +210,8 @@ def move_hourglass(blocks, b, unit, before, w):
     write_amplitudes(k, w, unit)
     subtract_slip(w, slip)
     write_resistance(k, w)
-    before[:] = energy
+    for lane in range(LANES):
+        before[lane] = energy[lane]
     write_hourglass_energy(w, slip, energy)
     if may_slip(w, energy, weight, blocks.plastic[material, FIRST_YIELD], blocks.modulus[material]) > 0.0:
         hourglass_flow(blocks, b, before, w)

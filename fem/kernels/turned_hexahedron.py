@@ -215,7 +215,7 @@ def turned_energies(cells, filled, constants, displacement):
     for b in range(len(cells)):
         k = constants[b]
         read_block(cells[b], displacement, k, w)
-        for lane in range(filled[b]):
+        for lane in range(np.int64(filled[b])):
             u = stretch(nine(w, ROTATION + lane), nine(w, DEFORMATION + lane))
             t = stress(nine(k, lane), u)
             mean += 0.5 * (t[0] * (u[0] - 1.0) + t[1] * (u[1] - 1.0) + t[2] * (u[2] - 1.0))

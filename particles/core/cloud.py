@@ -5,7 +5,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
 from reflowshock.arrays import Floats, Indices
@@ -88,6 +87,8 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
     if excess(lowest) > 0.0:
         raise TooLittleSolder(f"solder.volume = {volume:.4g} m^3 spans no gap of {geometry.gap:.4g} m: it ruptures")
     highest = np.sqrt(3.0 * volume / (np.pi * geometry.gap)) * 2.0
+    from scipy.optimize import brentq  # drops start without it
+
     return place(brentq(excess, lowest, highest, rtol=1e-13))
 
 

@@ -1,6 +1,6 @@
 """Neighbour lists: cell grid, compressed rows, Verlet skin."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from numba import get_num_threads, njit, prange
 from numpy.typing import NDArray
 
-from reflowshock.arrays import Indices
+from reflowshock.arrays import Floats, Indices
 
 Points = NDArray[np.float64]
 
@@ -19,6 +19,8 @@ REACH = 2
 BLOCK = 8192
 # Rows of equal length have at least so many places, and the so manieth part more than they need.
 FEWEST, SPARE = 32, 8
+# What makes no arrays counts no references to those it is given, on which threads would wait for each other.
+uncounted = njit(cache=True, _nrt=False)
 
 
 @njit(cache=True, parallel=True)
@@ -54,7 +56,7 @@ def _sort_into_cells(points, origin, size, shape, parts):
     return start, order, places
 
 
-@njit(cache=True)
+@uncounted
 def cell_of(place, origin, size, shape):
     """Cell of a place, the nearest one where it is outside the grid."""
     x = min(max(int((place[0] - origin[0]) / size), 0), shape[0] - 1)
@@ -63,7 +65,7 @@ def cell_of(place, origin, size, shape):
     return x, y, z
 
 
-@njit(cache=True)
+@uncounted
 def _columns(place, grid):
     """Cells around a place: first and last along x, y and z, the last one excluded."""
     _, _, _, origin, size, shape = grid
@@ -73,7 +75,7 @@ def _columns(place, grid):
     return along_x, along_y, (max(z - REACH, 0), min(z + REACH + 1, shape[2]))
 
 
-@njit(cache=True)
+@uncounted
 def _candidates(place, grid):
     """Number of points in the cells around a place."""
     start, shape = grid[0], grid[5]
@@ -86,7 +88,7 @@ def _candidates(place, grid):
     return count
 
 
-@njit(cache=True)
+@uncounted
 def visit(place, left_out, radius, grid, found):
     """Write the points near a place into found and return their number; where there are more than room, not the rest.
 
@@ -148,14 +150,11 @@ def _in_blocks(
 
 
 @njit(cache=True, parallel=True)
-def _fill_rows(places, within, grid, rows, counts):
-    """Write who is near each place into rows of equal length, how many into counts; return the largest of these.
-
-    ``within``: the radius, and how many points see and are seen by all.
-    """
-    (radius, movers), points, most = within, grid[1].shape[0], 0
+def _fill_rows(places, radius, grid, rows, counts):
+    """Write who of a grid is near each place into rows of equal length, how many into counts; the largest of these."""
+    points, most = grid[1].shape[0], 0
     for i in prange(places.shape[0]):
-        counts[i] = visit(places[i], (-1, points if i < movers else movers), radius, grid, rows[i])
+        counts[i] = visit(places[i], (np.int64(-1), points), radius, grid, rows[i])
         most = max(most, counts[i])
     return most
 
@@ -213,14 +212,23 @@ def list_beside(places: Points, points: Points, radius: float, movers: int, rows
     Raises:
         FloatingPointError: a coordinate is not finite.
     """
-    grid, counts = _grid(places, points, radius), np.empty(len(places), np.int32)
-    most = rows.shape[1]
+    grid, counts, most = _grid(places, points, radius), np.empty(len(places), np.int32), rows.shape[1]
+    sides = [(slice(movers), grid)]
+    if movers < len(places):  # the same cells without the other points, which few of the other places are near
+        sides.append((slice(movers, None), _with_points(points[:movers], *grid[3:])))
     if len(rows) == len(places) and most:
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     while len(rows) != len(places) or most >= rows.shape[1]:  # the last place of a row is there for what does not fit
         rows = np.empty((len(places), max(most + most // SPARE + 1, FEWEST)), np.int32)
-        most = _fill_rows(places, (radius, movers), grid, rows, counts)
+        most = _fill(sides, places, radius, rows, counts)
     return rows, counts
+
+
+def _fill(
+    sides: Sequence[tuple[slice, tuple[Any, ...]]], places: Points, radius: float, rows: Indices, counts: Indices
+) -> int:
+    """Fill the rows of places from the grid that each side of them sees; return the largest count."""
+    return max(_fill_rows(places[side], radius, grid, rows[side], counts[side]) for side, grid in sides)
 
 
 def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
@@ -229,15 +237,19 @@ def _grid(places: Points, points: Points, radius: float) -> tuple[Any, ...]:
     if astray or _extent(places)[2]:
         raise FloatingPointError("find_neighbours: a particle position is not finite")
     origin, size = np.array(low), radius / REACH
-    shape = ((np.array(high) - origin) / size).astype(np.int64) + 1
+    return _with_points(points, origin, size, ((np.array(high) - origin) / size).astype(np.int64) + 1)
+
+
+def _with_points(points: Points, origin: Points, size: float, shape: Indices) -> tuple[Any, ...]:
+    """Points in the cells of a grid."""
     return (*_sort_into_cells(points, origin, size, shape, get_num_threads()), origin, size, shape)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _extent(points):
     """Least and largest coordinates of points `(n, 3)`, and how many are not finite."""
     (low_x, low_y, low_z), (high_x, high_y, high_z), astray = (inf, inf, inf), (-inf, -inf, -inf), 0
-    for i in prange(points.shape[0]):
+    for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         astray += not isfinite(x + y + z)
         low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
@@ -245,20 +257,27 @@ def _extent(points):
     return (low_x, low_y, low_z), (high_x, high_y, high_z), astray
 
 
-@njit(cache=True, parallel=True)
-def have_moved(points, built_at, skin):
+def have_moved(points: Sequence[Floats] | Floats, built_at: Sequence[Floats] | Floats, skin: float) -> bool:
     """Whether a list made of other places may lack pairs: one has moved by half a skin or more from all.
 
     What moves all of them alike changes no distance. ``points`` and ``built_at`` have x, y and z of all, `(3, n)`.
     """
+    x, y, z = map(np.ascontiguousarray, points)  # one kernel for all layouts
+    before_x, before_y, before_z = map(np.ascontiguousarray, built_at)
+    return _have_moved((x, y, z), (before_x, before_y, before_z), skin)
+
+
+@njit(cache=True)
+def _have_moved(points, built_at, skin):
+    """`have_moved` of three arrays each."""
     count, (low_x, low_y, low_z), (high_x, high_y, high_z) = len(points[0]), (inf, inf, inf), (-inf, -inf, -inf)
-    for i in prange(count):
+    for i in range(count):
         x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
         low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
         high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
     mean_x, mean_y, mean_z = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z)
     far = 0
-    for i in prange(count):
+    for i in range(count):
         x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
         square = (x - mean_x) ** 2 + (y - mean_y) ** 2 + (z - mean_z) ** 2
         far += not square <= (0.5 * skin) ** 2  # what is no number has moved, too

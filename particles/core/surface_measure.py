@@ -46,22 +46,25 @@ def triangle_areas(points, triangles):
     return result
 
 
-@njit(cache=True)
-def area_gradient(points, triangles, weights=None):
+def area_gradient(points: Floats, triangles: Indices, weights: Floats | None = None) -> Floats:
     """Gradient of `surface_area` with respect to each point, `(n, 3)` [m]; triangles without area have none.
 
     It is K x with the stiffness of `cotangent_laplacian`, of which nothing is kept. ``weights`` `(t,)` multiply the
     areas of triangles.
     """
+    return _area_gradient(points, triangles, np.ones(len(triangles)) if weights is None else weights)
+
+
+@njit(cache=True)
+def _area_gradient(points, triangles, weights):
+    """`area_gradient`, compiled once: with weights."""
     result = np.zeros_like(points)
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
         size = np.sqrt(x * x + y * y + z * z)
         if size == 0.0:
             continue
-        x, y, z = 0.5 * x / size, 0.5 * y / size, 0.5 * z / size
-        if weights is not None:
-            x, y, z = weights[t] * x, weights[t] * y, weights[t] * z
+        x, y, z = weights[t] * (0.5 * x / size), weights[t] * (0.5 * y / size), weights[t] * (0.5 * z / size)
         for k in range(3):
             i, j, m = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
             ex, ey, ez = points[m, 0] - points[j, 0], points[m, 1] - points[j, 1], points[m, 2] - points[j, 2]
@@ -284,7 +287,9 @@ def _resisting_blocks(points, triangles, weights, starts, columns):
             pair = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
             for row in pair:
                 for column in pair:
-                    at = starts[row] + np.searchsorted(columns[starts[row] : starts[row + 1]], column)
+                    at = starts[row]
+                    while columns[at] != column:
+                        at += 1
                     sign = weights[t, k] if row == column else -weights[t, k]
                     for c in range(3):
                         for d in range(3):

@@ -67,7 +67,8 @@ def _band(diagonal, factor, matrix, order):
             width = max(width, rank[columns[k]] - rank[i])
     width = size * width + size - 1
     band = np.zeros((count * size, width + 1))
-    band[:, width] = diagonal
+    for r in range(count * size):
+        band[r, width] = diagonal[r]
     for i in range(count):
         for k in range(starts[i], starts[i + 1]):
             for c in range(size):

@@ -102,7 +102,7 @@ def mirror(
         slip_lengths: of the plates [m], 0 without slip; free slip where none are given.
     """
     all_points, source, nothing = points, np.arange(len(points)), np.zeros(0, np.int64)
-    reflection = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    reflection = np.tile(np.eye(3), (len(points), 1, 1))
     parents, walls, flips = [nothing], [nothing], [np.zeros((0, 3, 3))]
     for wall, (plate, slip) in enumerate(zip(plates, slip_lengths or [np.inf] * len(plates), strict=True)):
         height = -plate.side * plate.local(all_points)[:, 2]

@@ -24,7 +24,7 @@ def supports(rows, points, lists, spacing):
     offsets, indices, reach = lists
     squares, lengths = np.zeros(rows.shape[0]), np.ones(rows.shape[0], np.int64)
     for r in prange(rows.shape[0]):
-        i, support = rows[r], (SUPPORT * spacing) ** 2
+        i, support = np.int64(rows[r]), (SUPPORT * spacing) ** 2
         own, limit = indices[offsets[i] : offsets[i + 1]], support / WIDER**2
         near, within = 0, 0
         for j in own:
@@ -75,7 +75,8 @@ def with_rows(lists, rows, others):
     """Lists of neighbours in which some rows are others, which list the point itself, too."""
     (offsets, indices), (starts, found) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
-    number[rows] = np.arange(rows.shape[0])
+    for r in range(rows.shape[0]):
+        number[rows[r]] = r
     result, ends = np.empty(indices.shape[0] + found.shape[0], np.int32), np.zeros_like(offsets)
     at = 0
     for i in range(number.shape[0]):
@@ -135,16 +136,17 @@ def _slope_loads(places, count, first, loads):
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
 def _weights(places, count, solved, result):
-    """Weights `(m, 4)` of a row by b and its slopes, columns of `solved (4, 4)`; the support is one."""
+    """Weights `(m, 4)` of a row by b `(4, 1)` and its slopes `(4, 3)`, in `solved`; the support is one."""
+    first, slopes = solved
     for k in range(count):
         x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
         square = rest * rest
-        value = solved[0, 0] + solved[1, 0] * x + solved[2, 0] * y + solved[3, 0] * z
+        value = first[0, 0] + first[1, 0] * x + first[2, 0] * y + first[3, 0] * z
         steep, cube = 6.0 * value * square, square * rest
         result[k, 0] = value * cube
-        result[k, 1] = (solved[0, 1] + solved[1, 1] * x + solved[2, 1] * y + solved[3, 1] * z) * cube + steep * x
-        result[k, 2] = (solved[0, 2] + solved[1, 2] * x + solved[2, 2] * y + solved[3, 2] * z) * cube + steep * y
-        result[k, 3] = (solved[0, 3] + solved[1, 3] * x + solved[2, 3] * y + solved[3, 3] * z) * cube + steep * z
+        result[k, 1] = (slopes[0, 0] + slopes[1, 0] * x + slopes[2, 0] * y + slopes[3, 0] * z) * cube + steep * x
+        result[k, 2] = (slopes[0, 1] + slopes[1, 1] * x + slopes[2, 1] * y + slopes[3, 1] * z) * cube + steep * y
+        result[k, 3] = (slopes[0, 2] + slopes[1, 2] * x + slopes[2, 2] * y + slopes[3, 2] * z) * cube + steep * z
 
 
 @njit(cache=True, parallel=True)
@@ -159,8 +161,9 @@ def shape_rows(points, lists, squares, starts, shares):
     columns, weights = np.empty(starts[count], np.int32), np.empty((starts[count], 4))
     density = np.zeros(count)
     for part in prange((count + ROWS - 1) // ROWS):
-        places, moments, solved = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 4))
-        for i in range(part * ROWS, min(count, (part + 1) * ROWS)):
+        places, moments, first, slopes = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 1)), np.empty((4, 3))
+        begin = ROWS * np.int64(part)  # unsigned, it would have all that is called compiled once more
+        for i in range(begin, min(count, begin + ROWS)):
             support, at = np.sqrt(squares[i]), starts[i]
             columns[at] = i
             for k in range(offsets[i], offsets[i + 1]):
@@ -172,11 +175,11 @@ def shape_rows(points, lists, squares, starts, shares):
             _moments(places, len(own), moments)
             if not factor_spd(moments, 4):
                 continue
-            solved[:, 0], solved[0, 0] = 0.0, 1.0
-            substitute(moments, solved[:, :1], 4)
-            _slope_loads(places, len(own), solved, solved[:, 1:])
-            substitute(moments, solved[:, 1:], 4)
-            _weights(places, len(own), solved, result)
+            first[:], first[0] = 0.0, 1.0
+            substitute(moments, first, 4)
+            _slope_loads(places, len(own), first, slopes)
+            substitute(moments, slopes, 4)
+            _weights(places, len(own), (first, slopes), result)
             found = 0.0
             for k in range(len(own)):
                 found += shares[own[k]] * places[3, k] ** 3
@@ -327,7 +330,9 @@ def reflected(field, source, reflection):
     """A vector field `(n, 3)` with its images `(n + g, 3)`."""
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
-    result[:count] = field
+    for i in range(count):
+        for c in range(3):
+            result[i, c] = field[i, c]
     for g in range(source.shape[0]):
         for c in range(3):
             total = 0.0

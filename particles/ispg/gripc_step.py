@@ -31,7 +31,7 @@ from reflowshock.particles.ispg.projection import (
 )
 from reflowshock.particles.physics.operators import Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 FLAW = (
@@ -50,34 +50,9 @@ class GripcStep:
         self.velocities: Velocities | None = None
 
     @property
-    def support(self) -> float:
-        """Radius of the neighbour list, in spacings."""
-        return SUPPORT[self.basis]
-
-    @property
-    def smoothing_passes(self) -> int:
-        """How often the triangles are evened out after a step: the liquid takes them along."""
-        return 1
-
-    @property
-    def flip_worth(self) -> float:
-        """None: flips are Delaunay's."""
-        return 0.0
-
-    @property
-    def descends(self) -> bool:
-        """No: its pressure is explicit, and it loses volume."""
-        return False
-
-    @property
-    def keeps_time(self) -> bool:
-        """Always."""
-        return True
-
-    @property
-    def flaw(self) -> str:
-        """Its pressure gradient."""
-        return FLAW
+    def traits(self) -> SolverTraits:
+        """It does not descend: its pressure is explicit, and it loses volume."""
+        return SolverTraits(support=SUPPORT[self.basis], flaw=FLAW)
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedGripcStep":
         """Fit the operators at the current positions.

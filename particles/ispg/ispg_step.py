@@ -48,7 +48,7 @@ from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Vi
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
-from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 from reflowshock.particles.surface.contact_line import RubbingLine
 
@@ -81,34 +81,10 @@ class IspgStep:
     factors: LaggedCholesky = field(default_factory=LaggedCholesky)
 
     @property
-    def support(self) -> float:
-        """Radius of the neighbour list, in spacings: what the shift of the particles needs."""
-        return SUPPORT
-
-    @property
-    def smoothing_passes(self) -> float:
-        """How often the triangles are evened out after a step: the liquid takes them along."""
-        return 1.0 if self.past is None else self.past.evening
-
-    @property
-    def flip_worth(self) -> float:
-        """Enough to flip edges of squares."""
-        return FLIP_WORTH
-
-    @property
-    def descends(self) -> bool:
-        """No: the energy that falls is one of the surface and of the velocities."""
-        return False
-
-    @property
-    def keeps_time(self) -> bool:
-        """Always."""
-        return True
-
-    @property
-    def flaw(self) -> None:
-        """None."""
-        return None
+    def traits(self) -> SolverTraits:
+        """It does not descend: the energy that falls is one of the surface and of the velocities."""
+        evening = 1.0 if self.past is None else self.past.evening
+        return SolverTraits(SUPPORT, evening, FLIP_WORTH)
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
         """Carry the velocity to where the particles are now; without inertia it is zero."""

@@ -177,7 +177,8 @@ def shape_weights(rows, points, offsets, indices, support):
         substitute(moment, right, 4)
         for k in range(offsets[i], offsets[i + 1]):
             weight = _basis_and_weight(points, (i, indices[k]), support, basis)
-            pair[k, 0] = weight * (basis * right[:, 0]).sum()
+            value = right[0, 0] + basis[1] * right[1, 0] + basis[2] * right[2, 0] + basis[3] * right[3, 0]
+            pair[k, 0] = weight * value
         own[r, 0] = right[0, 0]
     return pair, own, order
 
@@ -195,12 +196,10 @@ def linear_weights(rows, points, offsets, indices, support):
     for r in range(rows.shape[0]):
         i = rows[r]
         moments = np.zeros((7, 4, 4))
-        derivative = np.zeros(7)
-        offset, basis = np.zeros(3), np.ones(4)
+        derivative, basis = np.zeros(7), np.ones(4)
         for k in range(offsets[i], offsets[i + 1] + 1):
             j = indices[k] if k < offsets[i + 1] else i
-            _weight_derivatives(points, (i, j), support, offset, derivative)
-            basis[1:] = offset
+            _weight_derivatives(points, (i, j), support, basis, derivative)
             for m in range(7):
                 for a in range(4):
                     for b in range(4):
@@ -211,14 +210,12 @@ def linear_weights(rows, points, offsets, indices, support):
         order[r] = 1
         for k in range(offsets[i], offsets[i + 1] + 1):
             j = indices[k] if k < offsets[i + 1] else i
-            _weight_derivatives(points, (i, j), support, offset, derivative)
-            basis[1:] = offset
+            _weight_derivatives(points, (i, j), support, basis, derivative)
             target = pair[k] if k < offsets[i + 1] else own[r]
             for c in range(3):
-                first = coefficients[1 + c] @ basis
-                value = coefficients[0] @ basis
+                first, value = _product(coefficients, 1 + c, basis), _product(coefficients, 0, basis)
                 target[c] = (first * derivative[0] + value * derivative[1 + c]) / support
-                second = coefficients[4 + c] @ basis
+                second = _product(coefficients, 4 + c, basis)
                 target[3] += (
                     second * derivative[0] + 2.0 * first * derivative[1 + c] + value * derivative[4 + c]
                 ) / support**2
@@ -226,18 +223,30 @@ def linear_weights(rows, points, offsets, indices, support):
 
 
 @njit(cache=True)
-def _weight_derivatives(points, pair, support, offset, derivative):
-    """Weight (1 - q^2)^3 and its derivatives with respect to the position of i: w, w,x w,y w,z, w,xx w,yy w,zz."""
+def _product(matrix, row, vector):
+    """A row of a matrix `(., 4)` times a vector `(4,)`."""
+    total = 0.0
+    for a in range(4):
+        total += matrix[row, a] * vector[a]
+    return total
+
+
+@njit(cache=True)
+def _weight_derivatives(points, pair, support, basis, derivative):
+    """Weight (1 - q^2)^3 and its derivatives with respect to the position of i: w, w,x w,y w,z, w,xx w,yy w,zz.
+
+    And the offset, in the linear basis (1, x, y, z).
+    """
     i, j = pair
     square = 0.0
     for d in range(3):
-        offset[d] = (points[j, d] - points[i, d]) / support
-        square += offset[d] * offset[d]
+        basis[1 + d] = (points[j, d] - points[i, d]) / support
+        square += basis[1 + d] * basis[1 + d]
     rest = max(1.0 - square, 0.0)
     derivative[0] = rest**3
     for d in range(3):
-        derivative[1 + d] = 6.0 * rest**2 * offset[d]
-        derivative[4 + d] = 24.0 * rest * offset[d] ** 2 - 6.0 * rest**2
+        derivative[1 + d] = 6.0 * rest**2 * basis[1 + d]
+        derivative[4 + d] = 24.0 * rest * basis[1 + d] ** 2 - 6.0 * rest**2
 
 
 @njit(cache=True)
@@ -252,18 +261,26 @@ def _linear_coefficients(moments):
         return np.zeros((0, 4))
     right = np.zeros((4, 1))
     right[0, 0] = 1.0
-    substitute(factor, right, 4)
-    result[0] = right[:, 0]
+    _solve_into(result, 0, factor, right)
     for c in range(3):
-        right[:, 0] = -(moments[1 + c] @ result[0])
+        for a in range(4):
+            right[a, 0] = -_product(moments[1 + c], a, result[0])
         right[1 + c, 0] += 1.0
-        substitute(factor, right, 4)
-        result[1 + c] = right[:, 0]
+        _solve_into(result, 1 + c, factor, right)
     for c in range(3):
-        right[:, 0] = -2.0 * (moments[1 + c] @ result[1 + c]) - moments[4 + c] @ result[0]
-        substitute(factor, right, 4)
-        result[4 + c] = right[:, 0]
+        for a in range(4):
+            first = _product(moments[1 + c], a, result[1 + c])
+            right[a, 0] = -2.0 * first - _product(moments[4 + c], a, result[0])
+        _solve_into(result, 4 + c, factor, right)
     return result
+
+
+@njit(cache=True)
+def _solve_into(result, row, factor, right):
+    """Write the solution of four equations with a Cholesky factor, whose right-hand side is overwritten, to a row."""
+    substitute(factor, right, 4)
+    for a in range(4):
+        result[row, a] = right[a, 0]
 
 
 @njit(cache=True)
@@ -334,6 +351,9 @@ def quadratic_weights(rows, points, offsets, indices, support):
             weight = _offset_and_weight(points, i, indices[k], support, offset)
             _taylor(offset, basis)
             for c in range(4):
-                pair[k, c] = weight * (basis * right[:, c]).sum()
+                value = 0.0
+                for a in range(9):
+                    value += basis[a] * right[a, c]
+                pair[k, c] = weight * value
                 own[r, c] -= pair[k, c]
     return pair, own, order

@@ -158,13 +158,55 @@ def _fitted(powers, volumes, wanted, softness):
 
     Newton's method for q; what is missing may be softness times q.
     """
-    factors, missing = np.zeros(len(wanted)), wanted - powers.T @ volumes
-    for _ in range(NEWTON_STEPS):
-        if np.abs(missing).max() < TOLERANCE * wanted[0]:
+    (count, size), found, growth = powers.shape, volumes.copy(), np.empty(len(volumes))
+    factors, change, matrix = np.zeros(size), np.empty(size), np.empty((size, size))
+    for step in range(NEWTON_STEPS + 1):
+        _take_sums(powers, found, change, matrix)
+        missing = 0.0
+        for a in range(size):
+            change[a] = wanted[a] - change[a] - softness[a] * factors[a]
+            matrix[a, a] += softness[a]
+            missing = missing if abs(change[a]) <= missing else abs(change[a])
+        if missing < TOLERANCE * wanted[0] or step == NEWTON_STEPS:
             break
-        change = np.linalg.solve((powers * volumes.reshape(-1, 1)).T @ powers + np.diag(softness), missing)
-        change /= max(1.0, np.abs(powers @ change).max())
-        factors += change
-        volumes = volumes * np.exp(powers @ change)
-        missing = wanted - powers.T @ volumes - softness * factors
-    return volumes, np.abs(missing).max()
+        _eliminate(matrix, change)
+        largest = 1.0
+        for i in range(count):
+            growth[i] = 0.0
+            for a in range(size):
+                growth[i] += powers[i, a] * change[a]
+            largest = max(largest, abs(growth[i]))
+        for a in range(size):
+            factors[a] += change[a] / largest
+        for i in range(count):
+            found[i] *= np.exp(growth[i] / largest)
+    return found, missing
+
+
+@njit(cache=True)
+def _take_sums(powers, volumes, sums, matrix):
+    """Write the sums of powers times volumes `(k,)`, and of their products `(k, k)`."""
+    sums[:] = 0.0
+    matrix[:] = 0.0
+    for i in range(powers.shape[0]):
+        for a in range(powers.shape[1]):
+            value = volumes[i] * powers[i, a]
+            sums[a] += value
+            for b in range(powers.shape[1]):
+                matrix[a, b] += value * powers[i, b]
+
+
+@njit(cache=True)
+def _eliminate(matrix, right):
+    """Solve a symmetric positive definite system in place (Gauss)."""
+    size = right.shape[0]
+    for pivot in range(size):
+        for a in range(pivot + 1, size):
+            factor = matrix[a, pivot] / matrix[pivot, pivot]
+            right[a] -= factor * right[pivot]
+            for b in range(pivot + 1, size):
+                matrix[a, b] -= factor * matrix[pivot, b]
+    for a in range(size - 1, -1, -1):
+        for b in range(a + 1, size):
+            right[a] -= matrix[a, b] * right[b]
+        right[a] /= matrix[a, a]

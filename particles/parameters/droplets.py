@@ -83,13 +83,17 @@ class Droplet(SphFlow):
         return RIGHT_ANGLE if self.contact_angle is None else self.contact_angle
 
     @property
+    def advancing(self) -> float:
+        """The contact angle where the contact line advances [rad]."""
+        return self.angle if self.advancing_angle is None else self.advancing_angle
+
+    @property
     def bounds(self) -> tuple[float, float] | None:
         """Cosines of the advancing and the receding angle; None where the contact angle is one."""
         if self.advancing_angle is None and self.receding_angle is None:
             return None
-        angles = (self.angle if one is None else one for one in (self.advancing_angle, self.receding_angle))
-        advancing, receding = (cos(one) for one in angles)
-        return advancing, receding
+        receding = self.angle if self.receding_angle is None else self.receding_angle
+        return cos(self.advancing), cos(receding)
 
     @property
     def length(self) -> float:

@@ -25,13 +25,13 @@ from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
 from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import mirrored
-from reflowshock.particles.surface.level_set import Grid, LevelSet, signed_distance
+from reflowshock.particles.surface.level_set import Grid, LevelSet, within_band
 
 LIQUID, HELD, SOLID = 0, 1, 2
 # In spacings: how far the surface of a new drop is from particles below it.
 CLEARANCE = 1.1
 ROUNDING = 1e-9
-# In spacings of the particles: nodes of the level set of the ground; in these, how far about a body it is told.
+# In spacings of the particles: nodes of the level set of the ground; in these, how far about its face it is told.
 NODES, MARGIN = 0.75, 4
 
 
@@ -121,6 +121,11 @@ class Deposit:
     def liquid(self) -> Indices:
         """Particles that are liquid."""
         return np.flatnonzero(self.state == LIQUID)
+
+    @property
+    def moving(self) -> int:
+        """Number of particles that move now."""
+        return self.simulation.fluids if self.simulation else 0
 
     @property
     def points(self) -> Floats:
@@ -279,7 +284,7 @@ def join(ground: LevelSet, body: CuredBody) -> None:
     low, high = np.maximum(low, 0), np.minimum(high, grid.counts)
     box = tuple(slice(first, last) for first, last in zip(low, high, strict=True))
     x, y, z = (int(count) for count in high - low)
-    own = signed_distance(points, triangles, Grid(grid.origin + spacing * low, spacing, (x, y, z)))
+    own = within_band(points, triangles, Grid(grid.origin + spacing * low, spacing, (x, y, z)), MARGIN * spacing)
     ground.values[box] = np.minimum(ground.values[box], own.values)
 
 

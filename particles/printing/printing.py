@@ -93,20 +93,20 @@ def solve_printing(
     saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
     if saved:
         run.restore(saved)
-    with threads_for(scene.particles):
-        while run.landed < scene.drops or run.deposit.simulation:
-            start = perf_counter()
-            try:
+    while run.landed < scene.drops or run.deposit.simulation:
+        start = perf_counter()
+        try:
+            with threads_for(run.deposit.moving):
                 _go_on(run, scene)
-            except SurfaceLost as error:
-                raise SurfaceLost(
-                    f"drop {run.landed}, {1e6 * run.deposit.time:.4g} us: {error}; take more particles per diameter"
-                ) from error
-            run.seconds += perf_counter() - start
-            if checkpoint is not None and checkpoint.is_due():
-                checkpoint.write(run.saved())
-            if progress is not None:
-                progress((run.landed - (run.deposit.simulation is not None)) / scene.drops)
+        except SurfaceLost as error:
+            raise SurfaceLost(
+                f"drop {run.landed}, {1e6 * run.deposit.time:.4g} us: {error}; take more particles per diameter"
+            ) from error
+        run.seconds += perf_counter() - start
+        if checkpoint is not None and checkpoint.is_due():
+            checkpoint.write(run.saved())
+        if progress is not None:
+            progress((run.landed - (run.deposit.simulation is not None)) / scene.drops)
     return _result(run, scene)
 
 

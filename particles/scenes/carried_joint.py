@@ -54,7 +54,7 @@ def carry_joint(
     now: Checkpoint,
     progress: Callable[[float], None] | None = None,
 ) -> Carried:
-    """Let a joint come to rest in a place, quasi-statically.
+    """Let a joint come to rest in a place, by the scheme ispg with inertia, else quasi-statically.
 
     Args:
         place: gap, radii, offset and tilt.
@@ -78,7 +78,8 @@ def carry_joint(
         except TooLittleSolder:
             return OPEN
     flow.physics = replace(flow.physics, motions=(travel(place, flow),))
-    run = run_to_rest(flow, replace(rule, max_steps=flow.steps + rule.max_steps), progress, checkpoint=now)
+    last = replace(rule, max_steps=flow.steps + rule.max_steps, end_time=flow.time + rule.end_time)
+    run = run_to_rest(flow, last, progress, checkpoint=now)
     return OPEN if run.ruptured else Carried(_wrenches(flow), len(run.records))
 
 
@@ -130,6 +131,7 @@ def _joined(first: Run, last: Run) -> Run:
         seconds=first.seconds + last.seconds,
         ruptured=last.ruptured,
         calm=last.calm,
+        at_rest=last.at_rest,
     )
 
 

@@ -20,7 +20,7 @@ from reflowshock.particles.scenes.reflow import collect_shape, contact_line, sta
 from reflowshock.particles.scenes.section_drop import start_section
 from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
-from reflowshock.particles.steps.rest import Run, run_to_rest
+from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine, RubbingLine
 from reflowshock.particles.surface.profile import width
@@ -79,9 +79,7 @@ def flow_to_rest(
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":
         section = start_section(drop, solder, acting)
-        return section, run_to_rest(
-            section, stop_rule(section.body.cloud, solder, acting), progress, checkpoint=checkpoint
-        )
+        return section, run_to_rest(section, _rule(drop, section.body.cloud, solder), progress, checkpoint=checkpoint)
     whole = free_box_cloud(drop.edge, drop.count) if drop.is_free else box_cloud(drop.edge, drop.count)
     cloud = cut(whole, drop.symmetry_axes)
     if drop.speed is not None:
@@ -90,7 +88,17 @@ def flow_to_rest(
     if drop.speed is not None:
         flight = np.broadcast_to([0.0, 0.0, -drop.speed], cloud.points.shape)
         flow.body.velocity = flow.physics.admit(flow.body, flight)
-    return flow, run_to_rest(flow, stop_rule(cloud, solder, acting), progress, checkpoint=checkpoint)
+    return flow, run_to_rest(flow, _rule(drop, cloud, solder), progress, checkpoint=checkpoint)
+
+
+def _rule(drop: Drop, cloud: Cloud, solder: Solder) -> StopRule:
+    """When it is at rest: it swings as the cap that it becomes, unless an edge or friction holds its contact line."""
+    acting = switched(decide_drop(solder, drop.is_free))
+    if drop.is_free:
+        return stop_rule(cloud, solder, acting, np.pi)
+    if drop.pad_radius is not None or drop.hysteresis is not None:
+        return stop_rule(cloud, solder, acting)
+    return stop_rule(cloud, solder, acting, solder.pad_contact_angle)
 
 
 def _touching(cloud: Cloud, solder: Solder) -> Cloud:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
+from math import inf, pi
 
 import numpy as np
 
@@ -56,7 +56,8 @@ def pair_to_rest(
     acting = switched(effects)
     start = partial(_start, solder, acting)
     flows = [start(cloud) for cloud in start_clouds(scene)]
-    rule = stop_rule(flows[0].body.cloud, solder, acting)
+    angle = pi if scene.is_free else solder.pad_contact_angle
+    rule = stop_rule(flows[0].body.cloud, solder, acting, angle)
     drops = run_drops(flows, rule, lambda body: start(body.cloud), checkpoint, progress)
     meridians = [_reference(scene, solder, effects, drop) for drop in drops]
     results = [_drop_metrics(scene, solder, *pair) for pair in zip(drops, meridians, strict=True)]
@@ -108,7 +109,7 @@ def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Mer
     """Numbers of one of the drops that are left; of a sphere also the largest error of a radius."""
     body = drop.flow.body
     profile = fit_profile(body.points, body.triangles, body.span())
-    run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds, calm=drop.calm)
+    run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds, calm=drop.calm, at_rest=drop.at_rest)
     own = solder.model_copy(update={"volume": _volume(scene, drop)})
     metrics = body_metrics(own, reference, drop.flow, run)
     if not scene.is_free:

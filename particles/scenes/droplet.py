@@ -12,6 +12,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.reference.impact_spread import of_measured, wildeman
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.flow import FlowResult, Metrics
 from reflowshock.particles.sph.fluid_state import Law
@@ -70,7 +71,7 @@ def follow(
             "take more particles per diameter"
         ) from error
     history = run.history(COLUMNS)
-    words = {"outcome": outcome(history), "film": _film(scene)} if scene.impact_speed else {}
+    words = {"outcome": outcome(history), "film": _film(scene)} | _expected(scene) if scene.impact_speed else {}
     return replace(flow.result_of(run, history, _metrics(scene, history)), words=words)
 
 
@@ -78,6 +79,15 @@ def _film(scene: Droplet) -> str:
     """Tell how thick the film is that an impact leaves, and with how many particles it has two."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
     return f"{film:.2g} D thick; {2.0 / film:.0f} particles a diameter put two across it"
+
+
+def _expected(scene: Droplet) -> dict[str, str]:
+    """Tell how wide such drops spread, measured ones and computed ones; nothing where that is not known."""
+    numbers = scene.weber_number, scene.reynolds_number, scene.advancing
+    if not (between := of_measured(*numbers)):
+        return {}
+    measured = f"{between[0]:.2f} to {between[1]:.2f} D by correlations of measured drops"
+    return {"spread_expected": f"{measured}, {wildeman(*numbers):.2f} D by that of computed ones"}
 
 
 def droplet(scene: Droplet) -> Simulation:

@@ -14,7 +14,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.scenes.rebuild import collapsing, hand_over, overlap, rebuild, touch
 from reflowshock.particles.steps.flow import LiquidFlow, StepRecord
-from reflowshock.particles.steps.rest import CALM_STEPS, RECORDS, NoRest, StopRule, fraction_done, is_calm
+from reflowshock.particles.steps.rest import RECORDS, NoRest, StopRule, fraction_done, is_calm, is_lasting
 from reflowshock.particles.steps.shape import Snapshot
 
 LARGEST_OVERLAP = 0.5  # spacings
@@ -35,6 +35,7 @@ class MovingDrop:
         parents: the drops that became this one, as they were when they touched.
         records: its steps since it was made.
         calm: its last steps that hardly moved it.
+        at_rest: whether it is at rest.
         seconds: wall time of its steps [s].
     """
 
@@ -44,6 +45,7 @@ class MovingDrop:
     parents: tuple["MovingDrop", ...] = ()
     records: list[StepRecord] = field(default_factory=list)
     calm: int = 0
+    at_rest: bool = False
     seconds: float = 0.0
 
     @classmethod
@@ -75,10 +77,11 @@ class MovingDrop:
         self.records.append(self.flow.step())
         self.seconds += perf_counter() - start
         self.calm = self.calm + 1 if is_calm(self.records, rule) else 0
+        self.at_rest = is_lasting(self.records, self.calm, rule)
 
     def moves(self, rule: StopRule) -> bool:
         """Whether it is neither at rest nor at the end of the process."""
-        return self.calm < CALM_STEPS and self.flow.time < rule.end_time
+        return not self.at_rest and self.flow.time < rule.end_time
 
 
 def run_drops(

@@ -255,7 +255,7 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     last, count = run.records[-1], len(flow.body.points)
     return {
         "at_rest": (float(run.at_rest), ""),
-        "time_at_rest": (flow.time if run.at_rest else float("nan"), "s"),
+        "time_at_rest": (run.time_at_rest, "s"),
         "particles_lost": (float(particles_lost(flow.body)), ""),
         "capillary_number_at_rest": (solder.viscosity * last.speed / solder.surface_tension, ""),
         "time_step_over_capillary_limit": (max(record.time_step for record in run.records) / limit, ""),

@@ -264,7 +264,7 @@ def _drop_metrics(solder: Solder, drops: Sequence[Flowed]) -> Metrics:
         "particles": (float(sum(len(flow.body.points) for flow, _ in drops)), ""),
         "particles_lost": (float(sum(particles_lost(flow.body) for flow, _ in drops)), ""),
         "at_rest": (float(all(run.at_rest for _, run in drops)), ""),
-        "time_at_rest": (max(flow.time for flow, _ in drops), "s"),
+        "time_at_rest": (float(np.max([run.time_at_rest for _, run in drops])), "s"),
     }
     for name, (flow, run) in zip(("board", "package"), drops, strict=True):
         metrics[f"volume_{name}"] = (flow.body.volume()[0], "m^3")

@@ -8,6 +8,7 @@ wet it; flatter puddles do not.
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import pi
 from pkgutil import resolve_name
 
 import numpy as np
@@ -26,6 +27,7 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Acting, Physics
 from reflowshock.particles.physics.plate_motion import Travel
+from reflowshock.particles.reference.drop_oscillation import cap_frequency
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -171,11 +173,22 @@ def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
     return Relaxation(solder.density)
 
 
-def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool]) -> StopRule:
-    """When a reflow ends: at rest, or with inertia at the end of the process at the latest."""
+def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool], angle: float = 0.5 * pi) -> StopRule:
+    """When a reflow ends: at rest, or with inertia at the end of the process at the latest.
+
+    Args:
+        cloud: particles.
+        solder: all of it, fluid and numerics.
+        effects: name to on or off.
+        angle: contact angle of the cap that swings as the body does [rad]: that of a drop on a uniform wall, pi without
+            walls. Where edges or friction hold the liquid it swings faster than half a ball that slides, or not at all.
+    """
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
-    end_time = solder.process_time if effects["inertia"] else float("inf")
-    return StopRule(most_steps(solder, cloud.spacing), solder.numerics.tolerance, calm_time, end_time)
+    steps, tolerance = most_steps(solder, cloud.spacing), solder.numerics.tolerance
+    if not effects["inertia"]:
+        return StopRule(steps, tolerance, calm_time)
+    swing = 2.0 * pi / cap_frequency(angle, solder.volume, solder.density, solder.surface_tension)
+    return StopRule(steps, tolerance, calm_time, solder.process_time, 0.25 * swing)
 
 
 def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:

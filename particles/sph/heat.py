@@ -56,7 +56,8 @@ def warming_of(i, neighbours, fields, temperatures, law):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _find_warming(lists, fields, temperatures, law, found):
     rows, counts = lists
-    for i in prange(found.shape[0]):
+    for k in prange(found.shape[0]):
+        i = np.uint64(k)
         found[i] = warming_of(i, rows[i, : counts[i]], fields, temperatures, law)
 
 

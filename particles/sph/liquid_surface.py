@@ -194,7 +194,7 @@ class LiquidSurface:
         self._shares = weights[0]
         outward = self._outward()
         found = np.zeros((2, 3, carriers))
-        surface_loops.share_out(self._lists, weights, np.array((self.forces(), outward)), found)
+        surface_loops.share_out(self._lists, weights, np.array((self.forces(self._drift(fields)), outward)), found)
         if self.law.mirror and self.law.no_slip:
             hold_films((self.points, self._normals(), self._lists, weights[1]), fields, self.law, rates)
         if self.ground is not None:
@@ -230,8 +230,11 @@ class LiquidSurface:
         outward = self._outward() * (1.0 if self.ground is None else (self.wetness[0] < 1.0)[:, None])
         return outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
 
-    def forces(self) -> Floats:
-        """Forces -d(E - p V)/dx on vertices `(m, 3)` [N], p from all of the surface; contact lines have none across."""
+    def forces(self, drift: Floats | None = None) -> Floats:
+        """Forces -d(E - p V)/dx on vertices `(m, 3)` [N], p from all of the surface; contact lines have none across.
+
+        With a ``drift``, as `_drift` returns it, contact lines have two angles.
+        """
         wet = None if self.ground is None else self._wet_shares()
         result = -self.tension * area_gradient(self.points, self.triangles, None if wet is None else 1.0 - wet)
         self.pressure = self._balance(result)
@@ -240,9 +243,11 @@ class LiquidSurface:
             result += self.tension * self.cosine * area_gradient(self.points, self.triangles, wet)
             result = grounds.along(result, *self.wetness)
         for ring in self.rings:
-            along = np.roll(self.points[ring], -1, axis=0) - np.roll(self.points[ring], 1, axis=0)
-            outward = 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
-            result[ring, :2] += self.tension * self._cosines(outward, result[ring, :2])[:, None] * outward
+            outward = surface_care.outward_along(self.points[ring])
+            cosines: Floats | float = self.cosine
+            if self.bounds is not None and drift is not None:
+                cosines = surface_care.cosines_of(self.bounds, outward, result[ring, :2] / self.tension, drift[ring])
+            result[ring, :2] += self.tension * cosines * outward
             result[ring, 2] = 0.0
         return result
 
@@ -256,11 +261,11 @@ class LiquidSurface:
         square = float((area**2).sum())
         return -float((forces * area).sum()) / square if square else 0.0
 
-    def _cosines(self, outward: Floats, push: Floats) -> Floats:
-        """Cosines of the contact angle along a contact line; see `surface_care.cosines_between`."""
+    def _drift(self, fields: Fields) -> Floats | None:
+        """Velocities of vertices; see `surface_care.sliding`. None where contact lines have one angle."""
         if self.bounds is None or not self.tension:
-            return np.full(len(push), self.cosine)
-        return surface_care.cosines_between(self.bounds, outward, push / self.tension)
+            return None
+        return surface_care.sliding(surface_loops.velocities(self._lists, self._shares, fields), self.tension, self.law)
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
         """Move with the velocities of the particles `(3, n)` [m/s] over a time step [s].
@@ -338,8 +343,8 @@ class LiquidSurface:
 
     def find_spray(self, liquid: Sequence[Floats], volumes: Floats) -> None:
         """Find how much of the particles, at x, y, z `(3, n)` [m], of volumes `(n,)` [m^3], is outside all of it."""
-        outside = surface_care.OWN * self.law.spacing
-        self.spray = float(volumes[are_outside(np.stack(liquid, 1), self.points, self._normals(), outside)].sum())
+        surface, outside = (self.points, self.triangles), surface_care.OWN * self.law.spacing
+        self.spray = float(volumes[are_outside(np.stack(liquid, 1), surface, self._normals(), outside)].sum())
 
     def _lines_on_ground(self) -> tuple[Indices, ...]:
         """Contact lines on the ground: the surface has an edge there, which evening out would round off.
@@ -362,14 +367,11 @@ class LiquidSurface:
         is_thin = 0.0 < self.wetted_area < 0.25 * np.pi * (FOOT * self.law.spacing) ** 2
         return is_thin and self.ground is None and bool(velocity[2].mean() > 0.0)
 
-    def _is_worn(self) -> bool:
-        """Whether its triangles do not serve any more."""
-        return surface_care.is_worn(self.points, self.triangles, self.rings, self.law.spacing)
-
     def _renew(self, velocity: Floats) -> None:
         """Make it anew for the first reason that holds, of those that were not tried in vain of late."""
         reasons: dict[str, Callable[[], bool]] = {
-            "meets": self._meets, "leaves": partial(self._leaves, velocity), "worn": self._is_worn,
+            "meets": self._meets, "leaves": partial(self._leaves, velocity),
+            "worn": partial(surface_care.is_worn, self.points, self.triangles, self.rings, self.law.spacing),
         }  # fmt: skip
         for reason, holds in reasons.items():
             if self.moves >= self.waits.get(reason, (0, 1))[0] and holds():

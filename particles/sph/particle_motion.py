@@ -34,16 +34,21 @@ def predict(i, fields, rates, middle, time_step):
 @compiled
 def settle(i, fields, middle, law):
     """Give a particle that has moved its pressure; one behind the mirror becomes its image, whose motion is its own."""
-    if law.mirror and fields.z[i] < 0.0:
-        middle[2, i] = -middle[2, i]
-        reflect(i, fields)
+    middle[2, i] *= reflect(i, fields, law)
     fields.pressure[i] = law.sound * law.sound * (fields.density[i] - law.rest_density)
 
 
 @compiled
-def reflect(i, fields):
-    """Let a particle change places with its image behind the mirror z = 0."""
-    fields.z[i], fields.w[i], fields.slope_z[i] = -fields.z[i], -fields.w[i], -fields.slope_z[i]
+def reflect(i, fields, law):
+    """Let a particle behind the mirror z = 0 change places with its image; return the sign of what is across it then.
+
+    Without a branch: where there was one, threads counted references to all fields for every particle.
+    """
+    side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
+    fields.z[i] *= side
+    fields.w[i] *= side
+    fields.slope_z[i] *= side
+    return side
 
 
 @compiled
@@ -69,8 +74,7 @@ def shift(i, fields, rates, factor, law):
     fields.x[i] -= factor * rates[7, i]
     fields.y[i] -= factor * rates[8, i]
     fields.z[i] -= factor * rates[9, i]
-    if law.mirror and fields.z[i] < 0.0:
-        reflect(i, fields)
+    reflect(i, fields, law)
 
 
 @compiled

@@ -16,9 +16,11 @@ from reflowshock.particles.sph.smoothing import shape, slope
 FEWEST_MOMENTS = 0.05
 # Of the matrix of the linear fit: with a larger condition number, or fewer neighbours, the slope is none (Shepard).
 LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
-compiled = njit(cache=True, error_model="numpy")
+# What makes no arrays counts no references to those it is given: for every particle that was a tenth of a step, and
+# threads waited for each other's counts.
+compiled = njit(cache=True, error_model="numpy", _nrt=False)
 # Sums may be taken in any order, so that several pairs are computed at a time; the order does not depend on threads.
-summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}, _nrt=False)
 
 
 @compiled
@@ -184,6 +186,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
     density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
+    parts = pulls_not(law) and pressure < 0.0  # what no wall pulls at, none stretches: work would come from nothing
     viscosity = own_viscosity(i, fields, law) * lightness if law.no_slip else 0.0
     rate = ax = ay = az = cx = cy = cz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
@@ -200,7 +203,8 @@ def _by_walls(i, fluids, neighbours, fields, law):
             volume = fields.mass[j] / beside * fields.wall_share[j - fluids]
             du, dv, dw = u - hold * fields.u[j], v - hold * fields.v[j], w - side * fields.w[j]
             closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
-            rate += pair_terms.continuity(closing, steep, volume, density)
+            squeezed = pair_terms.continuity(closing, steep, volume, density)
+            rate += positive(squeezed) if parts else squeezed
             other = fields.pressure[j] + weight_below * fields.z[j] * beside
             push = pair_terms.pressure(own, other, steep, volume, lightness)
             drag = pair_terms.shear_viscosity(distance2, 1.0 / (distance2 + softening), steep, volume, 2.0 * viscosity)

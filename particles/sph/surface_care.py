@@ -15,8 +15,9 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import find_beside
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas, volume_and_gradient
+from reflowshock.particles.core.windings import Windings
 from reflowshock.particles.sph import surface_loops
-from reflowshock.particles.sph.fluid_state import Fields
+from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.surface.closing import closed_level
 from reflowshock.particles.surface.cloud_level_set import (
     CannotRebuild,
@@ -33,7 +34,6 @@ from reflowshock.particles.surface.level_set import (
     extract_surface,
     relax,
     signed_distance,
-    windings_on,
 )
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
@@ -132,19 +132,35 @@ def made_anew(
     return None
 
 
-def cosines_between(bounds: tuple[float, float], outward: Floats, push: Floats) -> Floats:
-    """Cosines of the contact angle along a contact line, between those of the advancing and the receding angle.
+def outward_along(line: Floats) -> Floats:
+    """Outward normals in the wall along a contact line `(k, 3)`, as long as the line about each vertex `(k, 2)` [m]."""
+    along = np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0)
+    return 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
 
-    In between the wall holds the line against what pulls at it: the free surface, and the pressure of a liquid at rest
-    below it.
+
+def cosines_of(bounds: tuple[float, float], outward: Floats, push: Floats, drift: Floats) -> Floats:
+    """Cosines of the contact angle along a contact line `(k, 1)`, between those of advancing and receding angle.
+
+    As dry friction does, the wall holds a line at rest against what pulls at it, the free surface and the pressure of a
+    liquid at rest below it; a line that moves has the advancing or the receding angle, whatever pulls.
 
     Args:
         bounds: both cosines.
         outward: `(k, 2)` normal in the wall, as long as the line about each vertex [m].
         push: `(k, 2)` forces on its vertices without that of the wall, over the surface tension [m].
+        drift: `(k, 2)` velocities of its vertices, over that of `sliding`.
     """
-    needed = -(push * outward).sum(axis=1) / (outward**2).sum(axis=1)
-    return np.clip(needed, *bounds)
+    length = np.hypot(outward[:, 0], outward[:, 1])
+    needed = -((push * outward).sum(axis=1) / length + (drift * outward).sum(axis=1)) / length
+    return np.clip(needed, *bounds)[:, None]
+
+
+def sliding(velocities: Floats, tension: float, law: Law) -> Floats:
+    """Velocities along the wall `(m, 2)` of vertices `(m, 3)` [m/s], over that at which a line no longer is at rest.
+
+    With this one friction would stop the mass of a support, rho h^2 a unit of length, while sound crosses it.
+    """
+    return velocities[:, :2] * (law.rest_density * law.length * law.sound / tension)
 
 
 def evened_out(
@@ -175,8 +191,8 @@ def _blunting(line: Floats) -> Floats:
 
 def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
     """Whether sheets of a surface have crossed: it winds round some liquid twice, or round air inside out."""
-    found = windings_on(Grid.around(points, OVERLAP * spacing), points, triangles)
-    return bool(found.max() > 1 or found.min() < 0)
+    least, most = Windings.of(points, triangles, OVERLAP * spacing).bounds
+    return most > 1 or least < 0
 
 
 def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float) -> bool:

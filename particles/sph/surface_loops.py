@@ -66,6 +66,13 @@ def carry(lists, shares, velocity, time_step, points):
             points[v, 2] += time_step * shares[1, k] * velocity[2, j]
 
 
+def velocities(lists, shares, fields):
+    """Return the velocities `(m, 3)` [m/s] with which `carry` would move the vertices."""
+    found = np.zeros((len(lists[0]) - 1, 3))
+    carry(lists, shares, np.array((fields.u, fields.v, fields.w)), 1.0, found)
+    return found
+
+
 @njit(cache=True, parallel=True)
 def share_out(lists, weights, vectors, found):
     """Add what each particle has of kinds of vectors of vertices `(k, m, 3)` to ``found`` `(k, 3, n)`.

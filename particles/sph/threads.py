@@ -117,6 +117,7 @@ class ThreadParticles:
         self.fields, self.rates, self.rows = fields, np.zeros((RATES, fluids)), Rows(law, fluids)
         self._law, self._fluids = law, fluids
         self._middle = np.zeros((7, fluids))
+        self._near, self._near_in = np.empty(0, np.int64), self.rows.lists
 
     def restore(self, fields: Fields, rates: Floats, built_at: Floats, builds: int) -> None:
         """Go on from these arrays, and from neighbours found at these places `(3, n)` [m]."""
@@ -168,10 +169,17 @@ class ThreadParticles:
     def find_rates(self) -> None:
         """Find the rates of the liquid, and before them what walls and its viscosity are."""
         fluids, lists, fields, law = self._fluids, self.rows.lists, self.fields, self._law
-        _cover_walls(fluids, lists, fields, law, fields.wall_share)
+        _cover_walls((self._walls(), fluids), lists, fields, law, fields.wall_share)
         if law.rheology:
             _find_viscosities(fluids, lists, fields, law, fields.viscosity)
         _find_rates(fluids, lists, fields, law, self.rates)
+
+    def _walls(self) -> Indices:
+        """Particles of walls to cover: all in new lists, and then those alone that have liquid in their rows."""
+        if self._near_in is self.rows.lists:
+            return self._near
+        self._near, self._near_in = np.flatnonzero(self.rows.lists[1][self._fluids :]), self.rows.lists
+        return np.arange(len(self.fields.wall_share))
 
     def add(self, act: Callable[[Floats, Fields], None]) -> None:
         """Let what is not a loop over particles add to the rates `(10, n)`, as the fields say."""
@@ -257,8 +265,9 @@ def _find_drifts(fluids, lists, fields, law, middle):
 
 
 @threaded
-def _cover_walls(fluids, lists, fields, law, shares):
-    rows, counts = lists
-    for k in prange(shares.shape[0]):
+def _cover_walls(which, lists, fields, law, shares):
+    (walls, fluids), (rows, counts) = which, lists
+    for n in prange(walls.shape[0]):
+        k = walls[n]
         i = fluids + k
         cover(np.uint64(k), i, fields, wall_values(i, fluids, rows[i, : counts[i]], fields, law), law)

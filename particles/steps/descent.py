@@ -97,7 +97,7 @@ def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: 
     Infinite where momentum is kept, a plate is moved (its work is not known), or friction holds a contact line, which
     no energy describes.
     """
-    relaxes = solver.descends and not physics.momenta and all(line.has_energy for line in physics.lines)
+    relaxes = solver.traits.descends and not physics.momenta and all(line.has_energy for line in physics.lines)
     if not relaxes or is_driven(body, physics, time_step):
         return np.inf
     return physics.energy(body) + ROUNDING * sum(abs(force.energy(body)) for force in physics.forces)

@@ -84,7 +84,7 @@ class LiquidFlow:
         spacing = body.cloud.spacing
         self.body, self.physics, self.time_step, self.solver = body, physics, time_step, solver
         self.volume = body.volume()[0]
-        self.neighbours = NeighbourList(solver.support * spacing, SKIN * spacing)
+        self.neighbours = NeighbourList(solver.traits.support * spacing, SKIN * spacing)
         self.time, self.steps = 0.0, 0
         self.pace = np.zeros((body.cloud.surface_count, 3))  # mean velocity of the surface in the last step [m/s]
 
@@ -147,8 +147,8 @@ class LiquidFlow:
         """Move so that the energy does not rise; return the motion and the number of flips."""
         body, start = self.body, Start.of(self.body, self.physics.lines)
         highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
-        solver = self.solver
-        evening = Evening(solver.smoothing_passes, self.steps % FLIP_INTERVAL == 0, solver.flip_worth, highest)
+        traits = self.solver.traits
+        evening = Evening(traits.smoothing_passes, self.steps % FLIP_INTERVAL == 0, traits.flip_worth, highest)
         attempted = [event.attempt(body) for event in self.physics.events]
         if any(attempted):
             correct_volume(body, self.physics, self.volume)
@@ -193,7 +193,7 @@ class LiquidFlow:
         the steps are: it would creep. It must go as it went in the last step, smoothing included: where smoothing
         undoes what the forces move, these move the same in each step, too, but lead nowhere.
         """
-        if self.solver.keeps_time:
+        if self.solver.traits.keeps_time:
             return 1.0
         normal = self._normals()
         last, now = ((field[: len(normal)] * normal).sum(axis=1) for field in (self.pace, motion.transport))

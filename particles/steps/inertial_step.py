@@ -27,7 +27,7 @@ from reflowshock.particles.physics.operators import Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import BackwardDifference, Base, stepped
 from reflowshock.particles.steps.step_equations import StepEquations
-from reflowshock.particles.steps.step_solver import Motion, StepSolver
+from reflowshock.particles.steps.step_solver import Motion, SolverTraits, StepSolver
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
@@ -109,34 +109,9 @@ class InertialStep:
     past: Past | None = None
 
     @property
-    def support(self) -> float:
-        """Radius of the neighbour list, in spacings: what the shift of the particles needs."""
-        return SUPPORT
-
-    @property
-    def smoothing_passes(self) -> int:
-        """How often the triangles are evened out after a step: the liquid takes them along."""
-        return 1
-
-    @property
-    def flip_worth(self) -> float:
-        """None: flips are Delaunay's."""
-        return 0.0
-
-    @property
-    def descends(self) -> bool:
-        """Always: viscosity and mass only slow down what the forces drive."""
-        return True
-
-    @property
-    def keeps_time(self) -> bool:
-        """Always."""
-        return True
-
-    @property
-    def flaw(self) -> None:
-        """None."""
-        return None
+    def traits(self) -> SolverTraits:
+        """Lists serve the shift of the particles alone; viscosity and mass only slow down what the forces drive."""
+        return SolverTraits(support=SUPPORT, descends=True)
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
         """Start a step; tetrahedra need no neighbour list."""

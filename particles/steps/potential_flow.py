@@ -70,10 +70,10 @@ def _moments(points, mirrors, lists, support):
     """Sum of weight times squared length of each particle's edges, `(n,)` [m^2]."""
     offsets, indices = lists
     result = np.empty(points.shape[0])
-    for i in prange(points.shape[0]):
-        total = 0.0
+    for row in prange(points.shape[0]):
+        i, total = np.int64(row), 0.0  # as an unsigned index it would have what is called compiled once more
         for k in range(offsets[i], offsets[i + 1]):
-            total += _edge(points, mirrors, (i, indices[k]), support)[1]
+            total += _edge(points, mirrors, (i, np.int64(indices[k])), support)[1]
         result[i] = total
     return result
 
@@ -85,10 +85,11 @@ def _rows(points, mirrors, lists, scale, support):
     count = points.shape[0]
     columns = np.empty(offsets[count] + count, np.int32)
     values = np.empty(offsets[count] + count)
-    for i in prange(count):
+    for row in prange(count):
+        i = np.int64(row)
         at, total = offsets[i] + i, 0.0
         for k in range(offsets[i], offsets[i + 1]):
-            j = indices[k]
+            j = np.int64(indices[k])
             value = 3.0 * (scale[i] + scale[j]) * _edge(points, mirrors, (i, j), support)[0]
             columns[at], values[at] = j, -value
             total += value
@@ -150,7 +151,7 @@ def _gradients(points, mirrors, lists, field, support):
     for r in prange(count):
         i = first + r
         for k in range(offsets[i], offsets[i + 1]):
-            j = indices[k]
+            j = np.int64(indices[k])
             _add_edges(points, mirrors, (i, j, field[j] - field[i]), support, sums[r])
         _add_edges(points, mirrors, (i, i, 0.0), support, sums[r])
         _solve_symmetric(sums[r], result[r])

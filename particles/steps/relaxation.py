@@ -35,7 +35,7 @@ from reflowshock.particles.discretisation.volume_constraint import solve_volume
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.potential_flow import PotentialFlow
 from reflowshock.particles.steps.step_equations import StepEquations
-from reflowshock.particles.steps.step_solver import Motion
+from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 
 SUPPORT = 2.0
 # The surface moves along its normals and stretches its triangles unevenly, which biases the shape of least energy: one
@@ -57,34 +57,9 @@ class Relaxation:
     _multigrid: LaggedMultigrid = field(default_factory=LaggedMultigrid)
 
     @property
-    def support(self) -> float:
-        """Radius of the neighbour list, in spacings."""
-        return SUPPORT
-
-    @property
-    def smoothing_passes(self) -> int:
-        """How often the triangles are evened out after a step."""
-        return SMOOTHING_PASSES
-
-    @property
-    def flip_worth(self) -> float:
-        """None: flips are Delaunay's."""
-        return 0.0
-
-    @property
-    def descends(self) -> bool:
-        """Always: the step goes along the forces."""
-        return True
-
-    @property
-    def keeps_time(self) -> bool:
-        """Never: a step is no physical motion."""
-        return False
-
-    @property
-    def flaw(self) -> None:
-        """None."""
-        return None
+    def traits(self) -> SolverTraits:
+        """A step goes along the forces and is no physical motion."""
+        return SolverTraits(SUPPORT, SMOOTHING_PASSES, descends=True, keeps_time=False)
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
         """Build the equations of the surface and the operators of the potential flow."""

@@ -25,7 +25,7 @@ CALM_DISPLACEMENT = 1e-4
 SNAPSHOT_DISPLACEMENT = 0.1
 RUPTURE_SPACINGS = 2.0
 RECORDS = (*FLOW_RECORDS, Snapshot)  # that a flow and its run consist of in a checkpoint
-COUNTS = ("seconds", "ruptured", "calm", "moved")
+COUNTS = ("seconds", "ruptured", "calm", "at_rest", "moved")
 
 
 class SchemeBroke(RuntimeError):
@@ -45,12 +45,15 @@ class StopRule:
         tolerance: relative change of energy in a step below which a body is at rest.
         calm_time: time in which the surface of a body at rest moves less than 1e-4 spacings [s].
         end_time: physical end of the process [s]; infinite in the quasi-static mode.
+        lasting: time that a body is calm for before it is at rest [s]. Where it swings, a quarter of its slowest swing:
+            one that hardly decays is calm where it turns, but moves fastest a quarter later.
     """
 
     max_steps: int
     tolerance: float
     calm_time: float
     end_time: float = float("inf")
+    lasting: float = 0.0
 
 
 @dataclass(slots=True)
@@ -63,7 +66,8 @@ class Run:
         snapshots: the first, the last and some states between.
         seconds: wall time of the steps, those before a restart included [s].
         ruptured: whether the neck became thinner than two spacings.
-        calm: steps that the body has been at rest.
+        calm: last steps that hardly moved the body.
+        at_rest: whether it came to rest; else the process ended, or the neck ruptured, before it did.
         moved: displacement since the last snapshot, over the spacing.
     """
 
@@ -73,6 +77,7 @@ class Run:
     seconds: float = 0.0
     ruptured: bool = False
     calm: int = 0
+    at_rest: bool = False
     moved: float = 0.0
 
     def saved(self) -> dict[str, Any]:
@@ -95,9 +100,9 @@ class Run:
         )
 
     @property
-    def at_rest(self) -> bool:
-        """Whether the body came to rest; else the process ended, or the neck ruptured, before it did."""
-        return self.calm >= CALM_STEPS
+    def time_at_rest(self) -> float:
+        """When the body came to rest: the end of the third of its calm steps [s]; not a number where it did not."""
+        return self.records[CALM_STEPS - 1 - self.calm].time if self.at_rest else float("nan")
 
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
         """Columns of the records, with width and capillary number mu v / gamma.
@@ -132,7 +137,7 @@ def run_to_rest(
     on_snapshot: Callable[[Snapshot], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Run:
-    """Step until the surface hardly moves and the energy hardly changes for three steps, or until the end time.
+    """Step until surface and energy hardly change for three steps and as long as the rule says, or to the end time.
 
     Args:
         flow: the flow; advanced in place.
@@ -187,8 +192,12 @@ def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:
     raise NoRest(
         f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
         f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
-        f"{CALM_DISPLACEMENT:g}; {_what_helps(flow)}"
+        f"{CALM_DISPLACEMENT:g}{_for_how_long(rule)}; {_what_helps(flow)}"
     )
+
+
+def _for_how_long(rule: StopRule) -> str:
+    return f" for {rule.lasting:.3g} s" if rule.lasting > 0.0 else ""
 
 
 def _what_helps(flow: LiquidFlow) -> str:
@@ -206,6 +215,7 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
     calm = is_calm(run.records, rule) and not is_driven(flow.body, flow.physics, record.time_step)
     run.calm = run.calm + 1 if calm else 0
+    run.at_rest = is_lasting(run.records, run.calm, rule)
     run.moved += record.displacement
     run.seconds += perf_counter() - start
 
@@ -217,8 +227,8 @@ def _step(flow: LiquidFlow) -> StepRecord:
         with threads_for(len(flow.body.points)):
             return flow.step()
     except (ArithmeticError, SolveFailed, StepCollapsed) as error:
-        if flow.solver.flaw is not None:
-            raise SchemeBroke(f"{where}: {flow.solver.flaw} ({type(error).__name__}: {error})") from error
+        if flow.solver.traits.flaw is not None:
+            raise SchemeBroke(f"{where}: {flow.solver.traits.flaw} ({type(error).__name__}: {error})") from error
         if not isinstance(error, SolveFailed | ZeroDivisionError):
             raise
         raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
@@ -251,6 +261,11 @@ def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
     before, last = records[-2:]
     change = abs(last.energy - before.energy)
     return _motion(last, rule) < CALM_DISPLACEMENT and change < rule.tolerance * abs(last.energy)
+
+
+def is_lasting(records: Sequence[StepRecord], calm: int, rule: StopRule) -> bool:
+    """Whether a body whose last `calm` steps hardly moved it is at rest: three steps, and as long as the rule says."""
+    return calm >= CALM_STEPS and sum(record.time_step for record in records[-calm:]) >= rule.lasting
 
 
 def fraction_done(records: Sequence[StepRecord], rule: StopRule) -> float:

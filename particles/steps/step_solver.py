@@ -53,32 +53,33 @@ class PreparedStep(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class SolverTraits:
+    """What a flow has to know of a solver.
+
+    Attributes:
+        support: radius of the neighbour list that it needs, in spacings.
+        smoothing_passes: how often the triangles are evened out after a step; less than once where it is done in part.
+        flip_worth: angle [rad] beyond Delaunay's for which a flip may even out the numbers of triangles at a vertex.
+        descends: whether a short enough step without momentum lowers the energy.
+        keeps_time: whether a motion takes its physical time; else only where it leads to counts.
+        flaw: why the scheme itself breaks, for the message when it does; None where it holds.
+    """
+
+    support: float
+    smoothing_passes: float = 1.0
+    flip_worth: float = 0.0
+    descends: bool = False
+    keeps_time: bool = True
+    flaw: str | None = None
+
+
 class StepSolver(Protocol):
     """How a step is solved."""
 
     @property
-    def support(self) -> float:
-        """Radius of the neighbour list that it needs, in spacings."""
-
-    @property
-    def smoothing_passes(self) -> float:
-        """How often the triangles are evened out after a step; less than once where it is done in part."""
-
-    @property
-    def flip_worth(self) -> float:
-        """Angle [rad] beyond Delaunay's for which a flip may even out the numbers of triangles around vertices."""
-
-    @property
-    def descends(self) -> bool:
-        """Whether a short enough step without momentum lowers the energy."""
-
-    @property
-    def keeps_time(self) -> bool:
-        """Whether a motion takes its physical time; else only where it leads to counts."""
-
-    @property
-    def flaw(self) -> str | None:
-        """Why the scheme itself breaks, for the message when it does; None where it holds."""
+    def traits(self) -> SolverTraits:
+        """What a flow has to know of it."""
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
         """Build what does not depend on the size of the step."""

@@ -1,12 +1,19 @@
 """Surfaces that break up: parts that hang together in a vertex alone, parts that are too small, points outside."""
 
+from math import inf
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.neighbours import find_beside
+from reflowshock.particles.core.windings import Windings
 from reflowshock.particles.surface.closing import groups, part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops
+
+# In the distance outside a surface that is judged: what is farther from all vertices is judged by windings.
+FAR = 3.0
 
 
 def unpinched(triangles: Indices) -> tuple[Indices, Indices]:
@@ -93,14 +100,34 @@ def small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArr
     return is_small[part], float(volumes[is_small].sum())
 
 
-def are_outside(places: Floats, points: Floats, normals: Floats, distance: float) -> NDArray[np.bool_]:
+def are_outside(places: Floats, surface: tuple[Floats, Indices], normals: Floats, distance: float) -> NDArray[np.bool_]:
     """Whether places `(n, 3)` are farther than a distance outside the nearest vertex of a surface `(n,)`; all in m.
+
+    Of those that are far from all vertices it is asked what the surface, closed by the wall below, winds round.
 
     Args:
         places: to judge.
-        points: vertices `(m, 3)`.
-        normals: outward ones there `(m, 3)`.
+        surface: vertices `(m, 3)` and triangles `(t, 3)`, whose edges are shorter than three distances.
+        normals: outward ones of vertices `(m, 3)`.
         distance: at least a few tenths of an edge, since the nearest vertex stands for the surface.
     """
-    nearest = cKDTree(points).query(places)[1]
-    return ((places - points[nearest]) * normals[nearest]).sum(axis=1) > distance
+    points, triangles = surface
+    nearest = np.full(len(places), -1)
+    _find_nearest(points, places, find_beside(points, places, FAR * distance), nearest)
+    outside = ((places - points[nearest]) * normals[nearest]).sum(axis=1) > distance
+    far = nearest < 0
+    outside[far] = Windings.of(points, triangles, distance).about(places[far]) <= 0
+    return outside
+
+
+@njit(cache=True)
+def _find_nearest(points, places, lists, nearest):
+    """Write the nearest of the points `(m, 3)` that have each place in their lists; where there is none nothing."""
+    (offsets, indices), least = lists, np.full(places.shape[0], inf)
+    for v in range(points.shape[0]):
+        for k in range(offsets[v], offsets[v + 1]):
+            j = indices[k]
+            x, y, z = places[j, 0] - points[v, 0], places[j, 1] - points[v, 1], places[j, 2] - points[v, 2]
+            square = x * x + y * y + z * z
+            if square < least[j]:
+                least[j], nearest[j] = square, v

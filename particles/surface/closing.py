@@ -10,9 +10,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.surface.level_set import LevelSet, extract_surface, signed_distance
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, within_band
 
 BLUNTINGS = 4
+# In nodes: how far about a surface without gaps distances are told; farther ones do not bend splines at it.
+BAND = 5
 # Cosine of the angle between the normals of vertices that face each other, at most.
 FACING = -0.5
 
@@ -66,9 +68,11 @@ def closed_level(level: LevelSet, gap: float) -> LevelSet:
     What is within half of it is added, and what is then within half of it of the outside is taken away again; or first
     taken away, and then added.
     """
-    wider = signed_distance(*extract_surface(LevelSet(level.grid, level.values - 0.5 * gap)), level.grid)
+    grid = level.grid
+    surface, band = extract_surface(LevelSet(grid, level.values - 0.5 * gap)), 0.5 * abs(gap) + BAND * grid.spacing
+    wider = within_band(*surface, grid, band)
     least = np.minimum if gap > 0.0 else np.maximum
-    return LevelSet(level.grid, least(level.values, wider.values + 0.5 * gap))
+    return LevelSet(grid, least(level.values, wider.values + 0.5 * gap))
 
 
 def without_slits(level: LevelSet) -> LevelSet:

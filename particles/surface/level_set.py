@@ -2,15 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyvista
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core import windings
+from reflowshock.particles.surface import near_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
+
+if TYPE_CHECKING:
+    import pyvista
 
 RELAXATIONS = 30
 CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
@@ -87,20 +91,33 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
         triangles: `(t, 3)`; where the surface has an edge, the triangles share its vertices.
         grid: where to evaluate it.
     """
+    import pyvista  # most reflows need no level set, and start without it
+
     nodes = pyvista.ImageData(dimensions=grid.counts, spacing=(grid.spacing,) * 3, origin=grid.origin)
     distance = _distance(nodes, points, triangles).reshape(grid.counts, order="F")
     return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
 
 
+def within_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
+    """Return what `signed_distance` does; nodes farther from the surface than a band [m] are told as that far."""
+    distance = np.full(grid.counts, band)
+    near_distance.narrow(points, triangles, grid.origin, grid.spacing, distance)
+    return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
+
+
 def depths(points: Floats, surface: tuple[Floats, Indices]) -> Floats:
     """How deep points `(n, 3)` are inside a closed surface, negative outside, `(n,)` [m]; arguments as above."""
+    import pyvista
+
     corners, triangles = surface
     distance = _distance(pyvista.PolyData(points), corners, triangles)
     return np.where(windings.winding_numbers(points, corners[triangles]) > 0.5, distance, -distance)
 
 
-def _distance(nodes: pyvista.DataSet, points: Floats, triangles: Indices) -> Floats:
+def _distance(nodes: "pyvista.DataSet", points: Floats, triangles: Indices) -> Floats:
     """Distance of nodes to a surface [m]. Its sign, by the nearest triangle, is wrong where the surface is folded."""
+    import pyvista
+
     surface = pyvista.PolyData.from_regular_faces(points, triangles)
     return np.abs(nodes.compute_implicit_distance(surface)["implicit_distance"])
 
@@ -108,7 +125,7 @@ def _distance(nodes: pyvista.DataSet, points: Floats, triangles: Indices) -> Flo
 def windings_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
     """How often a closed surface winds round the nodes of a grid, an array of its counts."""
     found = np.zeros(grid.counts, np.int32)
-    windings.on_grid(points, triangles, grid.origin, grid.spacing, found)
+    windings.on_grid(points, np.ascontiguousarray(triangles), grid.origin, grid.spacing, found)
     return found
 
 

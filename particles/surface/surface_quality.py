@@ -100,22 +100,20 @@ def smoothing_offsets(
     return SMOOTHING * offset
 
 
-@njit(cache=True)
-def _half_edges(triangles, count):
+def _half_edges(triangles: Indices, count: int) -> tuple[Indices, Indices]:
     """Keys of the half edges opposite to each corner, sorted, with the half edge numbers."""
-    keys = np.empty(3 * triangles.shape[0], np.int64)
-    for t in range(triangles.shape[0]):
-        for k in range(3):
-            i, j = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
-            keys[3 * t + k] = np.int64(min(i, j)) * count + max(i, j)
-    order = np.argsort(keys, kind="mergesort")
+    i, j = np.roll(triangles, -1, axis=1).astype(np.int64), np.roll(triangles, -2, axis=1)
+    keys = (np.minimum(i, j) * count + np.maximum(i, j)).ravel()
+    order = np.argsort(keys, kind="stable")
     return keys[order], order
 
 
 @njit(cache=True)
 def _excess_triangles(triangles, on_ring):
     """Triangles around each vertex beyond six, on a contact line beyond three."""
-    result = np.where(on_ring, -3.0, -6.0)
+    result = np.empty(on_ring.shape[0])
+    for vertex in range(on_ring.shape[0]):
+        result[vertex] = -3.0 if on_ring[vertex] else -6.0
     for t in range(triangles.shape[0]):
         for k in range(3):
             result[triangles[t, k]] += 1.0
@@ -123,13 +121,13 @@ def _excess_triangles(triangles, on_ring):
 
 
 @njit(cache=True)
-def _flip_pass(points, triangles, on_ring, margin, worth):
+def _flip_pass(points, triangles, half_edges, on_ring, worth):
     """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips.
 
     To them adds an angle `worth` for each triangle by which the flip evens out the numbers around its four vertices:
     minus half the change of the sum of the squares of their excess. A flip back has the opposite of both.
     """
-    keys, order = _half_edges(triangles, points.shape[0])
+    keys, order = half_edges
     touched = np.zeros(triangles.shape[0], np.bool_)
     excess = _excess_triangles(triangles, on_ring)
     made, flips = np.empty(triangles.shape[0], np.int64), 0
@@ -143,11 +141,14 @@ def _flip_pass(points, triangles, on_ring, margin, worth):
         i, j = triangles[s, (order[e] % 3 + 1) % 3], triangles[s, (order[e] % 3 + 2) % 3]
         angles = _angle(points, p, i, j) + _angle(points, q, i, j)
         angles += worth * (excess[i] + excess[j] - excess[p] - excess[q] - 2.0)
-        if angles < np.pi + margin or (on_ring[p] and on_ring[q]):
+        if angles < np.pi + FLIP_MARGIN or (on_ring[p] and on_ring[q]):
             continue
         new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
         found = np.searchsorted(keys, new_key)
-        if (found < keys.shape[0] and keys[found] == new_key) or (made[:flips] == new_key).any():
+        exists = found < keys.shape[0] and keys[found] == new_key
+        for flip in range(flips):
+            exists |= made[flip] == new_key
+        if exists:
             continue
         if _folds(points, (p, q, i, j)):
             continue
@@ -184,7 +185,7 @@ def flip_to_delaunay(
         on_ring[ring] = True
     total = 0
     for _ in range(FLIP_PASSES):
-        flips = _flip_pass(points, result, on_ring, FLIP_MARGIN, worth)
+        flips = _flip_pass(points, result, _half_edges(result, len(points)), on_ring, worth)
         total += flips
         if flips == 0:
             break

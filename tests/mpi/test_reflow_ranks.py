@@ -15,6 +15,7 @@ from reflowshock.workflow.reflow.ranks import Ranks
 from tests.support import rank_work
 
 SOLDER = Solder(volume=7.2e-11, numerics=SolderNumerics(spacing=1.2e-4))
+FLOWING = Solder(volume=7.2e-11, numerics=SolderNumerics(spacing=1e-4, scheme="ispg"), effects={"inertia": "on"})
 PLACES = {
     "A1": JointGeometry(3.0e-4, 2.4e-4, 2.4e-4),
     "B1": JointGeometry(3.1e-4, 2.4e-4, 2.4e-4, (1e-5, 0.0), (0.01, 0.02)),
@@ -28,8 +29,8 @@ def ranks(tmp_path):
     assert not found.folder.exists()
 
 
-def jobs(folder) -> dict[str, JointReflow]:
-    return {name: JointReflow(place, SOLDER, folder / name) for name, place in PLACES.items()}
+def jobs(folder, solder) -> dict[str, JointReflow]:
+    return {name: JointReflow(place, solder, folder / name) for name, place in PLACES.items()}
 
 
 def test_what_fails_is_named_and_all_end(ranks):
@@ -45,14 +46,15 @@ def test_nothing_to_do_needs_no_rank(ranks):
     assert ranks.run(rank_work.fail, {}, lambda _: None) == {}
 
 
-def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processes_give(ranks, tmp_path):
+@pytest.mark.parametrize("solder", [SOLDER, FLOWING], ids=["energy", "ispg"])
+def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processes_give(ranks, tmp_path, solder):
     with pytest.raises(ReflowError, match=r"(?s)mpirun was killed.*unfinished joints: (A1, )?B1"):
-        ranks.run(rank_work.be_killed, jobs(tmp_path), lambda _: None)
+        ranks.run(rank_work.be_killed, jobs(tmp_path, solder), lambda _: None)
     assert not psutil.pid_exists(int((tmp_path / "B1.pid").read_text()))
     told = []
-    by_ranks = ranks.run(rank_work.solve, jobs(tmp_path), lambda shares: told.append(dict(shares)))
+    by_ranks = ranks.run(rank_work.solve, jobs(tmp_path, solder), lambda shares: told.append(dict(shares)))
     with Processes(1, 1) as processes:
-        by_processes = processes.run(rank_work.solve, jobs(tmp_path / "processes"), lambda _: None)
+        by_processes = processes.run(rank_work.solve, jobs(tmp_path / "processes", solder), lambda _: None)
     assert list(by_ranks) == list(by_processes) == list(PLACES)
     assert [continued for _, continued in by_ranks.values()] == [True, False]
     assert told[-1] == dict.fromkeys(PLACES, 1.0)

@@ -1,13 +1,16 @@
 """Joints of a package by the scheme ispg: each flows from its cone with inertia and rests where the default has it."""
 
 import json
+import signal
 from math import pi
 
+import numpy as np
 import pytest
 
+from reflowshock.particles.scenes.products import read_shapes
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from tests.support.workflow_command import SMALL_CASE, reflowshock
+from tests.support.workflow_command import SMALL_CASE, break_off, command_line, reflowshock
 
 SETTINGS = ("solder.numerics.scheme=ispg", "solder.effects.inertia=on")
 
@@ -17,11 +20,17 @@ def metrics_of(folder):
     return {name: {key: m["value"] for key, m in joint["metrics"].items()} for name, joint in joints.items()}
 
 
-def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_run, tmp_path):
-    solder = read_case(SMALL_CASE).solder
-    result = reflowshock("run", tmp_path, "--until", "reflow", settings=SETTINGS)
+@pytest.fixture(scope="module")
+def by_ispg(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ispg")
+    result = reflowshock("run", folder, "--until", "reflow", settings=SETTINGS)
     assert result.returncode == 0, result.stdout + result.stderr
-    found, default = metrics_of(tmp_path), metrics_of(first_run[0])
+    return folder
+
+
+def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_run, by_ispg):
+    solder = read_case(SMALL_CASE).solder
+    found, default = metrics_of(by_ispg), metrics_of(first_run[0])
     assert found.keys() == default.keys()
     for name, joint in found.items():
         assert joint["max_width"] == pytest.approx(default[name]["max_width"], rel=1e-4)
@@ -29,8 +38,23 @@ def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_
         assert abs(change) < 1e-3 * pi * 0.24e-3 * solder.surface_tension
         assert joint["at_rest"] == 1.0 and joint["particles_lost"] == 0.0
         assert abs(joint["volume_drift"]) < 1e-9 and abs(joint["energy_imbalance"]) < 1e-6
-    told = json.loads((tmp_path / "reflow/stage.json").read_text())["metrics"]
+    told = json.loads((by_ispg / "reflow/stage.json").read_text())["metrics"]
     assert told["joints_at_rest"]["value"] == len(found)
+
+
+@pytest.mark.long  # joints one by one: tests/unit/particles/test_restart.py
+def test_a_run_that_is_killed_goes_on_to_the_same_bits(by_ispg, tmp_path):
+    line = command_line("run", tmp_path, "--until", "reflow", settings=SETTINGS)
+    break_off(line, tmp_path, signal.SIGKILL, "stage")
+    result = reflowshock("run", tmp_path, "--until", "reflow", settings=SETTINGS)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "continued from checkpoints" in " ".join(result.stdout.split())
+    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (by_ispg, tmp_path))
+    assert found.keys() == expected.keys()
+    for name, shape in expected.items():
+        for array in ("points", "velocity", "pressure"):
+            assert np.array_equal(getattr(found[name], array), getattr(shape, array))
+        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
 
 
 def test_the_plan_names_the_scheme_and_its_cost(tmp_path):

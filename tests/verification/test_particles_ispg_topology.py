@@ -29,7 +29,7 @@ def named(shape):
 
 def neck_radius(body):
     """The smallest of the cross-sections between the drops, as a disc."""
-    points = body.points[:, [1, 2, 0]]
+    points = np.ascontiguousarray(body.points[:, [1, 2, 0]])
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
     return np.sqrt(section_areas(points, body.triangles, heights).min() / np.pi)
 

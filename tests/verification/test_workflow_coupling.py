@@ -62,6 +62,23 @@ def test_a_rigid_package_on_joints_comes_to_the_height_of_one(tmp_path, count):
     )
 
 
+def test_joints_that_flow_with_inertia_bear_a_package_at_the_height_of_the_default(tmp_path):
+    """By the scheme ispg each exchange ends at rest: the same height, and forces that bear the weight."""
+    load, gaps = 5e-5, {}
+    flowing = {"numerics": SolderNumerics(spacing=1e-4, scheme="ispg"), "effects": {"gravity": "off", "inertia": "on"}}
+    relaxing = {"numerics": SolderNumerics(spacing=1e-4, time_step_limit=100), "effects": {"gravity": "off"}}
+    for name, settings in {"ispg": flowing, "energy": relaxing}.items():
+        structure = Bow(SQUARE, rigid_modes(SQUARE, ("z",), 4 * load))
+        found = coupled(tmp_path / name, structure, solder=Solder(volume=BALL, **settings))
+        assert found.seen[-1].residual <= 1e-3
+        assert found.state.wrenches[:, 1, 2].sum() == pytest.approx(4 * load, abs=4e-3 * PULL)
+        shape = found.joints.shapes()["J0"]
+        assert shape.metrics["at_rest"][0] == 1.0 and abs(shape.metrics["volume_drift"][0]) < 1e-9
+        gaps[name] = found.places["J0"].gap
+    assert abs(shape.metrics.get("energy_imbalance", (0.0, ""))[0]) < 1e-6
+    assert gaps["ispg"] == pytest.approx(gaps["energy"], rel=5e-4)
+
+
 def test_a_package_that_starts_tilted_and_shifted_levels_and_centres_itself(tmp_path):
     """Six rigid motions: 0.2 radii aside, a degree tilted, a degree turned; a micrometre of it is left."""
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, 8e-5))

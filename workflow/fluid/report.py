@@ -9,6 +9,7 @@ import numpy as np
 from reflowshock.arrays import Floats
 from reflowshock.particles.parameters.droplets import cap
 from reflowshock.particles.reference.dam_break import measured_pressure
+from reflowshock.particles.reference.impact_spread import of_measured
 from reflowshock.workflow.case.text import number, percent, quantity, short
 from reflowshock.workflow.fluid.case import DamBreakCase, DropletCase, FlowCase, PoiseuilleCase, PrintingCase
 from reflowshock.workflow.fluid.printed_part import add_part
@@ -131,12 +132,17 @@ def droplet_curves(case: DropletCase, history: Mapping[str, Floats]) -> list[Cha
     unit = "D / U" if drop.impact_speed else "sqrt(rho D³ / gamma)"
     time, axis = history["time"] / drop.unit_of_time, Axis(f"time [{unit}]")
     shape = [Series("width", time, history["spread"]), Series("height", time, history["height"], ORANGE)]
+    ends = time[[0, -1]]
     if drop.has_wall:
         base, height = cap(drop.angle)
-        ends = time[[0, -1]]
         shape += [
             Series("cap at rest, width on the wall", ends, np.array([base, base]), BLUE, line="dashed"),
             Series("cap at rest, height", ends, np.array([height, height]), ORANGE, line="dashed"),
+        ]
+    if between := of_measured(drop.weber_number, drop.reynolds_number, drop.advancing):
+        shape += [
+            Series(f"largest width by correlations, {which}", ends, np.array([width, width]), RED, line="dashed")
+            for which, width in zip(("least", "largest"), between, strict=True)
         ]
     surface = np.pi * drop.diameter**2 * drop.surface_tension
     energies = [

@@ -137,7 +137,7 @@ class PackageCase(Case):
         from reflowshock.meshing.board.checks import problems
         from reflowshock.particles.parameters.joint_checks import unverified_joints
 
-        if self.thermal or "scheme" in self.solder.numerics.model_fields_set:
+        if "scheme" in self.solder.numerics.model_fields_set:
             return self
         if problems(self.package, self.board, self.warpage):
             return self

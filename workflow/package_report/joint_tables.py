@@ -33,8 +33,11 @@ SHAPE_COLUMNS: tuple[Column, ...] = (
     ("angle board / package [deg]", "angles", str),
     ("tilt [mrad]", "tilted", lambda value: f"{1e3 * value:.2f}"),
     ("width error", "width_error", percent),
-    ("axial force [mN]", "axial_force", lambda value: f"{1e3 * value:+.3f}"),
+    ("axial force on the package, upwards [mN]", "axial_force", lambda value: f"{1e3 * value:+.3f}"),
     ("volume drift", "volume_drift", percent),
+    ("smoothing takes", "smoothing_loss", percent),
+    ("viscosity takes", "viscous_loss", percent),
+    ("energy imbalance", "energy_imbalance", percent),
 )
 
 

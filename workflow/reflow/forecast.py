@@ -95,17 +95,17 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
 
 
 def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
-    """Find a motion that matters where load steps have no time."""
+    """Find a motion that matters where load steps have no time; by the scheme ispg it may be asked for all the same."""
     from reflowshock.particles.parameters.effects import AT_REST, decide_effects
 
-    for geometry in list(geometries.values())[:1]:
-        for name in AT_REST:
-            effect = decide_effects(geometry, solder)[name]
-            if effect["on"]:
-                key = "solder.process_time" if getattr(solder.effects, name) == "auto" else f"solder.effects.{name}"
-                yield Problem(
-                    key,
-                    f"cannot be combined with [thermal], whose load steps are at rest: {effect['why']}",
-                    None,
-                    "a slower process",
-                )
+    if solder.numerics.scheme == "ispg":
+        by_numbers = solder.effects.model_copy(update=dict.fromkeys(AT_REST, "auto"))
+        solder = solder.model_copy(update={"effects": by_numbers})
+    effects = decide_effects(next(iter(geometries.values())), solder)
+    for name in (name for name in AT_REST if effects[name]["on"]):
+        message = f"cannot be combined with [thermal], whose load steps are at rest: {effects[name]['why']}"
+        if getattr(solder.effects, name) == "auto":
+            yield Problem("solder.process_time", message, None, "a slower process")
+        else:
+            allowed = 'off, or solder.effects.inertia = "on" with the scheme ispg'
+            yield Problem(f"solder.effects.{name}", message, None, allowed)

@@ -39,7 +39,8 @@ def add_solder(run_folder: Path, case: Case, context: dict, summary: dict) -> No
             axis = middle(shape.surface_points) if case.kind == "drops" else 0.0
             is_plane = isinstance(case, DropCase) and case.drop.section == "plane"
             context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian, is_plane)
-        context["curves"]["body_history"] = history_curve(shape.history)
+        moves = summary["effects"].get("inertia", {}).get("on", False)
+        context["curves"]["body_history"] = history_curve(shape.history, moves)
     path = run_folder / "reflow" / "path.json"
     if path.exists() and "pull" not in shape.history:
         context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
@@ -66,21 +67,24 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None, is_plane: boo
     return [Chart(Axis("height [mm]"), Axis(label), lines, is_upright=True)]
 
 
-def history_curve(history: dict) -> list[Chart]:
-    """Return height and width, energy, capillary number and time step against the steps; the force of a pull first."""
-    step, steps = history["step"], Axis("step")
+def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]:
+    """Return height and width, potential energy, capillary number and time step; the force of a pull first.
+
+    Over the time of a liquid that moves by its inertia; else over the steps, whose times mean nothing.
+    """
+    axis, at = (TIME, history["time"] / MILLI) if moves else (Axis("step"), history["step"])
     sizes = [
-        Series(name, step, history[name] / MILLI, colour)
+        Series(name, at, history[name] / MILLI, colour)
         for name, colour in (("height", BLUE), ("width", ORANGE))
         if name in history
     ]
-    energy = [Series("energy", step, history["energy"] / MICRO)]
-    capillary = [Series("capillary number", step, history["capillary_number"])]
+    energy = [Series("energy", at, history["energy"] / MICRO)]
+    capillary = [Series("capillary number", at, history["capillary_number"])]
     charts = [
-        Chart(steps, Axis("size [mm]"), sizes),
-        Chart(steps, Axis("energy [µJ]"), energy),
-        Chart(steps, Axis("capillary number", log=True), capillary),
-        Chart(steps, Axis("time step [µs]", log=True), [Series("time step", step, history["time_step"] / MICRO)]),
+        Chart(axis, Axis("size [mm]"), sizes),
+        Chart(axis, Axis("energy of surface, wetting and weight [µJ]"), energy),
+        Chart(axis, Axis("capillary number", log=True), capillary),
+        Chart(axis, Axis("time step [µs]", log=True), [Series("time step", at, history["time_step"] / MICRO)]),
     ]
     if "pull" in history:
         charts.insert(0, pull_chart(history))

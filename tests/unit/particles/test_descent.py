@@ -17,12 +17,13 @@ from reflowshock.particles.physics.plate_motion import Travel
 from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
+from reflowshock.particles.steps.step_solver import SolverTraits
 from reflowshock.particles.steps.time_step import TimeStep
 from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine, HystereticLine
 
 RADII, GAP = (0.75, 1.46), 1.0
 TENSION = (SurfaceTension(2.0),)
-DESCENDS = SimpleNamespace(descends=True)
+DESCENDS = SimpleNamespace(traits=SolverTraits(support=2.0, descends=True))
 
 
 def joint():
@@ -104,7 +105,7 @@ def test_momentum_plates_that_are_moved_and_friction_may_raise_the_energy():
         replace(physics, lines=(rubbed,)),
     ):
         assert highest_energy(body, driven, DESCENDS, 1.0) == np.inf
-    assert highest_energy(body, physics, SimpleNamespace(descends=False), 1.0) == np.inf
+    assert highest_energy(body, physics, SimpleNamespace(traits=SolverTraits(support=2.0)), 1.0) == np.inf
 
 
 @dataclass

@@ -12,7 +12,7 @@ from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import SurfaceLost, is_folded
+from reflowshock.particles.sph.surface_care import SurfaceLost, cosines_of, is_folded
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
 COARSE = DropletNumerics(particles_per_diameter=8)
@@ -222,6 +222,20 @@ def test_a_drop_that_does_not_wet_its_wall_rebounds():
 def test_what_became_of_a_drop_is_told_in_words(foot, parts, shed, words):
     history = {"foot": np.array(foot), "parts": np.array([1.0, parts]), "shed": np.array([0.0, shed])}
     assert outcome(history) == words
+
+
+def test_what_strikes_fast_is_told_how_wide_such_drops_spread():
+    told = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
+    assert told == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by that of computed ones"
+    assert "spread_expected" not in solve_droplet(drop(weber=8.0, reynolds=7.7, duration=1e-4)).words
+
+
+def test_a_wall_holds_a_contact_line_at_rest_and_one_that_moves_has_its_angle():
+    outward, push = np.array([[2.0, 0.0], [0.0, 2.0]]), np.array([[0.6, 0.0], [0.0, -0.6]])
+    held = cosines_of((-0.5, 0.4), outward, push, np.zeros((2, 2)))
+    assert held[:, 0] == pytest.approx([-0.3, 0.3])
+    assert cosines_of((-0.5, 0.4), outward, push, 0.1 * outward)[:, 0] == pytest.approx([-0.5, 0.1])
+    assert cosines_of((-0.5, 0.4), outward, push, -outward)[:, 0] == pytest.approx([0.4, 0.4])
 
 
 def test_threads_change_no_droplet(every_thread):

@@ -80,26 +80,34 @@ def float_on(checkpoint):
     return moved_in_galerkin_form(Floating(1, LIFT, np.array([0.0, 0.0, 1e-4])), checkpoint)
 
 
-def moved_in_galerkin_form(motion, checkpoint):
+def viscous():
+    """Solder that hardly swings, in a short process."""
     effects = SolderEffects(inertia="on", viscosity="on")
     numerics = SolderNumerics(spacing=8e-5, scheme="ispg", time_step_limit=100)
     fluid = {"surface_tension": 4.985, "viscosity": 0.227, "process_time": 2e-4}
-    solder = SOLDER.model_copy(update={"effects": effects, "numerics": numerics, **fluid})
-    shape = settle_joint(JOINT, solder, (motion,), checkpoint=checkpoint)
+    return SOLDER.model_copy(update={"effects": effects, "numerics": numerics, **fluid})
+
+
+def moved_in_galerkin_form(motion, checkpoint):
+    shape = settle_joint(JOINT, viscous(), (motion,), checkpoint=checkpoint)
     assert len(shape.history["time"]) > 8
     return [shape.points, shape.velocity, shape.history["energy"], np.array(shape.metrics["offset"][0])]
 
 
-def carry(checkpoint):
+def carry(checkpoint, solder=SOLDER):
     """Carried from a file to another place, on the way to which it is broken off; then its shape there."""
     if checkpoint is None:
         with TemporaryDirectory() as folder:
-            return carry(BreakingCheckpoint(Path(folder) / "state", -1))
+            return carry(BreakingCheckpoint(Path(folder) / "state", -1), solder)
     first, now = (Checkpoint(checkpoint.path.with_name(name), ("inputs",)) for name in ("first", "now"))
     moved = JointGeometry(0.29e-3, RADIUS + 1e-10, RADIUS, (1e-5, 0.0), (0.0, -0.01))  # alike, but not to the bit
-    carry_joint(JOINT, SOLDER, None, first)
-    wrenches = carry_joint(moved, SOLDER, first, BreakingCheckpoint(now.path, checkpoint.left)).wrenches
-    return [wrenches, carried_shape(moved, SOLDER, first, now).points]
+    carry_joint(JOINT, solder, None, first)
+    wrenches = carry_joint(moved, solder, first, BreakingCheckpoint(now.path, checkpoint.left)).wrenches
+    return [wrenches, carried_shape(moved, solder, first, now).points]
+
+
+def carry_in_galerkin_form(checkpoint):
+    return carry(checkpoint, viscous())  # each place for the time of some steps
 
 
 def stand(checkpoint):
@@ -176,7 +184,20 @@ def merge_with_inertia(checkpoint):
 
 
 FLOWS = [flow_as_printed, flow_in_galerkin_form, flow_in_section]
-RUNS = [settle, follow, pull, float_on, carry, stand, stand_with_inertia, *FLOWS, swing, merge, merge_with_inertia]
+RUNS = [
+    settle,
+    follow,
+    pull,
+    float_on,
+    carry,
+    carry_in_galerkin_form,
+    stand,
+    stand_with_inertia,
+    *FLOWS,
+    swing,
+    merge,
+    merge_with_inertia,
+]
 
 
 @pytest.mark.parametrize("run", RUNS)

@@ -46,11 +46,11 @@ def test_the_rate_at_a_particle_is_that_of_the_flow():
     strain = 0.5 * (gradient + gradient.T)
     expected = CARREAU.viscosity(float(np.sqrt(2.0 * (strain**2).sum())), 0.0149)
     for i in range(0, simulation.fluids, 17):
-        found = viscosity_of(i, simulation.fluids, rows.of(i), fields, simulation.law)
+        found = viscosity_of(np.uint64(i), simulation.fluids, rows.of(i), fields, simulation.law)
         assert found == pytest.approx(expected, rel=1e-10)
     turning = np.array([[0.0, -1e6, 0.0], [1e6, 0.0, 0.0], [0.0, 0.0, 0.0]])
     fields.u[:], fields.v[:], fields.w[:] = turning @ np.array(fields[:3])
-    found = viscosity_of(0, simulation.fluids, rows.of(0), fields, simulation.law)
+    found = viscosity_of(np.uint64(0), simulation.fluids, rows.of(0), fields, simulation.law)
     assert found == pytest.approx(0.0149, rel=1e-9)  # a body that turns as a whole is not sheared
 
 

@@ -18,7 +18,7 @@ def ink(xsph, **changes):
 def drifts(simulation):
     found, rows = np.empty((3, simulation.fluids)), simulation.particles.rows
     for i in range(simulation.fluids):
-        found[:, i] = drift_of(i, simulation.fluids, rows.of(i), simulation.fields, simulation.law)
+        found[:, i] = drift_of(np.uint64(i), simulation.fluids, rows.of(i), simulation.fields, simulation.law)
     return found
 
 

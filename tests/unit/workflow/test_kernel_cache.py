@@ -46,7 +46,27 @@ def test_where_none_can_be_made_it_is_temporary(tmp_path: Path, monkeypatch, var
 
 
 def test_tests_use_it() -> None:
+    from reflowshock.particles.core.neighbours import visit
+
     assert kernel_cache.VARIABLE in os.environ
+    assert visit._cache.cache_path == kernel_cache.PlaceByModule(visit.py_func, __file__).get_cache_path()
+
+
+def test_a_kernel_is_kept_by_its_module_and_source_wherever_that_is(tmp_path: Path, monkeypatch) -> None:
+    def kernel() -> None:
+        pass
+
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "kept"))
+    kernel.__module__ = "reflowshock.fem.kernels.some"
+    places = []
+    for name, text in (("here", "1"), ("there", "1"), ("changed", "2")):
+        (tmp_path / name).write_text(text)
+        places.append(kernel_cache.PlaceByModule.from_function(kernel, str(tmp_path / name)))
+    assert len({place.get_cache_path() for place in places}) == 1
+    here, there, changed = (place.get_source_stamp() for place in places)
+    assert here == there != changed
+    kernel.__module__ = "somebody.kernels"
+    assert kernel_cache.PlaceByModule.from_function(kernel, str(tmp_path / "here")) is None
 
 
 def test_compilation_is_predicted_until_it_was_done(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from reflowshock.workflow.package_report.array import array_maps
 from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.package_report.joints import headline
 from reflowshock.workflow.package_report.scenes import is_neighbour, role_of
-from reflowshock.workflow.solder.report import pull_chart
+from reflowshock.workflow.solder.report import history_curve, pull_chart
 from tests.support.chain_products import BOW, MICRO, MILLI, bowed_structure, interface
 
 NAMES = ["A3", "A4", "B3", "B4"]
@@ -244,3 +244,21 @@ def test_the_force_of_a_moved_package_is_drawn_over_what_changes(standoff, axis)
     chart = pull_chart({name: np.array(column) for name, column in columns.items()})
     assert chart.x.label == axis
     assert [line.name for line in chart.series] == ["particles", "Young-Laplace"][: 1 + known]
+
+
+@pytest.mark.parametrize(("moves", "label", "last"), [(True, "time [ms]", 3.0), (False, "step", 2.0)])
+def test_a_history_is_drawn_over_time_where_that_means_something(moves, label, last):
+    names = ("time", "height", "width", "energy", "capillary_number", "time_step")
+    history = {name: np.array([1.0, 3.0]) * MILLI for name in names} | {"step": np.array([1.0, 2.0])}
+    charts = history_curve(history, moves)
+    assert [chart.x.label for chart in charts] == 4 * [label]
+    assert all(series.x[-1] == pytest.approx(last) for chart in charts for series in chart.series)
+
+
+def test_joints_that_flowed_with_inertia_show_what_took_their_energy():
+    relaxed = {"name": "A3", "shape": "A3", "standoff": 3e-4, "axial_force": -1e-5}
+    assert "smoothing takes" not in mesh_tables.shapes([relaxed])["head"]
+    table = mesh_tables.shapes([relaxed | {"smoothing_loss": 0.02, "viscous_loss": 3e-5, "energy_imbalance": -1e-9}])
+    row = dict(zip(table["head"], table["rows"][0], strict=True))
+    assert row["axial force on the package, upwards [mN]"] == "-0.010"
+    assert (row["smoothing takes"], row["viscosity takes"]) == ("2 %", "0.003 %")

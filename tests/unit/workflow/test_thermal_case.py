@@ -52,6 +52,12 @@ def test_a_material_expands_as_it_says():
     assert not any(material.unknown_expansion for material in LIBRARY.values())
 
 
+def test_with_inertia_joints_flow_by_ispg_in_a_process_that_leaves_them_time():
+    solder = read("thermal.steps=1", "solder.effects.inertia=on").solder
+    assert (solder.numerics.scheme, solder.effects.inertia) == ("ispg", "on")
+    assert read("thermal.steps=1").solder.numerics.scheme == "energy"
+
+
 FAULTS = {
     "cools": (['thermal.peak="5 degC"'], ['thermal.peak = "5 degC"', ">= 25 degC, the reference"]),
     "melts above the peak": (PAPER[:1], ["thermal.melting", ">= 25 degC, the reference and <= 200 degC, the peak"]),
@@ -68,7 +74,15 @@ FAULTS = {
         [*PAPER, MOVED[0], 'thermal.corner_displacement="-0.25 mm"'],
         ['thermal.corner_displacement = "-0.25 mm"', "leaves 0.06 mm of the 0.31 mm gap", "> -0.2376 mm"],
     ),
-    "ispg": (["thermal.steps=1", "solder.numerics.scheme=ispg"], ['scheme = "ispg"', "load steps of [thermal]"]),
+    "ispg": (["thermal.steps=1", "solder.numerics.scheme=ispg"], ['scheme = "ispg"', "joints without inertia"]),
+    "tetrahedra": (
+        ["thermal.steps=1", "solder.numerics.scheme=energy", "solder.effects.inertia=on"],
+        ["solder.effects.inertia", "load steps are at rest", "with the scheme ispg"],
+    ),
+    "too fast": (
+        ["thermal.steps=1", "solder.effects.inertia=on", "solder.process_time=10 ms"],
+        ["solder.process_time", "load steps are at rest", "the motion matters", "a slower process"],
+    ),
     "switch": (["thermal.effects.flexible=yes"], ["one of auto, on, off"]),
     "steps": (["thermal.steps=0"], [">= 1 and <= 200"]),
     "warped twice": (

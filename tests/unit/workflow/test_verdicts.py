@@ -8,7 +8,7 @@ import pytest
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.reflow.joints import ReflowError, mark_bridges, refuse_joints_without_mesh
-from reflowshock.workflow.solder.stages import of_drop, of_joint
+from reflowshock.workflow.solder.stages import of_drop, of_joint, of_oscillation
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 
@@ -54,6 +54,14 @@ def test_joints_with_an_account_of_their_energy_are_judged_by_it(records):
     records["A1"]["metrics"] |= {"energy_imbalance": {"value": -0.03}, "particles_lost": {"value": 1.0}}
     found = findings.of_reflow(records, {})
     assert not found.health["joint_energy_imbalance_max"]["ok"] and not found.health["joint_particles_lost"]["ok"]
+
+
+@pytest.mark.parametrize(("scheme", "limit"), [("inertia", 0.10), ("ispg", 0.20)])
+def test_the_decay_of_a_swing_is_judged_as_its_scheme_is_verified_for(scheme, limit):
+    metrics = {"volume_drift": (0.0, ""), "period_error": (5e-3, ""), "decay_rate_error": (1.01 * limit, "")}
+    health = of_oscillation(metrics, {}, scheme).health
+    assert health["decay_rate_error"]["limit"] == limit and not health["decay_rate_error"]["ok"]
+    assert health["period_error"]["ok"]
 
 
 def test_widths_are_judged_to_one_per_cent_and_counted(records):

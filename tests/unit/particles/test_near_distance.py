@@ -1,0 +1,18 @@
+"""Distances to a surface in a band about it: those that VTK finds everywhere, slivers and folds included."""
+
+import numpy as np
+import pyvista
+
+from reflowshock.particles.surface.level_set import Grid, signed_distance, within_band
+
+
+def test_a_band_about_a_rough_surface_has_its_distances():
+    ball = pyvista.Icosphere(radius=1.0, nsub=2)
+    points, triangles = np.array(ball.points, dtype=float), ball.faces.reshape(-1, 4)[:, 1:].astype(np.int32)
+    points = points * [1.0, 1.0, 0.6] + 0.1 * np.random.default_rng(0).normal(size=points.shape)
+    triangles = np.append(triangles, triangles[:1, [0, 1, 1]], axis=0)  # an edge, and no triangle
+    grid = Grid.around(points, 0.11)
+    everywhere = signed_distance(points, triangles[:-1], grid).values
+    for band in (0.05, 0.4, 10.0):
+        near = within_band(points, triangles, grid, band).values
+        assert np.abs(near - np.clip(everywhere, -band, band)).max() < 1e-14

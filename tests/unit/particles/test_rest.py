@@ -1,0 +1,114 @@
+"""A body is at rest when it is calm for long enough: a swing that hardly decays is calm where it turns."""
+
+from dataclasses import replace
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+
+from reflowshock.particles.core.cloud import sphere_cloud
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
+from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.reference.drop_oscillation import cap_frequency, rayleigh_frequency
+from reflowshock.particles.scenes.reflow import start_flow, stop_rule
+from reflowshock.particles.steps.flow import StepRecord
+from reflowshock.particles.steps.rest import CALM_STEPS, NoRest, Run, StopRule, is_calm, is_lasting, run_to_rest
+
+PERIOD = 60  # steps
+# Surface of a body that moves by this in a step, of the spacing, is at the bound of calm.
+BOUND = 1e-4
+
+
+def records_of(displacements):
+    """Steps of one second that move the surface; its energy does not change."""
+    nan = float("nan")
+    return [
+        StepRecord(number, float(number), 1.0, "", 0.0, 1.0, 1.0, 0.0, displacement, 0, 0, nan, nan)
+        for number, displacement in enumerate(displacements, 1)
+    ]
+
+
+def swing(amplitude, decay, steps):
+    """Displacements of a swing of an amplitude, in spacings, that loses a share in a step; it starts where it turns."""
+    turn = 2.0 * pi / PERIOD
+    place = [amplitude * (1.0 - decay) ** step * cos(turn * step) for step in range(steps + 1)]
+    return np.abs(np.diff(place))
+
+
+def steps_to_rest(records, rule):
+    """After how many steps a run with these records would have been found at rest, and its run."""
+    run = Run()
+    for record in records:
+        run.records.append(record)
+        run.calm = run.calm + 1 if is_calm(run.records, rule) else 0
+        run.at_rest = is_lasting(run.records, run.calm, rule)
+        if run.at_rest:
+            break
+    return run
+
+
+def test_a_swing_is_not_at_rest_where_it_turns():
+    """Its amplitude is found so with three steps when it is eight times as large as that with a quarter of a period."""
+    records = records_of(swing(amplitude=0.02, decay=1e-3, steps=5000))
+    three, quarter = StopRule(9999, 1e-6, 1.0), StopRule(9999, 1e-6, 1.0, lasting=0.25 * PERIOD)
+    found = [steps_to_rest(records, rule) for rule in (three, quarter)]
+    assert [run.at_rest for run in found] == [True, True]
+    amplitudes = [0.02 * (1.0 - 1e-3) ** len(run.records) for run in found]
+    fastest = [amplitude * 2.0 * pi / PERIOD for amplitude in amplitudes]
+    assert fastest[0] > 4.0 * BOUND
+    assert fastest[1] < BOUND / sin(0.25 * pi)
+
+
+def test_a_body_that_stops_is_at_rest_after_three_steps_and_only_confirmed_by_more():
+    records = records_of([1.0] * 7 + [0.0] * 40)
+    three = steps_to_rest(records, StopRule(99, 1e-6, 1.0))
+    longer = steps_to_rest(records, StopRule(99, 1e-6, 1.0, lasting=15.0))
+    assert (len(three.records), len(longer.records)) == (7 + CALM_STEPS, 7 + 15)
+    assert three.time_at_rest == longer.time_at_rest == 10.0
+
+
+def test_no_time_at_rest_without_rest():
+    assert np.isnan(Run(records_of([1.0, 0.0])).time_at_rest)
+
+
+def test_the_slowest_swing_of_half_a_ball_is_that_of_the_ball():
+    half = cap_frequency(0.5 * pi, 1e-9, 8930.0, 0.5)
+    ball = rayleigh_frequency(2, (1.5e-9 / pi) ** (1.0 / 3.0), 8930.0, 0.5)
+    assert half == pytest.approx(ball, rel=1e-12)
+    ball = rayleigh_frequency(2, (0.75e-9 / pi) ** (1.0 / 3.0), 8930.0, 0.5)
+    assert cap_frequency(pi, 1e-9, 8930.0, 0.5) == pytest.approx(ball, rel=1e-12)
+
+
+def test_the_slowest_swing_of_a_cap():
+    """That of real solder, 1 mm^3 and 60 degrees, was found to have 108.7 Hz; a film has 12 gamma h / (rho a^4) 2."""
+    assert cap_frequency(pi / 3.0, 1e-9, 8930.0, 0.4985) / (2.0 * pi) == pytest.approx(108.7, rel=0.02)
+    angle, radius = 0.01, 1e-3
+    film = cap_frequency(angle, pi * radius**3 * angle / 4.0, 8930.0, 0.5)
+    assert film**2 == pytest.approx(12.0 * angle * 0.5 / (8930.0 * radius**3), rel=1e-3)
+
+
+def relaxed_ball(solder, shells):
+    """Particles of a ball at rest."""
+    still = solder.model_copy(update={"numerics": SolderNumerics(time_step_limit=100.0)})
+    effects = {effect.name: effect.name == "surface_tension" for effect in LIQUID_EFFECTS}
+    flow = start_flow(sphere_cloud(solder.volume, shells), still, effects, ())
+    run_to_rest(flow, stop_rule(flow.body.cloud, still, effects))
+    return replace(flow.body.cloud, points=flow.body.points, triangles=flow.body.triangles)
+
+
+def test_a_drop_of_real_solder_that_swings_is_not_found_at_rest_where_it_turns():
+    """A ball of 147 particles that moves two and a half times as fast as one at rest, and is calm for some steps."""
+    solder = Solder(volume=1e-9, numerics=SolderNumerics(scheme="ispg", time_step_limit=100.0, max_steps=16))
+    effects = {effect.name: effect.name in ("inertia", "viscosity", "surface_tension") for effect in LIQUID_EFFECTS}
+    cloud = relaxed_ball(solder, 3)
+    rule = stop_rule(cloud, solder, effects, pi)
+
+    def pushed():
+        flow = start_flow(cloud, solder, effects, ())
+        speed = 2.5 * BOUND * cloud.spacing / rule.calm_time
+        flow.body.velocity = speed / 0.62e-3 * cloud.points * np.array([1.0, -1.0, 0.0])
+        return flow
+
+    assert run_to_rest(pushed(), replace(rule, lasting=0.0)).at_rest
+    with pytest.raises(NoRest, match=r"at rest it would be 0.0001 for 0.00115 s"):
+        run_to_rest(pushed(), rule)
