@@ -12,21 +12,26 @@ def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension
 def cap_frequency(angle: float, volume: float, density: float, surface_tension: float) -> float:
     """Angular frequency of the slowest swing of a cap whose foot slides freely, a little too high [rad/s].
 
-    Rayleigh's quotient of the flow (x, -y, 0), in which the foot becomes an ellipse and keeps its area: the second
-    derivative of the free surface's area, pi R^2 (4 S3 - S5), over that of the kinetic energy, pi R^5 S5 / 2, with Sn
-    the integral of sin^n up to the contact angle: omega^2 = (8 S3 / S5 - 2) gamma / (rho R^3). Exact for half a ball
-    and a whole one, whose second mode it is; a cap of 60 degrees was measured to be 1.3 % slower.
+    The lower of Rayleigh's quotients of two flows: (x, -y, 0), in which the foot becomes an ellipse, and (x, y, -2 z),
+    in which the cap rises and sinks: the second derivative of the surface energy over that of the kinetic energy. With
+    Sn the integral of sin^n up to the contact angle they are (8 S3 / S5 - 2) and, with c the cosine and the integral I
+    of (z - c)^2 (1 - z^2) from c to 1, 4 (4 (1 - c) + 6 S3 - 9 S5 - 2 c (1 - c^2)) / (S5 + 8 I), in gamma / (rho R^3).
+    Both are exact for half a ball. Measured swings are 1.3 % slower at 60 degrees, 10 % at 120 and 26 % at 148.
 
     Args:
-        angle: contact angle [rad], in (0, pi]; pi for a free drop.
+        angle: contact angle [rad], in (0, pi).
         volume: of the cap [m^3].
         density: of the liquid [kg/m^3].
         surface_tension: of it [N/m].
     """
     c = cos(angle)
-    cubes = (1.0 - c) ** 2 * (2.0 + c) / 3.0
-    fifths = (1.0 - c) ** 3 * (8.0 + 9.0 * c + 3.0 * c**2) / 15.0
-    return sqrt((8.0 * cubes / fifths - 2.0) * pi * cubes * surface_tension / (density * volume))
+    d = 1.0 - c
+    cubes = d**2 * (2.0 + c) / 3.0
+    fifths = d**3 * (8.0 + 9.0 * c + 3.0 * c**2) / 15.0
+    ellipse = 8.0 * cubes / fifths - 2.0
+    heights = (1.0 - c**2) * d**3 / 3.0 - c * d**4 / 2.0 - d**5 / 5.0
+    bounce = 4.0 * (4.0 * d + 6.0 * cubes - 9.0 * fifths - 2.0 * c * (1.0 - c**2)) / (fifths + 8.0 * heights)
+    return sqrt(min(ellipse, bounce) * pi * cubes * surface_tension / (density * volume))
 
 
 def lamb_decay_rate(mode: int, radius: float, density: float, viscosity: float) -> float:

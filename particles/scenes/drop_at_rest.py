@@ -95,7 +95,7 @@ def _rule(drop: Drop, cloud: Cloud, solder: Solder) -> StopRule:
     """When it is at rest: it swings as the cap that it becomes, unless an edge or friction holds its contact line."""
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.is_free:
-        return stop_rule(cloud, solder, acting, np.pi)
+        return stop_rule(cloud, solder, acting, None)
     if drop.pad_radius is not None or drop.hysteresis is not None:
         return stop_rule(cloud, solder, acting)
     return stop_rule(cloud, solder, acting, solder.pad_contact_angle)

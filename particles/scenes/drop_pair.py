@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf, pi
+from math import inf
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def pair_to_rest(
     acting = switched(effects)
     start = partial(_start, solder, acting)
     flows = [start(cloud) for cloud in start_clouds(scene)]
-    angle = pi if scene.is_free else solder.pad_contact_angle
+    angle = None if scene.is_free else solder.pad_contact_angle
     rule = stop_rule(flows[0].body.cloud, solder, acting, angle)
     drops = run_drops(flows, rule, lambda body: start(body.cloud), checkpoint, progress)
     meridians = [_reference(scene, solder, effects, drop) for drop in drops]

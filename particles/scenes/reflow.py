@@ -27,7 +27,6 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Acting, Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.reference.drop_oscillation import cap_frequency
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -36,7 +35,7 @@ from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.particles.steps.step_solver import StepSolver
-from reflowshock.particles.steps.time_step import TimeStep, capillary_limit, largest_step, most_steps
+from reflowshock.particles.steps.time_step import TimeStep, capillary_limit, largest_step, most_steps, swing_period
 from reflowshock.particles.surface.contact_line import ContactLine
 
 __all__ = ["JointGeometry", "JointShape", "solve_joint"]
@@ -173,22 +172,21 @@ def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
     return Relaxation(solder.density)
 
 
-def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool], angle: float = 0.5 * pi) -> StopRule:
+def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool], angle: float | None = 0.5 * pi) -> StopRule:
     """When a reflow ends: at rest, or with inertia at the end of the process at the latest.
 
     Args:
         cloud: particles.
         solder: all of it, fluid and numerics.
         effects: name to on or off.
-        angle: contact angle of the cap that swings as the body does [rad]: that of a drop on a uniform wall, pi without
-            walls. Where edges or friction hold the liquid it swings faster than half a ball that slides, or not at all.
+        angle: contact angle of the cap that swings as the body does [rad]: that of a drop on a uniform wall; None for
+            one without walls. Where edges or friction hold the liquid it swings about as fast as half a ball, or not.
     """
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     steps, tolerance = most_steps(solder, cloud.spacing), solder.numerics.tolerance
     if not effects["inertia"]:
         return StopRule(steps, tolerance, calm_time)
-    swing = 2.0 * pi / cap_frequency(angle, solder.volume, solder.density, solder.surface_tension)
-    return StopRule(steps, tolerance, calm_time, solder.process_time, 0.25 * swing)
+    return StopRule(steps, tolerance, calm_time, solder.process_time, 0.25 * swing_period(solder, angle))
 
 
 def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:

@@ -6,7 +6,7 @@ from math import ceil, pi
 import numpy as np
 
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.reference.drop_oscillation import lamb_decay_rate, rayleigh_frequency
+from reflowshock.particles.reference.drop_oscillation import cap_frequency, lamb_decay_rate, rayleigh_frequency
 
 LARGEST_DISPLACEMENT = 0.25
 GROWTH = 1.15
@@ -31,8 +31,10 @@ def capillary_limit(density: float, spacing: float, surface_tension: float) -> f
     return float(0.25 * np.sqrt(density * spacing**3 / (2.0 * np.pi * surface_tension)))
 
 
-def swing_period(solder: Solder) -> float:
-    """Period of the slowest mode of a free drop of all the solder [s]."""
+def swing_period(solder: Solder, angle: float | None = None) -> float:
+    """Period of the slowest mode of a drop of all the solder, free or with a contact angle [rad] on a wall [s]."""
+    if angle is not None:
+        return 2.0 * pi / cap_frequency(angle, solder.volume, solder.density, solder.surface_tension)
     return 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
 
 
