@@ -156,7 +156,7 @@ TABLES: dict[str, list[Row]] = {
     "weight": [heavy(7, 60, 5), heavy(7, 120, 1), heavy(5, 60, 5), heavy(11, 60, 1)],
     "friction": [
         drop(count, angle, *WALLS[wall], name=wall)
-        for count in (7, 6, 11)
+        for count in (7, 6, 11, 12)
         for angle in (60, 120)
         for wall in ("slip", "no slip")
     ],

@@ -149,8 +149,12 @@ OVERFLOWS = tables(
 
 @st.composite
 def struck_walls(draw: st.DrawFn) -> dict[str, Any]:
-    """A drop or two side by side that strike a wall, Weber number 1 to 100, Reynolds number 5 to 500; noisy or not."""
+    """A drop or two side by side that strike a wall, Weber number 1 to 100, Reynolds number 5 to 500; noisy or not.
+
+    The wall holds contact lines at rest or not.
+    """
     diameter, density, tension, weber = 50e-6, 1000.0, 0.07, draw(powers(0.0, 2.0))
+    angle, held = draw(numbers(30.0, 150.0)), draw(st.sampled_from([0.0, 0.0, 30.0]))
     time = diameter / (weber * tension / (density * diameter)) ** 0.5
     return {
         "droplet": {
@@ -159,7 +163,9 @@ def struck_walls(draw: st.DrawFn) -> dict[str, Any]:
             "surface_tension": "0.07 N/m",
             "weber": weber,
             "reynolds": draw(powers(0.7, 2.7)),
-            "contact_angle": draw(quantities(30.0, 150.0, "deg")),
+            "contact_angle": f"{angle} deg",
+            "advancing_angle": f"{min(angle + held, 150.0)} deg",
+            "receding_angle": f"{max(angle - held, 30.0)} deg",
             "duration": f"{1e6 * time * draw(numbers(0.5, 2.5)):.4g} us",
             "numerics": {"particles_per_diameter": draw(st.integers(8, 10))},
         },

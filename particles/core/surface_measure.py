@@ -227,13 +227,48 @@ def area_stiffness(points: Floats, triangles: Indices, count: int) -> sparse.bsr
     stiffness is 0.99 times the second derivative (1.25 with all directions alone, 0.38 with none), 1.14 for n = 3; for
     waves of the grid it is 1.
     """
-    i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
-    own = np.arange(count)
-    rows, columns = np.concatenate((i, j, own)), np.concatenate((j, i, own))
-    links = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    links.sort_indices()
-    blocks = _resisting_blocks(points, triangles, 0.5 * cotangents(points, triangles), links.indptr, links.indices)
-    return sparse.bsr_matrix((blocks, links.indices, links.indptr), shape=(3 * count, 3 * count))
+    starts, columns = _links(triangles, count)
+    blocks = _resisting_blocks(points, triangles, 0.5 * cotangents(points, triangles), starts, columns)
+    return sparse.bsr_matrix((blocks, columns, starts), shape=(3 * count, 3 * count))
+
+
+@njit(cache=True)
+def _links(triangles, count):
+    """Points that share a triangle with each of `count` ones, itself too, ascending: starts `(count + 1,)`, columns."""
+    room = np.ones(count + 1, np.int64)
+    room[0] = 0
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            room[triangles[t, k] + 1] += 2
+    room = np.cumsum(room)
+    found, ends = np.empty(room[count], np.int32), room[:-1] + 1
+    for i in range(count):
+        found[room[i]] = i
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            own = triangles[t, k]
+            for other in (triangles[t, k - 1], triangles[t, k - 2]):
+                ends[own] = _inserted(found, room[own], ends[own], other)
+    starts = np.zeros(count + 1, np.int32)
+    starts[1:] = np.cumsum(ends - room[:-1])
+    columns = np.empty(starts[count], np.int32)
+    for i in range(count):
+        columns[starts[i] : starts[i + 1]] = found[room[i] : ends[i]]
+    return starts, columns
+
+
+@njit(cache=True)
+def _inserted(values, first, end, value):
+    """Put a value into ascending ones from a first place to an end, if it is not there; return their end."""
+    at = end
+    while at > first and values[at - 1] > value:
+        at -= 1
+    if at > first and values[at - 1] == value:
+        return end
+    for m in range(end, at, -1):
+        values[m] = values[m - 1]
+    values[at] = value
+    return end + 1
 
 
 @njit(cache=True)
@@ -243,7 +278,7 @@ def _resisting_blocks(points, triangles, weights, starts, columns):
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
         size = np.sqrt(x * x + y * y + z * z)
-        normal = x / size, y / size, z / size
+        normal = (x / size, y / size, z / size)
         for c in range(3):
             for d in range(3):
                 own[c, d] = (1.0 - ALL_WAYS) * normal[c] * normal[d]

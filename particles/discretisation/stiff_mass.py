@@ -111,15 +111,20 @@ class StiffMass:
         pull = np.zeros_like(rigid)
         pull[:, :size] = (stiffness @ rigid[:, :size].T).T
         across = np.concatenate((masses * rigid, pull)).T
-        bare = cls(inertia, factors, across[:, :0], across[:, :0], np.zeros((0, 0)))
-        pulled, unit = bare.solve(pull.T), np.eye(count)
+        without = cls(inertia, factors, across[:, :0], across[:, :0], np.zeros((0, 0)))
+        pulled, unit = without.bare(pull.T), np.eye(count)
         moved = np.concatenate((time_step * (rigid - time_step * pulled.T), pulled.T)).T
         inner = np.block([[np.zeros((count, count)), -unit], [-unit, -pull @ rigid.T]]) / time_step
         return cls(inertia, factors, across, moved, np.linalg.inv(inner + across.T @ moved))
 
     def solve(self, load: Floats) -> Floats:
         """Velocities `(d,)` or `(d, l)` that loads reach in a time step."""
+        first = self.bare(load)
+        return first - self.moved @ (self.core @ (self.across.T @ first))
+
+    def bare(self, load: Floats) -> Floats:
+        """The same if tension resisted rigid motions, too."""
         size = len(self.factors.order)
         first = (load.T / self.inertia).T
         first[:size] = self.factors.solve(load[:size])
-        return first - self.moved @ (self.core @ (self.across.T @ first))
+        return first

@@ -212,6 +212,7 @@ def _open_pairs(points, offsets, indices, gap, empty):
     pairs, apart, count = np.empty((indices.shape[0] // 2 + 1, 2), np.int32), np.empty(indices.shape[0] // 2 + 1), 0
     least, limit = max(gap, 2.0 * empty) ** 2, empty**2
     for i in range(points.shape[0]):
+        last = i  # what was in the middle of the pair before is likely to be in that of this one, too
         for a in range(offsets[i], offsets[i + 1]):
             j = indices[a]
             if j < i:
@@ -220,12 +221,14 @@ def _open_pairs(points, offsets, indices, gap, empty):
             if square <= least:
                 continue
             x, y, z = points[i, 0] + points[j, 0], points[i, 1] + points[j, 1], points[i, 2] + points[j, 2]
-            nearest = limit
+            if _square(points, last, 0.5 * x, 0.5 * y, 0.5 * z) < limit:
+                continue
+            is_open = True
             for b in range(offsets[i], offsets[i + 1]):
-                nearest = min(nearest, _square(points, indices[b], 0.5 * x, 0.5 * y, 0.5 * z))
-                if nearest < limit:
+                if _square(points, indices[b], 0.5 * x, 0.5 * y, 0.5 * z) < limit:
+                    is_open, last = False, indices[b]
                     break
-            if nearest == limit:
+            if is_open:
                 pairs[count, 0], pairs[count, 1] = i, j
                 apart[count] = np.sqrt(square)
                 count += 1

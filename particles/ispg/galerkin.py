@@ -21,11 +21,11 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.collocation import Ghosts, mirror
 from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.nodal_volumes import cell_share, nodal_volumes, with_moments
+from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, nodal_volumes, with_moments
 from reflowshock.particles.ispg.rigid_motions import Riders
 
 # Reach of the search for neighbours in spacings, and that of particles with too few of them.
-REACH, WIDEST = 2.6, 4.4
+REACH, WIDEST = 2.4, 4.4
 # The least that a particle counts of its volume V in V + N^T V: at the rim of a film that is thinner than a spacing
 # N^T V may be below -V, where the shape functions continue what is inside, and its mass would be negative.
 LEAST_CARRIED = 0.5
@@ -40,7 +40,6 @@ class Galerkin:
         volumes: `(n,)` of the particles as points of integration [m^3].
         carried: `(n,)` volumes whose mass the particles carry [m^3].
         starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
-        shape: psi alone, `(n, n + g)`.
         ghosts: g images of the particles at the walls.
         order: `(n,)` particles one after the other along the longest side of the body.
         drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
@@ -52,7 +51,6 @@ class Galerkin:
     starts: NDArray[np.int64]
     columns: NDArray[np.int32]
     weights: Floats
-    shape: sparse.csr_matrix
     ghosts: Ghosts
     order: NDArray[np.int64]
     drift: Floats
@@ -72,25 +70,25 @@ class Galerkin:
         ghosts = mirror(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
         points = np.concatenate((body.points, ghosts.points))
         lists = find_neighbours(points, REACH * spacing, rows=count)
-        squares, lengths = kernels.supports(count, points, (*lists, REACH * spacing), spacing)
+        squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
         lacking = np.flatnonzero(squares == 0.0)
         if len(lacking):
             lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
-            squares, lengths = kernels.supports(count, points, (*lists, WIDEST * spacing), spacing)
+            wider = kernels.supports(lacking, points, (*lists, WIDEST * spacing), spacing)
+            squares[lacking], lengths[lacking] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)
         shares = np.concatenate((shares, shares[ghosts.source]))
         columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
         check_stencils(body, density > 0.0, "has all its neighbours in a plane")
-        shape = sparse.csr_matrix((weights[:, 0].copy(), columns, starts), shape=(count, len(points)))
-        volumes = nodal_volumes(body, density)
-        spread = shape.T @ volumes
-        of_shapes = spread[:count] + np.bincount(ghosts.source, spread[count:], minlength=count)
-        carried = with_moments(body, np.maximum(volumes + of_shapes, LEAST_CARRIED * volumes))
+        moments = body_moments(body)
+        volumes = nodal_volumes(body, density, moments)
+        of_shapes = kernels.spread(starts, columns, weights, volumes, ghosts.source)
+        carried = with_moments(body, np.maximum(volumes + of_shapes, LEAST_CARRIED * volumes), moments)
         drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
         order = np.argsort(body.points[:, np.argmax(np.ptp(body.points, axis=0))], kind="stable")
-        return cls(volumes, carried, starts, columns, weights, shape, ghosts, order, drift)
+        return cls(volumes, carried, starts, columns, weights, ghosts, order, drift)
 
     @property
     def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:
@@ -102,13 +100,20 @@ class Galerkin:
         """Sources and reflections of the images, for kernels."""
         return self.ghosts.source, self.ghosts.reflection
 
+    @property
+    def shape(self) -> sparse.csr_matrix:
+        """Psi alone, `(n, n + g)`."""
+        size = len(self.starts) - 1, len(self.volumes) + len(self.ghosts.source)
+        return sparse.csr_matrix((self.weights[:, 0].copy(), self.columns, self.starts), shape=size)
+
     def averages(self, coefficients: Floats) -> Floats:
         """Values at the particles `(n,)` of a scalar that is even at the walls."""
-        return self.shape @ coefficients[np.concatenate((np.arange(len(self.volumes)), self.ghosts.source))]
+        even = np.concatenate((coefficients, coefficients[self.ghosts.source]))
+        return kernels.values(*self.rows, even[:, None])[:, 0]
 
     def rough(self, field: Floats) -> Floats:
         """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
-        return field - self.shape @ self.with_images(field)
+        return field - kernels.values(*self.rows, self.with_images(field))
 
     def gradient(self, field: Floats) -> Floats:
         """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
@@ -124,6 +129,20 @@ class Galerkin:
         """
         images = self.with_images(field)
         return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))
+
+    def lost_power(self, fields: tuple[Floats, Floats], factors: Floats, walls: Floats) -> tuple[float, float, float]:
+        """Power [W] of the forces that resist the first of two velocities `(n, 3)` [m/s] in the second one.
+
+        Args:
+            fields: the velocities.
+            factors: of `resistance`, `(n, 3)`.
+            walls: velocities of walls `(n, 3)` [m/s], against which N v slides.
+
+        Returns:
+            By roughness, by walls and by viscosity.
+        """
+        first, second = (self.with_images(field) for field in fields)
+        return kernels.lost_power(self.rows, (first, second), factors, walls)
 
     def divergence(self, field: Floats) -> Floats:
         """Divergence of a velocity at the particles `(n,)` [1/s]."""

@@ -43,6 +43,7 @@ from reflowshock.particles.discretisation.lagged_cholesky import (
     Tolerance,
     conjugate_gradients,
 )
+from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg import step_kernels as kernels
 from reflowshock.particles.ispg.galerkin import Galerkin
@@ -216,13 +217,29 @@ class GalerkinEquations:
         volumes = self.space.volumes
         missing = rate * volumes / volumes.sum() - self.constraint(start)
         enough = NEGLIGIBLE * float(volumes.mean()) / self.time_step * np.sqrt(len(missing))
-        images = self._image_rates()
-        return factors.solve(
-            lambda pressure: self._admitted_rates(drive(self.push(pressure), images @ pressure), images),
-            self.pressure_matrix,
-            missing,
-            Tolerance(VOLUME_TOLERANCE, enough),
-        )
+        return factors.solve(*self.pressure_equation(drive), missing, Tolerance(VOLUME_TOLERANCE, enough))
+
+    def pressure_equation(self, drive: Drive) -> tuple[Apply, Callable[[], Band]]:
+        """Rates of volume under pressures, A, and what makes a band of it to factor.
+
+        The band is without what nodal integration misses, and has K by its diagonal only. Plates that float add a rank
+        each to A.
+        """
+        space, images, riders = self.space, self._image_rates(), self.space.riders
+        rates = PairRates(*kernels.admitted_rates(space.rows, space.images, space.volumes, self.admitted))
+        missed = space.volumes / space.volumes.sum(), kernels.projected(self.admitted, self.unbalanced)
+        still = np.zeros_like(self.walls)
+        moved = [drive(still, unit) for unit in np.eye(len(images))]
+        columns = np.array([self._admitted_rates(field, images) for field in moved]).reshape(-1, len(still)).T
+        core = np.zeros((0, 0)) if riders is None else np.linalg.inv([riders.rates(field) for field in moved])
+        operator = SchurComplement.of(rates, missed, self.inertia, (columns, core))
+        return operator, lambda: rates.band(self._stiffness_of_particles(), space.order)
+
+    def _stiffness_of_particles(self) -> Floats:
+        """The diagonal of m / dt + dt K, `(n, 3)` [kg/s]."""
+        stiff = np.repeat(self.masses / self.time_step, 3)
+        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
+        return stiff.reshape(-1, 3)
 
     def _admitted_rates(self, field: Floats, images: Floats) -> Floats:
         """Rates of volume `(n,)` of a velocity that walls admit, with those of images `(k, n)` of plates that float."""
@@ -272,14 +289,6 @@ class GalerkinEquations:
         found = np.tensordot(riders.rates(velocity), riders.twists, 1)
         return {wall: found[wall] for wall in floating}
 
-    def pressure_matrix(self) -> Band:
-        """Rates of volume under pressures, A, but for what nodal integration misses, and with K by its diagonal."""
-        space, stiff = self.space, np.repeat(self.masses / self.time_step, 3)
-        stiff[: self.stiffness.shape[0]] += self.time_step * self.stiffness.diagonal()
-        roots = stiff.reshape(-1, 3, 1) ** -0.5 * self.admitted
-        rows, scale = kernels.pressure_matrix(space.rows, space.images, space.volumes, roots, space.order)
-        return Band(rows, scale, space.order)
-
     @property
     def given(self) -> Floats:
         """Velocities `(n, 3)` that walls prescribe [m/s]."""
@@ -322,12 +331,8 @@ class GalerkinEquations:
 
     def losses(self, start: Floats, field: Floats) -> LostPower:
         """What a velocity loses to the friction on v1, the start."""
-        space = self.space
-        before, after = space.rough(start), space.rough(field)
-        inside = float((self._stress(space.gradient(start)) * space.gradient(field)).sum())
-        sliding = (start - before - self.walls) * (field - after - self.walls)
-        on_walls = float((self.drag[:, None] * sliding).sum())
-        return LostPower(viscous=inside + on_walls, smoothing=float((self._friction(before) * after).sum()))
+        smoothing, on_walls, inside = self.space.lost_power((start, field), self.factors, self.walls)
+        return LostPower(viscous=inside + on_walls, smoothing=smoothing)
 
     def reaction(
         self, velocities: tuple[Floats, Floats, Floats], force: Floats, pressure: Floats
@@ -366,15 +371,6 @@ class GalerkinEquations:
         """
         done, way = self.power(body, ways, forces), float(np.linalg.norm([way[:3] for way in ways.values()]))
         return done, done / way if way > ARRIVED * body.cloud.spacing else float("nan")
-
-    def _stress(self, gradient: Floats) -> Floats:
-        """Viscous stress times volume `(n, 3, 3)` [N m]."""
-        factor = self.fluid.viscosity * self.space.volumes
-        return factor[:, None, None] * (gradient + gradient.transpose(0, 2, 1))
-
-    def _friction(self, rough: Floats) -> Floats:
-        """Resistance to velocities `(n, 3)` that the shape functions do not show [N]."""
-        return (self.fluid.smoothing * self.masses)[:, None] * rough
 
 
 def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:

@@ -12,26 +12,31 @@ from reflowshock.particles.ispg.mls import factor_spd, substitute
 
 # Support radius in spacings; but the 16th neighbour lies within 1 / 1.2 of it: four must not lie in a plane.
 SUPPORT, FEWEST, WIDER = 2.0, 16, 1.2
+ROWS = 64  # that share their room for stencils
 
 
 @njit(cache=True, parallel=True)
-def supports(count, points, lists, spacing):
-    """Square of the support radius of each of the first `count` points, and the number of points within it.
+def supports(rows, points, lists, spacing):
+    """Square of the support radius of some particles `(m,)`, and the number of points within it.
 
     The radius is zero where the lists, which reach `lists[2]`, do not hold enough points.
     """
     offsets, indices, reach = lists
-    squares, lengths = np.zeros(count), np.ones(count, np.int64)
-    for row in prange(count):
-        i = np.int64(row)  # as an unsigned index it would have all that is called compiled once more
-        own, support = indices[offsets[i] : offsets[i + 1]], (SUPPORT * spacing) ** 2
-        near, within = _count_within(points, i, own, support / WIDER**2), _count_within(points, i, own, support)
+    squares, lengths = np.zeros(rows.shape[0]), np.ones(rows.shape[0], np.int64)
+    for r in prange(rows.shape[0]):
+        i, support = np.int64(rows[r]), (SUPPORT * spacing) ** 2
+        own, limit = indices[offsets[i] : offsets[i + 1]], support / WIDER**2
+        near, within = 0, 0
+        for j in own:
+            square = _square(points, i, j)
+            near += square < limit
+            within += square < support
         if near < FEWEST and len(own) >= FEWEST:
             support = max(support, WIDER**2 * _square_of_the_fewest(points, i, own))
             within = _count_within(points, i, own, support)
         if max(near, len(own)) >= FEWEST and support <= reach**2:
-            squares[i] = support
-            lengths[i] += within
+            squares[r] = support
+            lengths[r] += within
     return squares, lengths
 
 
@@ -84,27 +89,26 @@ def with_rows(lists, rows, others):
     return ends, result[:at]
 
 
-@njit(cache=True)
-def _stencil(points, row, support, offsets):
-    """Offsets of a row's points in units of the support (written), and 1 - their squares `(m,)`."""
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def _stencil(points, row, support, places):
+    """Offsets of a row's points in units of the support and, after them, 1 - their squares, `places (4, m)`."""
     i, columns = row
-    rests = np.empty(columns.shape[0])
+    x, y, z, scale = points[i, 0], points[i, 1], points[i, 2], 1.0 / support
     for k in range(columns.shape[0]):
-        j, square = columns[k], 0.0
-        for d in range(3):
-            offsets[k, d] = (points[j, d] - points[i, d]) / support
-            square += offsets[k, d] * offsets[k, d]
-        rests[k] = 1.0 - square
-    return rests
+        j = columns[k]
+        places[0, k], places[1, k], places[2, k] = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+    for k in range(columns.shape[0]):
+        x, y, z = scale * places[0, k], scale * places[1, k], scale * places[2, k]
+        places[0, k], places[1, k], places[2, k], places[3, k] = x, y, z, 1.0 - (x * x + y * y + z * z)
 
 
-@njit(cache=True)
-def _moments(offsets, rests, moments):
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def _moments(places, count, moments):
     """Moment matrix of the linear basis (1, x, y, z), lower triangle: M = sum of w p p^T, w = rest^3."""
     m0 = mx = my = mz = xx = xy = xz = yy = yz = zz = 0.0
-    for k in range(rests.shape[0]):
-        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
-        weight = rests[k] * rests[k] * rests[k]
+    for k in range(count):
+        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
+        weight = rest * rest * rest
         wx, wy, wz = weight * x, weight * y, weight * z
         m0, mx, my, mz = m0 + weight, mx + wx, my + wy, mz + wz
         xx, xy, xz, yy, yz, zz = xx + wx * x, xy + wx * y, xz + wx * z, yy + wy * y, yz + wy * z, zz + wz * z
@@ -113,26 +117,36 @@ def _moments(offsets, rests, moments):
     moments[2, 2], moments[3, 2], moments[3, 3] = yy, yz, zz
 
 
-@njit(cache=True)
-def _slope_loads(offsets, rests, first, loads):
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def _slope_loads(places, count, first, loads):
     """Right-hand sides e_c - M,c b, columns of `loads (4, 3)`, by the position of the row's particle; b is `first`."""
-    loads[:] = 0.0
-    for k in range(rests.shape[0]):
-        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
-        slope = 6.0 * rests[k] * rests[k] * (first[0] + first[1] * x + first[2] * y + first[3] * z)
-        sx, sy, sz = slope * x, slope * y, slope * z
-        loads[0, 0] -= sx
-        loads[0, 1] -= sy
-        loads[0, 2] -= sz
-        loads[1, 0] -= sx * x
-        loads[2, 0] -= sx * y
-        loads[3, 0] -= sx * z
-        loads[2, 1] -= sy * y
-        loads[3, 1] -= sy * z
-        loads[3, 2] -= sz * z
-    loads[1, 1], loads[1, 2], loads[2, 2] = loads[2, 0], loads[3, 0], loads[3, 1]
-    for c in range(3):
-        loads[1 + c, c] += 1.0
+    sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0
+    b0, b1, b2, b3 = first[0, 0], first[1, 0], first[2, 0], first[3, 0]
+    for k in range(count):
+        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
+        slope = 6.0 * rest * rest * (b0 + b1 * x + b2 * y + b3 * z)
+        wx, wy, wz = slope * x, slope * y, slope * z
+        sx, sy, sz, xx, xy, xz = sx + wx, sy + wy, sz + wz, xx + wx * x, xy + wx * y, xz + wx * z
+        yy, yz, zz = yy + wy * y, yz + wy * z, zz + wz * z
+    loads[0, 0], loads[0, 1], loads[0, 2] = -sx, -sy, -sz
+    loads[1, 0], loads[1, 1], loads[1, 2] = 1.0 - xx, -xy, -xz
+    loads[2, 0], loads[2, 1], loads[2, 2] = -xy, 1.0 - yy, -yz
+    loads[3, 0], loads[3, 1], loads[3, 2] = -xz, -yz, 1.0 - zz
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def _weights(places, count, solved, result):
+    """Weights `(m, 4)` of a row by b `(4, 1)` and its slopes `(4, 3)`, in `solved`; the support is one."""
+    first, slopes = solved
+    for k in range(count):
+        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
+        square = rest * rest
+        value = first[0, 0] + first[1, 0] * x + first[2, 0] * y + first[3, 0] * z
+        steep, cube = 6.0 * value * square, square * rest
+        result[k, 0] = value * cube
+        result[k, 1] = (slopes[0, 0] + slopes[1, 0] * x + slopes[2, 0] * y + slopes[3, 0] * z) * cube + steep * x
+        result[k, 2] = (slopes[0, 1] + slopes[1, 1] * x + slopes[2, 1] * y + slopes[3, 1] * z) * cube + steep * y
+        result[k, 3] = (slopes[0, 2] + slopes[1, 2] * x + slopes[2, 2] * y + slopes[3, 2] * z) * cube + steep * z
 
 
 @njit(cache=True, parallel=True)
@@ -143,37 +157,84 @@ def shape_rows(points, lists, squares, starts, shares):
     density counts each point by its share `(n + g,)`, without a constant factor; it is zero where M is singular.
     """
     offsets, indices = lists
-    count = squares.shape[0]
+    count, longest = squares.shape[0], np.diff(starts).max()
     columns, weights = np.empty(starts[count], np.int32), np.empty((starts[count], 4))
     density = np.zeros(count)
-    for row in prange(count):
-        i = np.int64(row)
-        support, at = np.sqrt(squares[i]), starts[i]
-        columns[at] = i
-        for k in range(offsets[i], offsets[i + 1]):
-            if _square(points, i, indices[k]) < squares[i]:
-                at += 1
-                columns[at] = indices[k]
-        own, result = columns[starts[i] : starts[i + 1]], weights[starts[i] : starts[i + 1]]
-        places, moments, first, slopes = np.empty((len(own), 3)), np.empty((4, 4)), np.zeros((4, 1)), np.empty((4, 3))
-        rests = _stencil(points, (i, own), support, places)
-        _moments(places, rests, moments)
-        if not factor_spd(moments, 4):
-            continue
-        first[0, 0] = 1.0
-        substitute(moments, first, 4)
-        _slope_loads(places, rests, first[:, 0], slopes)
-        substitute(moments, slopes, 4)
-        for k in range(rests.shape[0]):
-            place, rest = places[k], rests[k]
-            square = rest * rest
-            density[i] += shares[own[k]] * square * rest / support**3
-            value = first[0, 0] + first[1, 0] * place[0] + first[2, 0] * place[1] + first[3, 0] * place[2]
-            result[k, 0] = value * square * rest
-            for c in range(3):
-                slope = slopes[0, c] + slopes[1, c] * place[0] + slopes[2, c] * place[1] + slopes[3, c] * place[2]
-                result[k, 1 + c] = (slope * rest + 6.0 * value * place[c]) * square / support
+    for part in prange((count + ROWS - 1) // ROWS):
+        places, moments, first, slopes = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 1)), np.empty((4, 3))
+        begin = ROWS * np.int64(part)  # unsigned, it would have all that is called compiled once more
+        for i in range(begin, min(count, begin + ROWS)):
+            support, at = np.sqrt(squares[i]), starts[i]
+            columns[at] = i
+            for k in range(offsets[i], offsets[i + 1]):
+                if _square(points, i, indices[k]) < squares[i]:
+                    at += 1
+                    columns[at] = indices[k]
+            own, result = columns[starts[i] : at + 1], weights[starts[i] : at + 1]
+            _stencil(points, (i, own), support, places)
+            _moments(places, len(own), moments)
+            if not factor_spd(moments, 4):
+                continue
+            first[:], first[0] = 0.0, 1.0
+            substitute(moments, first, 4)
+            _slope_loads(places, len(own), first, slopes)
+            substitute(moments, slopes, 4)
+            _weights(places, len(own), (first, slopes), result)
+            found = 0.0
+            for k in range(len(own)):
+                found += shares[own[k]] * places[3, k] ** 3
+                for c in range(1, 4):
+                    result[k, c] /= support
+            density[i] = found / support**3
     return columns, weights, density
+
+
+@njit(cache=True)
+def values(starts, columns, weights, field):
+    """Fields `(n + g, d)` as the shape functions show them at the particles, `(n, d)`."""
+    result = np.zeros((starts.shape[0] - 1, field.shape[1]))
+    for i in range(result.shape[0]):
+        for k in range(starts[i], starts[i + 1]):
+            for d in range(field.shape[1]):
+                result[i, d] += weights[k, 0] * field[columns[k], d]
+    return result
+
+
+@njit(cache=True)
+def spread(starts, columns, weights, parts, source):
+    """The transposed of `values` of a scalar that is even at the walls, from `(n,)` to `(n,)`."""
+    count = starts.shape[0] - 1
+    result = np.zeros(count)
+    for i in range(count):
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            result[source[j - count] if j >= count else j] += weights[k, 0] * parts[i]
+    return result
+
+
+@njit(cache=True, fastmath={"contract"})
+def lost_power(rows, fields, factors, walls):
+    """Power [W] of the forces of `resistance` of a first velocity in a second one, both with images `(n + g, 3)`.
+
+    By smoothing, walls, whose velocities are `(n, 3)`, and viscosity.
+    """
+    (starts, columns, weights), (first, second) = rows, fields
+    smoothing = sliding = viscous = 0.0
+    a, b = np.empty((4, 3)), np.empty((4, 3))
+    for i in range(starts.shape[0] - 1):
+        a[:], b[:] = 0.0, 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j = columns[k]
+            for c in range(4):
+                for d in range(3):
+                    a[c, d] += weights[k, c] * first[j, d]
+                    b[c, d] += weights[k, c] * second[j, d]
+        for d in range(3):
+            smoothing += factors[i, 0] * (first[i, d] - a[0, d]) * (second[i, d] - b[0, d])
+            sliding += factors[i, 1] * (a[0, d] - walls[i, d]) * (b[0, d] - walls[i, d])
+            for c in range(3):
+                viscous += factors[i, 2] * (a[1 + c, d] + a[1 + d, c]) * b[1 + c, d]
+    return smoothing, sliding, viscous
 
 
 @njit(cache=True)

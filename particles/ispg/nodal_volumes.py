@@ -9,15 +9,20 @@ leave next to nothing to the particles of its surfaces: cells at z = 0 and h hav
 thickness h, and particles without mass are thrown out of the liquid.
 """
 
+from typing import TypeAlias
+
 import numpy as np
 from numba import njit
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.core.surface_measure import ring_area, wall_corners
+from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.core.symmetry import share
 
+Moments: TypeAlias = tuple[float, Floats, Floats]
 PAIRS = np.triu_indices(3)
+# Products of two directions stand for two entries of x x.
+ENTRIES = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
 NEWTON_STEPS = 30
 TOLERANCE = 1e-12
 # Of the second moments: what a particle at the middle of its cell leaves out of it is 0.08 of volume times h^2.
@@ -28,33 +33,42 @@ class NoVolumes(RuntimeError):
     """No positive volumes of the particles have the centre of the body."""
 
 
-def body_moments(body: Body) -> tuple[float, Floats, Floats]:
+def body_moments(body: Body) -> Moments:
     """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
     if (own := body.moments()) is not None:
         return own
-    walls = zip(body.cloud.rings, body.plates, strict=True)
-    moments = _moments(body.points[body.triangles])
-    for ring, plate in walls:
-        moments += _moments(wall_corners(body.points, ring, plate))
+    moments = np.zeros(13)
+    _add_moments(body.points, body.triangles, moments)
+    for ring, plate in zip(body.cloud.rings, body.plates, strict=True):
+        corners = np.concatenate((body.points[ring].mean(axis=0)[None], body.points[ring]))
+        _add_moments(corners, _fan(len(ring), plate.side > 0.0), moments)
     return float(moments[0]), moments[1:4], moments[4:].reshape(3, 3)
 
 
 @njit(cache=True)
-def _moments(corners):
-    """Integrals of 1, x and x x over tetrahedra with the origin, `corners (t, 3, 3)`, one after the other."""
-    result = np.zeros(13)
-    for t in range(corners.shape[0]):
-        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
+def _fan(count, forward):
+    """Triangles between a first point and each two of `count` others in a ring, `(count, 3)`."""
+    result = np.empty((count, 3), np.int32)
+    for k in range(count):
+        own, after = 1 + k, 1 + (k + 1) % count
+        result[k] = (0, own, after) if forward else (0, after, own)
+    return result
+
+
+@njit(cache=True)
+def _add_moments(points, triangles, result):
+    """Add integrals of 1, x and x x over tetrahedra between triangles `(t, 3)` and the origin, one after the other."""
+    for t in range(triangles.shape[0]):
+        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
         volume = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
         volume = (volume + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0
         result[0] += volume
-        total = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
         for d in range(3):
-            result[1 + d] += volume * total[d] / 4.0
+            total = a[d] + b[d] + c[d]
+            result[1 + d] += volume * total / 4.0
             for e in range(3):
-                product = total[d] * total[e] + a[d] * a[e] + b[d] * b[e] + c[d] * c[e]
+                product = total * (a[e] + b[e] + c[e]) + a[d] * a[e] + b[d] * b[e] + c[d] * c[e]
                 result[4 + 3 * d + e] += volume * product / 20.0
-    return result
 
 
 def cell_share(body: Body) -> Floats:
@@ -73,38 +87,50 @@ def wall_shares(body: Body, volumes: Floats) -> Floats:
     return areas
 
 
-def nodal_volumes(body: Body, density: Floats) -> Floats:
+def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
     """Volumes of the particles `(n,)` [m^3].
 
     Args:
         body: the liquid body.
         density: `(n,)` of particles around each, walls mirrored, the free surface counted by `cell_share`.
+        moments: of the body.
 
     Raises:
         NoVolumes: there are none.
     """
     # Around a particle of the free surface only half of its surroundings are liquid.
     on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
-    return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud))
+    return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud), moments)
 
 
-def with_moments(body: Body, cells: Floats) -> Floats:
+def with_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
     """The volumes `(n,)` [m^3] closest to some cells `(n,)`, in any unit, that have the moments of the body.
 
     Raises:
         NoVolumes: there are none.
     """
-    volume, first, second = body_moments(body)
-    found = cells * (volume / cells.sum())
+    volume, first, second = moments
     centre, length = first / volume, np.cbrt(volume)
-    offset = (body.points - centre) / length
-    powers = np.column_stack((np.ones(len(offset)), offset, offset[:, PAIRS[0]] * offset[:, PAIRS[1]]))
     central = (second - np.outer(first, first) / volume) / length**2
     wanted = np.concatenate(([volume], np.zeros(3), central[PAIRS]))
-    # Products of two directions stand for two entries of x x.
-    entries = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
-    softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
-    return fitted_volumes(found, powers, wanted, softness)
+    softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / ENTRIES
+    return fitted_volumes(cells * (volume / cells.sum()), _powers(body.points, centre, length), wanted, softness)
+
+
+@njit(cache=True)
+def _powers(points, centre, length):
+    """Monomials `(n, 10)` up to the second degree of points, from a centre `(3,)` in units of a length."""
+    result = np.ones((points.shape[0], 10))
+    for i in range(points.shape[0]):
+        x, y, z = (
+            (points[i, 0] - centre[0]) / length,
+            (points[i, 1] - centre[1]) / length,
+            (points[i, 2] - centre[2]) / length,
+        )
+        result[i, 1], result[i, 2], result[i, 3] = x, y, z
+        result[i, 4], result[i, 5], result[i, 6] = x * x, x * y, x * z
+        result[i, 7], result[i, 8], result[i, 9] = y * y, y * z, z * z
+    return result
 
 
 def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floats) -> Floats:

@@ -1,11 +1,11 @@
-"""Loops of a step's equations: operators that touch each pair once, and the matrix of the pressure equation.
+"""Loops of a step's equations: operators that touch each pair once, and the rows of the pressure equation.
 
 Arguments that several take: rows of the shape functions (starts, columns, weights), images (source, reflection), both
 as in `galerkin_kernels`.
 """
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from reflowshock.particles.ispg.galerkin_kernels import (
     divergence,
@@ -80,17 +80,18 @@ def friction_operator(rows, images, resisted, field):
     return projected(admitted, force)
 
 
-@njit(cache=True, parallel=True)
-def _divergences(rows, images, roots):
-    """Entries of the divergence by row: particle of each, its weights times a root `(k, 3)`, over the row's length.
+@njit(cache=True)
+def admitted_rates(rows, images, volumes, admitted):
+    """Rows of rates of volume by particle, as `PairRates`, of velocities that projections `(n, 3, 3)` admit.
 
-    The lengths, too, `(n,)`.
+    Without what is unbalanced. A particle and its images make one entry.
     """
     (starts, columns, weights), (source, reflection) = rows, images
     count = starts.shape[0] - 1
-    particle, entries = np.empty(columns.shape[0], np.int32), np.empty((columns.shape[0], 3), np.float32)
-    lengths, pieces = np.zeros(count), np.empty((columns.shape[0], 3))
-    for i in prange(count):
+    place, ends = np.full(count, -1), np.zeros_like(starts)
+    particle, entries, at = np.empty_like(columns), np.empty((columns.shape[0], 3)), 0
+    for i in range(count):
+        first = at
         for k in range(starts[i], starts[i + 1]):
             j, x, y, z = columns[k], weights[k, 1], weights[k, 2], weights[k, 3]
             if j >= count:
@@ -101,61 +102,12 @@ def _divergences(rows, images, roots):
                     r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
                     r[0, 2] * x + r[1, 2] * y + r[2, 2] * z,
                 )
-            particle[k] = j
+            if place[j] < first:
+                place[j], particle[at] = at, j
+                entries[at, 0] = entries[at, 1] = entries[at, 2] = 0.0
+                at += 1
+            p = admitted[j]
             for c in range(3):
-                pieces[k, c] = roots[j, c, 0] * x + roots[j, c, 1] * y + roots[j, c, 2] * z
-                lengths[i] += pieces[k, c] * pieces[k, c]
-        lengths[i] = np.sqrt(lengths[i])
-        for k in range(starts[i], starts[i + 1]):
-            for c in range(3):
-                entries[k, c] = pieces[k, c] / lengths[i]
-    return particle, entries, lengths
-
-
-@njit(cache=True)
-def _by_particle(starts, particle, entries, order):
-    """Entries by the particle of their column, those of each in an order of the rows.
-
-    Firsts `(n + 1,)`, ranks of the rows, entries; where what follows the row of each of the given ones begins, `(k,)`;
-    how far apart the ranks of one particle are at most.
-    """
-    count = starts.shape[0] - 1
-    firsts = np.zeros(count + 1, np.int64)
-    for j in particle:
-        firsts[j + 1] += 1
-    firsts = np.cumsum(firsts)
-    fill, rank, ends = firsts.copy(), np.empty(particle.shape[0], np.int32), np.empty(particle.shape[0], np.int64)
-    result, width = np.empty_like(entries), 0
-    for r in range(count):
-        for k in range(starts[order[r]], starts[order[r] + 1]):
-            j = particle[k]
-            rank[fill[j]], ends[k] = r, fill[j]
-            for c in range(3):
-                result[fill[j], c] = entries[k, c]
-            fill[j] += 1
-    for k in range(particle.shape[0]):
-        own, last = rank[ends[k]], firsts[particle[k] + 1]
-        width = max(width, own - rank[firsts[particle[k]]])
-        while ends[k] < last and rank[ends[k]] == own:  # a particle and its images
-            ends[k] += 1
-    return firsts, rank, result, ends, width
-
-
-@njit(cache=True, parallel=True)
-def pressure_matrix(rows, images, volumes, roots, order):
-    """Band, in single precision, of the matrix A of rates of volume under pressures, particles in an order `(n,)`.
-
-    Without what is unbalanced. ``roots``: of the mobilities of the particles, `(n, 3, 3)`. Returns S A S by rows from
-    b places before the diagonal, which is about one, to it, `(n, b + 1)`; and S `(n,)`, by particle.
-    """
-    starts, count = rows[0], order.shape[0]
-    particle, entries, lengths = _divergences(rows, images, roots)
-    firsts, rank, others, ends, width = _by_particle(starts, particle, entries, order)
-    band = np.zeros((count, width + 1), np.float32)
-    for r in prange(count):
-        line, shift = band[r], width - r
-        for k in range(starts[order[r]], starts[order[r] + 1]):
-            x, y, z = entries[k, 0], entries[k, 1], entries[k, 2]
-            for a in range(firsts[particle[k]], ends[k]):
-                line[rank[a] + shift] += x * others[a, 0] + y * others[a, 1] + z * others[a, 2]
-    return band, 1.0 / (volumes * lengths)
+                entries[place[j], c] += volumes[i] * (p[c, 0] * x + p[c, 1] * y + p[c, 2] * z)
+        ends[i + 1] = at
+    return ends, particle[:at], entries[:at]

@@ -11,7 +11,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
-from reflowshock.particles.core.symmetry import fold
+from reflowshock.particles.core.symmetry import fold, on_plane
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import PlateMotion
@@ -106,8 +106,13 @@ class Physics:
 
     def projections(self, body: Body) -> Floats:
         """The matrices `(n, 3, 3)` of `admit`, one for each particle."""
-        units = (np.broadcast_to(unit, body.points.shape) for unit in np.eye(3))
-        return np.stack([self.admit(body, unit) for unit in units], axis=2)
+        result = np.tile(np.eye(3), (len(body.points), 1, 1))
+        for number, plate in enumerate(body.plates):
+            result[body.cloud.wall == number] -= np.outer(plate.normal, plate.normal)
+        for axis in body.cloud.symmetry:
+            result[on_plane(body.cloud, axis), axis] = 0.0
+        result[self.pinned(body)] = 0.0
+        return result
 
 
 class Acting(Protocol):

@@ -113,6 +113,12 @@ class SectionSpace:
         """Gradient of a velocity `(n, 3, 3)` [1/s], that of hoops in the middle."""
         return (self.slopes[0] @ field.ravel()).reshape(-1, 3, 3)
 
+    def lost_power(self, fields: tuple[Floats, Floats], factors: Floats, _walls: Floats) -> tuple[float, float, float]:
+        """Power [W] that roughness, walls, which take none, and viscosity take, as `Galerkin.lost_power`."""
+        (first, second), (before, after) = (map(act, fields) for act in (self.gradient, self.rough))
+        stress = factors[:, 2, None, None] * (first + first.transpose(0, 2, 1))
+        return float((factors[:, :1] * before * after).sum()), 0.0, float((stress * second).sum())
+
     def resistance(self, field: Floats, factors: Floats) -> Floats:
         """Forces `(n, 3)` [N] that resist a velocity, as `Galerkin.resistance`."""
         smoothing, drag, viscosity = factors.T

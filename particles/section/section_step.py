@@ -4,7 +4,7 @@ The vertices of the chain are spaced evenly at the rate at which triangles are e
 shifted as in space.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from math import ceil
 from typing import ClassVar, cast
@@ -16,7 +16,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
-from reflowshock.particles.discretisation.lagged_cholesky import Band, Tolerance, conjugate_gradients
+from reflowshock.particles.discretisation.lagged_cholesky import Apply, Band, Tolerance, conjugate_gradients
 from reflowshock.particles.discretisation.stiff_mass import StiffMass
 from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
@@ -75,8 +75,15 @@ class SectionEquations(GalerkinEquations):
         basis, across = self.basis, self.basis.T
         return lambda force, _: (basis @ self.inertia.solve(across @ force.ravel())).reshape(-1, 3)
 
-    def _admitted_rates(self, field: Floats, _images: Floats) -> Floats:
-        return self.constraint(field)
+    def pressure_equation(self, drive: Drive) -> tuple[Apply, Callable[[], Band]]:
+        """Rates of volume under pressures, A, and a matrix of it but for what nodal integration misses."""
+
+        def matrix() -> Band:
+            rates = sparse.diags(self.matrices.volumes) @ self.matrices.divergence_rows() @ self.basis
+            return Band.of(rates @ self.inertia.solve(rates.T.toarray()))
+
+        none = np.zeros(0)
+        return lambda pressure: self.constraint(drive(self.push(pressure), none)), matrix
 
     def constraint(self, field: Floats) -> Floats:
         """B v: rates of volume `(n,)` [m^3/s]."""
@@ -87,11 +94,6 @@ class SectionEquations(GalerkinEquations):
         """B^T p, [N]."""
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
-
-    def pressure_matrix(self) -> Band:
-        """Rates of volume under pressures, A, but for what nodal integration misses."""
-        rows = sparse.diags(self.matrices.volumes) @ self.matrices.divergence_rows() @ self.basis
-        return Band.of(rows @ self.inertia.solve(rows.T.toarray()))
 
 
 class SectionStep(IspgStep):

@@ -47,6 +47,29 @@ def extreme_edges(points, triangles):
     return np.sqrt(shortest), np.sqrt(longest)
 
 
+@dataclass(frozen=True, slots=True)
+class FacesOf:
+    """The triangles around each vertex, ascending, cut out where they are asked for: few of them are.
+
+    Attributes:
+        faces: around one vertex after the other.
+        ends: of those of each vertex.
+    """
+
+    faces: Indices
+    ends: Indices
+
+    @classmethod
+    def of(cls, triangles: Indices, count: int) -> "FacesOf":
+        """Find those of so many vertices."""
+        order = np.argsort(triangles.ravel(), kind="stable")
+        return cls(order // 3, np.cumsum(np.bincount(triangles.ravel(), minlength=count)))
+
+    def __getitem__(self, vertex: int) -> Indices:
+        """Those around a vertex."""
+        return self.faces[self.ends[vertex - 1] if vertex else 0 : self.ends[vertex]]
+
+
 def split_long(
     points: Floats, triangles: Indices, rings: Sequence[Indices], longest: float, on_rings: bool
 ) -> NewSurface:
@@ -99,7 +122,7 @@ def collapse_short(
     on_ring = np.zeros(len(points), bool)
     for ring in rings:
         on_ring[ring] = True
-    faces_of = _faces_of(triangles, len(points))
+    faces_of = FacesOf.of(triangles, len(points))
     first, second = (np.arange(len(points), dtype=np.int32) for _ in range(2))
     target, busy = np.arange(len(points), dtype=np.int32), np.zeros(len(points), bool)
     for edge in np.argsort(length, kind="stable"):
@@ -131,7 +154,7 @@ def collapse_short(
     return NewSurface(first[stays], second[stays], number[faces], lines)
 
 
-def _tip(triangles: Indices, faces_of: Sequence[Indices], ends: tuple[int, int]) -> int | None:
+def _tip(triangles: Indices, faces_of: FacesOf, ends: tuple[int, int]) -> int | None:
     """The vertex over an edge in which three triangles alone meet, on a base that is no triangle yet; else None."""
     shared = set(faces_of[ends[0]]) & set(faces_of[ends[1]])
     over = set(triangles[list(shared)].ravel().tolist()) - set(ends)
@@ -142,9 +165,7 @@ def _tip(triangles: Indices, faces_of: Sequence[Indices], ends: tuple[int, int])
     return None
 
 
-def _may_collapse(
-    points: Floats, triangles: Indices, faces_of: Sequence[Indices], ends: tuple[int, int], place: Floats
-) -> bool:
+def _may_collapse(points: Floats, triangles: Indices, faces_of: FacesOf, ends: tuple[int, int], place: Floats) -> bool:
     """Whether the ends of an edge, joined at a place `(3,)`, leave a surface that is neither folded nor pinched off."""
     kept, gone = ends
     rings = [set(triangles[faces_of[end]].ravel().tolist()) - {kept, gone} for end in ends]
@@ -174,13 +195,6 @@ def _edges(triangles: Indices) -> tuple[Indices, NDArray[np.int64]]:
     sides[double, 1] = owner[order[starts[double] + 1]]
     first = order[starts]
     return np.column_stack((lower[first], upper[first])).astype(np.int32), sides
-
-
-def _faces_of(triangles: Indices, count: int) -> list[Indices]:
-    """The triangles around each vertex, ascending."""
-    order = np.argsort(triangles.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(triangles.ravel(), minlength=count))
-    return np.split(order // 3, ends[:-1])
 
 
 def _insert(lines: list[list[int]], i: int, j: int, new: int) -> None:

@@ -11,7 +11,7 @@ from rich.table import Table
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.parameters.flows import CENTRAL, DamBreak, SphFlow, TaylorGreen, largest_time_step
-from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
+from reflowshock.particles.parameters.printing import Printing
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.text import duration, short
@@ -20,10 +20,12 @@ from reflowshock.workflow.process.terminal import new_table
 
 # On one core of an AMD EPYC, in a plane: of a step and of each of its particles; processor times of cases/dam_break.
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 1.3e-4, 2.9e-7
-# In space, with a surface: of a step of each particle, and of each of its triangles, cases/drop_impact.
-SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 3.0e-4, 1.2e-6
-# What a solid particle within reach of the liquid costs, over a liquid one: cases/printing, 64 drops.
-SOLID_SHARE = 0.65
+# In space, with a surface, on one core of an Intel Xeon: of a step, and of each particle with its triangles; drops of
+# ink with 280 to 28 768 particles, benchmarks/bench_sph.py.
+SECONDS_PER_STEP_IN_SPACE, SECONDS_PER_PARTICLE_IN_SPACE = 1.2e-3, 2.2e-6
+# Printing, on that core: cured ink beside a drop, over a step and over its particles; of the ground and of the part of
+# each drop that is printed, in each layer that is told of; cases/printing, 64 drops.
+SECONDS_PER_STEP_ON_INK, SOLID_SHARE, SECONDS_PER_DROP_AND_LAYER = 1.0e-3, 0.5, 1.5e-2
 # A step with a viscosity that depends on the rate of shear, over one without: an impact, 24 particles across.
 SHEAR_COST = 1.53
 # On a GPU, an NVIDIA H200, in space: of a step and of each of its particles, benchmarks/bench_sph.py; of a particle of
@@ -42,20 +44,22 @@ class Cost:
         steps: of time.
         fixed: wall time of a step whatever its particles [s].
         moving: that of its particles [s].
+        once: what is measured at the end [s].
     """
 
     steps: float
     fixed: float
     moving: float
+    once: float = 0.0
 
     @property
     def seconds(self) -> float:
         """Wall time [s]."""
-        return SECONDS_TO_START + self.steps * (self.fixed + self.moving)
+        return SECONDS_TO_START + self.steps * (self.fixed + self.moving) + self.once
 
     def finer(self, times: float, dimension: int) -> "Cost":
         """Return the cost of so many times the particles: steps shrink with the spacing."""
-        return Cost(self.steps * times ** (1.0 / dimension), self.fixed, self.moving * times)
+        return Cost(self.steps * times ** (1.0 / dimension), self.fixed, self.moving * times, self.once * times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,21 +95,26 @@ def forecast_flow(case: FlowCase) -> FlowForecast:
     each = SECONDS_PER_PARTICLE_IN_SPACE if in_space else SECONDS_PER_PARTICLE
     if effects["shear_dependent_viscosity"]["on"]:
         each *= SHEAR_COST
-    moving = _in_the_loops(scene) if isinstance(scene, Printing) else scene.particles
-    by_device = {"cpu": Cost(steps, SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP, each * moving)}
-    if not isinstance(scene, Printing):
+    if isinstance(scene, Printing):
+        by_device = {"cpu": _of_printing(scene, steps, each)}
+    else:
+        fixed = SECONDS_PER_STEP_IN_SPACE if in_space else SECONDS_PER_STEP
+        by_device = {"cpu": Cost(steps, fixed, each * scene.particles)}
         share = SECONDS_PER_GPU_PARTICLE_WITH_SURFACE if in_space else SECONDS_PER_GPU_PARTICLE
         by_device["cuda"] = Cost(steps, SECONDS_PER_GPU_STEP, share * scene.particles)
     chosen = by_device.get(scene.numerics.device, by_device["cpu"])
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {"particles": chosen.seconds}, by_device)
 
 
-def _in_the_loops(scene: Printing) -> float:
-    """Return what a step of printing costs on average, in liquid particles: a drop, and solid ones within reach."""
-    support = 2.0 * scene.numerics.smoothing_length * scene.spacing
-    reach = 0.5 * scene.base + WITHIN_REACH * scene.length + support
-    columns, rows = (min(count, 2.0 * reach / scene.pitch) for count in (scene.columns, scene.rows))
-    return scene.drop.particles * (1.0 + SOLID_SHARE * 0.5 * scene.layers * columns * rows)
+def _of_printing(scene: Printing, steps: int, each: float) -> Cost:
+    """Return the cost of printing: one drop after the other moves, and cured ink counts as far as liquid reaches it.
+
+    ``each``: of a particle in a step [s].
+    """
+    fixed = SECONDS_PER_STEP_IN_SPACE + SECONDS_PER_STEP_ON_INK
+    at_once = scene.drop.particles * max(1.0, min(scene.cure_time / scene.delay, float(scene.drops)))
+    told = SECONDS_PER_DROP_AND_LAYER * scene.drops * scene.layers
+    return Cost(steps, fixed, each * at_once * (1.0 + SOLID_SHARE), told)
 
 
 def time_step(scene: SphFlow, is_viscous: bool) -> float:

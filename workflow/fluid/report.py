@@ -28,14 +28,15 @@ HEADLINE = (
     "base_over_diameter", "height_over_diameter", "capillary_number", "volume_error",
     "connected_parts_max", "roughness_sa", "height_max", "voids", "drops",
     "impact_onset", "plateau_mean", "second_rise", "decay_rate_error", "speed_error", "profile_error_at_end",
-    "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
+    "weber", "reynolds", "volume_drift", "particles_lost", "particles", "seconds",
 )  # fmt: skip
 INK = {"m": (1e6, "µm"), "m^3": (1e15, "pL")}  # also where it is none
 UNITS = {"sqrt(H/g)": "√(H/g)", "rho g H": "ρgH"}
+OVER_DIAMETER = ("spread_max", "base_over_diameter", "height_over_diameter")
 CAPTIONS = {
     "dam_break": "Pressure at the sensor; front of the liquid; energies.",
     "poiseuille": "Speeds at the end, and the exact ones; largest speed in time.",
-    "droplet": "Shape of the drop; pressure in it; its largest speed and its energies, in time.",
+    "droplet": "Shape of the drop; the pressure in it, or the largest speed of one that strikes a wall; its energies.",
     "printing": "Height of what is printed; kinetic and surface energy of what is liquid; particles after drops.",
     "taylor_green": "The largest speed in time, and the exact one; kinetic energy.",
 }
@@ -149,13 +150,15 @@ def droplet_curves(case: DropletCase, history: Mapping[str, Floats]) -> list[Cha
         Series("kinetic", time, history["kinetic_energy"] / surface, ORANGE),
         Series("surface and wall", time, history["surface_energy"] / surface),
     ]
+    if drop.impact_speed:  # its pressure is that of sound that dies out slowly
+        motion = Axis("largest speed over that of the impact"), history["largest_speed"] / drop.impact_speed
+        total = (history["kinetic_energy"] + history["surface_energy"]) / surface
+        energies.append(Series("both", time, total, RED))
+    else:
+        motion = Axis("mean pressure over 4 gamma / D"), history["mean_pressure"] / drop.laplace_pressure
     return [
         Chart(axis, Axis("over the diameter"), shape),
-        Chart(
-            axis,
-            Axis("mean pressure over 4 gamma / D"),
-            [Series("particles", time, history["mean_pressure"] / drop.laplace_pressure)],
-        ),
+        Chart(axis, motion[0], [Series("particles", time, motion[1])]),
         Chart(axis, Axis("energy over that of the sphere's surface"), energies),
     ]
 
@@ -208,6 +211,8 @@ def _ink_text(name: str, metric: dict) -> str:
 
 
 def _text(name: str, metric: dict) -> str:
+    if name in OVER_DIAMETER:
+        return f"{number(metric['value'])} D"
     if metric["unit"] in UNITS:
         return f"{number(metric['value'])} {UNITS[metric['unit']]}"
     if metric["unit"] == "" and ("error" in name or name.endswith(("_drift", "_rise"))):

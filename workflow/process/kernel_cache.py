@@ -30,11 +30,11 @@ def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -
 
     A folder that the user has named stays, if it can be written to. Where none can be made, it is a temporary one.
     """
+    environment.setdefault(PLACES_VARIABLE, f"{__name__}.{PlaceByModule.__name__},{OTHER_PLACES}")
     named = environment.get(VARIABLE)
     if named and _is_made(Path(named)):
         return
     folder = _usual_folder(environment)
-    environment.setdefault(PLACES_VARIABLE, f"{__name__}.{PlaceByModule.__name__},{OTHER_PLACES}")
     if folder and _is_made(folder):
         environment[VARIABLE] = str(folder)
         return
@@ -54,7 +54,7 @@ class PlaceByModule:
         if VARIABLE not in os.environ or not function.__module__.startswith(PACKAGES):
             return None
         place = cls(function, file)
-        return place if _is_made(Path(place.get_cache_path())) else None
+        return place if _is_ready(place.get_cache_path()) else None
 
     def get_cache_path(self) -> str:
         """Return its folder."""
@@ -65,12 +65,17 @@ class PlaceByModule:
         Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
 
     def get_source_stamp(self) -> str:
-        """Return what says that the source is the same."""
-        return _content(self._py_file)
+        """Return what says that the source is the same, and those of all that it may call."""
+        return _sources()
 
     def get_disambiguator(self) -> str:
         """Return what tells kernels of one name in a file apart."""
         return str(inspect.unwrap(self._function).__code__.co_firstlineno)
+
+
+@cache
+def _is_ready(folder: str) -> bool:
+    return _is_made(Path(folder))
 
 
 @cache
@@ -79,8 +84,8 @@ def _compiler() -> str:
 
 
 @cache
-def _content(file: str) -> str:
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+def _sources() -> str:
+    return digest()
 
 
 def compilation(stages: Iterable[str], environment: Mapping[str, str] = os.environ) -> float:

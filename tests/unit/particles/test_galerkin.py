@@ -21,7 +21,7 @@ from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.past import centre
 from reflowshock.particles.ispg.rigid_motions import Riders, rigid_momenta, rigid_motions
-from reflowshock.particles.ispg.step_kernels import pressure_matrix, projected
+from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
@@ -195,24 +195,35 @@ def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
     assert np.abs(equations.twists(field, [1])[1]).max() > 0.0
 
 
+def test_the_pressure_equation_is_that_of_its_parts(body, between_plates):
+    """With implicit tension, walls, and a plate that floats: B of what B^T p drives."""
+    joint, _, _ = between_plates
+    lifts = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
+    for drop, physics in ((body, water()), (joint, lifts)):
+        equations = IspgStep().prepare(drop, physics, NeighbourList(1.0, 0.0)).equations(drop, 0.1)
+        pressure, drive = np.random.default_rng(11).normal(size=len(drop.points)), equations.driver()
+        whole = drive(equations.push(pressure), equations.on_images(pressure))
+        operator, _ = equations.pressure_equation(drive)
+        wanted = equations.constraint(whole)
+        assert operator(pressure) == pytest.approx(wanted, abs=1e-10 * np.abs(wanted).max())
+
+
 def test_the_pressure_matrix_is_that_of_its_operator(body, space):
     """In single precision, scaled; walls admit no velocity across them."""
-    equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
-    roots = np.sqrt(1e-3 / equations.masses)[:, None, None] * equations.admitted
-    balanced = replace(equations, unbalanced=np.zeros_like(body.points))
-    columns = [balanced.constraint(projected(roots @ roots, balanced.push(unit))) for unit in np.eye(len(roots))]
-    order = space.order
-    band, scale = pressure_matrix(space.rows, space.images, space.volumes, roots, order)
-    assert band[:, -1] == pytest.approx(1.0, abs=0.8)
-    count, width = len(order), band.shape[1]
+    equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-6)
+    balanced, count = replace(equations, unbalanced=np.zeros_like(body.points)), len(body.points)
+    operator, matrix = balanced.pressure_equation(balanced.driver())
+    band, order = matrix(), space.order
+    assert band.rows[:, -1] == pytest.approx(1.0, abs=1e-6)
+    width = band.rows.shape[1]
     assert width < count
-    matrix = np.zeros((count, width + count))
-    for rank, row in enumerate(band):
-        matrix[rank, rank + 1 : rank + 1 + width] = row
-    whole = np.tril(np.array(columns)[np.ix_(order, order)])
-    assert matrix[:, :width] == pytest.approx(0.0, abs=0.0)
-    assert matrix[:, width:] / np.outer(scale[order], scale[order]) == pytest.approx(
-        whole, abs=1e-6 * np.abs(columns).max()
+    found = np.zeros((count, width + count))
+    for rank, row in enumerate(band.rows):
+        found[rank, rank + 1 : rank + 1 + width] = row
+    whole = np.array([operator(unit) for unit in np.eye(count)])
+    assert found[:, :width] == pytest.approx(0.0, abs=0.0)
+    assert found[:, width:] / np.outer(band.scale[order], band.scale[order]) == pytest.approx(
+        np.tril(whole[np.ix_(order, order)]), abs=1e-6 * np.abs(whole).max()
     )
 
 

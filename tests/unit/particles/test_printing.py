@@ -1,5 +1,7 @@
 """Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
 
+from contextlib import nullcontext
+
 import meshio
 import numba
 import numpy as np
@@ -63,6 +65,18 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     below, above = deposit.points[deposit.drop == 0], deposit.points[deposit.drop == 1]
     gaps = np.linalg.norm(below[:, None] - above, axis=2)
     assert gaps.min() > scene.spacing
+
+
+def test_threads_are_those_that_pay_for_what_moves(monkeypatch):
+    asked = []
+
+    def remembered(particles):
+        asked.append(particles)
+        return nullcontext()
+
+    monkeypatch.setattr("reflowshock.particles.printing.printing.threads_for", remembered)
+    solve_printing(printing(columns=1, numerics=PrintingNumerics(particles_per_diameter=8, settling=0.5)))
+    assert min(asked) == 0 and max(asked) == Deposit(printing()).start[0].shape[1]  # one drop, not all
 
 
 def test_the_largest_spray_of_a_print_is_kept():

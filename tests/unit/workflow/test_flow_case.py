@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.fluid.forecast import flow_tables, forecast_flow, time_step
+from reflowshock.workflow.fluid.report import droplet_curves
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 
@@ -182,3 +184,20 @@ def test_viscosity_by_shear_costs_what_its_forecast_says():
 def test_viscosity_limits_the_step_of_fine_flows():
     scene = read_case(CHANNEL, ["poiseuille.numerics.particles_across=200"], True).scene
     assert time_step(scene, True) < time_step(scene, False)
+
+
+@pytest.mark.parametrize(
+    ("path", "settings", "widths", "motion", "energies"),
+    [
+        (IMPACT, ["droplet.speed=20 m/s", "droplet.viscosity=2 mPa*s"], 2, "largest speed", ["both"]),
+        (IMPACT, [], 0, "largest speed", ["both"]),
+        (FREE, [], 0, "mean pressure", []),
+    ],
+)
+def test_charts_of_a_droplet_show_what_is_known_of_its_kind(path, settings, widths, motion, energies):
+    case = read_case(path, settings, True)
+    names = ("time", "spread", "height", "mean_pressure", "largest_speed", "kinetic_energy", "surface_energy")
+    shape, moves, energy = droplet_curves(case, {name: np.ones(2) for name in names})
+    assert sum("correlations" in one.name for one in shape.series) == widths
+    assert moves.y.label.startswith(motion)
+    assert [one.name for one in energy.series] == ["kinetic", "surface and wall", *energies]

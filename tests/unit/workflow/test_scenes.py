@@ -285,7 +285,7 @@ def test_the_scheme_ispg_takes_walls_with_friction(wall):
     asked = ["solder.numerics.scheme=ispg", "solder.effects.inertia=on", *ISPG, *(f"solder.{key}" for key in wall)]
     assert read_case(DROP, asked).molten.wall == wall[0].split("=")[1]
     for setting in ("drop.particles_per_edge=5", "drop.particles_per_edge=13"):
-        assert "on a wall with friction (for 6 to 11 it is)" in problems_of(DROP, *asked, setting)
+        assert "on a wall with friction (for 6 to 12 it is)" in problems_of(DROP, *asked, setting)
     assert "on a pad with friction (for 7 to 9 it is)" in problems_of(BALL, *asked)
     read_case(BALL, [*asked, "drop.particles_per_edge=7"])
 

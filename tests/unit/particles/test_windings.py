@@ -1,0 +1,58 @@
+"""How often a surface winds round the nodes of a grid without bounds: as on an array, and where none would fit."""
+
+import numpy as np
+import pyvista
+
+from reflowshock.particles.core.windings import Windings
+from reflowshock.particles.surface.breakup import are_outside
+from reflowshock.particles.surface.level_set import Grid, windings_on
+from reflowshock.particles.surface.surface_quality import vertex_normals
+
+SPACING = 0.12
+
+
+def ball():
+    """A flat ball of radius 1."""
+    found = pyvista.Icosphere(radius=1.0, nsub=3)
+    points = np.array(found.points, dtype=float) * [1.0, 1.0, 0.7]
+    return points, found.faces.reshape(-1, 4)[:, 1:].astype(np.int32)
+
+
+def several(*parts):
+    """One surface of several: points and triangles."""
+    first = np.cumsum([0, *(len(points) for points, _ in parts)])
+    return np.concatenate([points for points, _ in parts]), np.concatenate(
+        [triangles + start for (_, triangles), start in zip(parts, first, strict=False)]
+    )
+
+
+def test_crossings_alone_tell_what_a_grid_tells():
+    points, triangles = ball()
+    crossed = several((points, triangles), (points + [0.7, 0.0, 0.0], triangles))
+    turned = several((points, triangles), (0.3 * points + [3.0, 0.0, 0.0], triangles[:, ::-1]))
+    upper = triangles[points[triangles, 2].min(axis=1) > 0.0]  # the wall below closes it
+    for surface, bounds in ((ball(), (0, 1)), (crossed, (0, 2)), (turned, (-1, 1)), ((points, upper), (0, 1))):
+        found = Windings.of(*surface, SPACING)
+        counts = tuple(int(one) for one in np.ceil((surface[0].max(axis=0) - found.origin) / SPACING) + 3.0)
+        grid = Grid(found.origin, SPACING, counts)
+        nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
+        assert np.array_equal(found.about(nodes), windings_on(grid, *surface).ravel())
+        assert found.bounds == bounds
+    far = 9.0 * np.concatenate((np.eye(3), -np.eye(3), [[0.0, 1.0, -1.0]]))
+    assert not Windings.of(points, triangles, SPACING).about(far).any()
+
+
+def test_parts_that_are_far_apart_cost_no_more():
+    points, triangles = ball()
+    apart = several((points, triangles), (points + [1e5, -1e5, 1e5], triangles))
+    found = Windings.of(*apart, SPACING)
+    assert found.bounds == (0, 1) and len(found.keys) < 2 * 4 * 3.2 / SPACING**2
+    assert found.about(np.array([[0.0, 0.0, 0.0], [1e5, -1e5, 1e5], [5e4, -5e4, 5e4]])).tolist() == [1, 1, 0]
+
+
+def test_what_is_outside_is_so_however_far():
+    points, triangles = ball()
+    places = np.random.default_rng(0).uniform(-1.6, 1.6, (2000, 3))
+    beyond = np.linalg.norm(places, axis=1) > 1.3
+    found = are_outside(places, (points, triangles), vertex_normals(points, triangles, len(points)), SPACING)
+    assert found[beyond].all() and not found[np.linalg.norm(places, axis=1) < 0.7].any()
