@@ -183,7 +183,7 @@ def _fitted(powers, volumes, wanted, softness):
     return found, missing
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def _take_sums(powers, volumes, sums, matrix):
     """Write the sums of powers times volumes `(k,)`, and of their products `(k, k)`."""
     sums[:] = 0.0

@@ -11,6 +11,7 @@ from math import sqrt
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.neighbours import have_moved, list_beside
@@ -174,7 +175,7 @@ class ThreadParticles:
             _find_viscosities(fluids, lists, fields, law, fields.viscosity)
         _find_rates(fluids, lists, fields, law, self.rates)
 
-    def _walls(self) -> Indices:
+    def _walls(self) -> NDArray[np.int64]:
         """Particles of walls to cover: all in new lists, and then those alone that have liquid in their rows."""
         if self._near_in is self.rows.lists:
             return self._near
