@@ -4,3 +4,7 @@ The default reflow solver relaxes the energy of the tracked surface at constant 
 particles inside follow a potential flow. The ISPG scheme of the paper (`ispg/gripc_step.py`) can be selected for
 comparison. Start with `scenes/reflow.py`.
 """
+
+from reflowshock.kernel_place import ask_first
+
+ask_first()

@@ -9,7 +9,6 @@ nothing in them is executed, whoever has written them.
 A broken or foreign checkpoint is reported, and the run begins anew or from the older generation.
 """
 
-import hashlib
 import shutil
 from functools import cache
 from importlib.metadata import version
@@ -36,6 +35,7 @@ from reflowshock.fem.parallel.checkpoint_files import (
 )
 from reflowshock.fem.parallel.portable import ENTRIES, State
 from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.sources import digest_of_sources
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
@@ -212,7 +212,5 @@ def remove_others(own: Path) -> None:
 @cache
 def _code() -> bytes:
     """Return a digest of this package's source and of the libraries: other code may continue a state differently."""
-    digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.digest()
+    libraries = " ".join(version(name) for name in LIBRARIES)
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])

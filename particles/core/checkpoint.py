@@ -14,6 +14,7 @@ from time import monotonic
 from typing import Any
 
 from reflowshock.data_file import NotData, read_data, read_header, write_data
+from reflowshock.sources import digest_of_sources
 
 logger = logging.getLogger(__name__)
 
@@ -73,7 +74,5 @@ class Checkpoint:
 @cache
 def _code() -> bytes:
     """Digest of this package's source and of the libraries: other code would read or continue a state differently."""
-    digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.digest()
+    libraries = " ".join(version(name) for name in LIBRARIES)
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])

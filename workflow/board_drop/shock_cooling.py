@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.fem.estimates.thermal_effects import ResidualStress
+from reflowshock.kernel_place import digest
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.part_forecast import PartForecast, role_of
 from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
-from reflowshock.workflow.process.kernel_cache import digest
 
 if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverCost
