@@ -166,7 +166,8 @@ def largest_of(values):
     """Return the largest magnitude, 0 where there is no value; no number where one is none."""
     largest = 0.0
     for value in values:
-        largest = largest if abs(value) <= largest else abs(value)
+        if abs(value) > largest or np.isnan(value):
+            largest = abs(value)
     return largest
 
 

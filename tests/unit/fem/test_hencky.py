@@ -8,7 +8,7 @@ from reflowshock.cases.hard.trials.bodies import force_of, nonlinear
 from reflowshock.fem.elements.element import Elements, element_kind, element_stiffness
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.kernels.hencky import PointLaw, hencky
+from reflowshock.fem.kernels.hencky import PointLaw, hencky, largest_of
 from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.materials.elasticity import elasticity_matrix
 from reflowshock.fem.materials.library import FR4, SAC405
@@ -116,3 +116,11 @@ def test_tetrahedra_are_refused():
     elements = Elements(points, cells, np.zeros(1, np.int32), matrix, np.ones(1), element_kind(4))
     with pytest.raises(MeshError, match="needs hexahedra, not tetrahedron"):
         HenckyElements.build(elements, [FR4], np.zeros((1, 3)))
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_residual_that_is_no_number_is_not_small(place):
+    values = np.array([1.0, -2.0, 0.5])
+    assert largest_of(values) == 2.0
+    values[place] = np.nan
+    assert np.isnan(largest_of(values))
