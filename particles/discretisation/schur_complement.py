@@ -1,9 +1,9 @@
 """The pressure equation's matrix, B (m / dt + dt K)^-1 B^T: rows of B by particle, the rest low in rank.
 
 B = G + v u^T: rates of volume G that are sparse, and what they miss of the rate of the whole, u, shared out by v. With
-the factors of m / dt + dt K but for rigid motions, S, and X, c, Y of Woodbury's formula, S^-1 - X c Y^T,
+the factors of m / dt + dt K but for rigid motions, S, and Woodbury's formula for these, S^-1 - X c X^T with X = S^-1 Y,
 
-    B (S^-1 - X c Y^T) B^T = G S^-1 G^T + v z^T + z v^T + (u . S^-1 u) v v^T - (B X) c (B X)^T,     z = G S^-1 u.
+    B (S^-1 - X c X^T) B^T = G S^-1 G^T + v z^T + z v^T + (u . S^-1 u) v v^T - (B X) c (B X)^T,     z = G S^-1 u.
 
 So an application passes over G twice and solves once, whatever else there is.
 """
