@@ -11,7 +11,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import slide
-from reflowshock.particles.core.symmetry import fold, on_plane
+from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import PlateMotion
@@ -105,14 +105,9 @@ class Physics:
         return np.where(self.pinned(body)[:, None], 0.0, along)
 
     def projections(self, body: Body) -> Floats:
-        """The matrices `(n, 3, 3)` of `admit`, one for each particle."""
-        result = np.tile(np.eye(3), (len(body.points), 1, 1))
-        for number, plate in enumerate(body.plates):
-            result[body.cloud.wall == number] -= np.outer(plate.normal, plate.normal)
-        for axis in body.cloud.symmetry:
-            result[on_plane(body.cloud, axis), axis] = 0.0
-        result[self.pinned(body)] = 0.0
-        return result
+        """The matrices `(n, 3, 3)` of `admit`, one for each particle: what it leaves of the unit vectors."""
+        fields = (np.tile(axis, (len(body.points), 1)) for axis in np.eye(3))
+        return np.stack([self.admit(body, field) for field in fields], axis=-1)
 
 
 class Acting(Protocol):
