@@ -18,6 +18,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.core.symmetry import share
+from reflowshock.particles.ispg.mls import factor_spd, substitute
 
 Moments: TypeAlias = tuple[float, Floats, Floats]
 PAIRS = np.triu_indices(3)
@@ -156,28 +157,30 @@ def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floa
 def _fitted(powers, volumes, wanted, softness):
     """Volumes `(n,)` times exp(powers q) with wanted sums of powers `(n, k)`, and the largest that is missing of one.
 
-    Newton's method for q; what is missing may be softness times q.
+    Newton's method for q; what is missing may be softness times q. Infinity: particles do not tell powers apart.
     """
     (count, size), found, growth = powers.shape, volumes.copy(), np.empty(len(volumes))
-    factors, change, matrix = np.zeros(size), np.empty(size), np.empty((size, size))
+    factors, sums, change, matrix = np.zeros(size), np.empty(size), np.empty((size, 1)), np.empty((size, size))
     for step in range(NEWTON_STEPS + 1):
-        _take_sums(powers, found, change, matrix)
+        _take_sums(powers, found, sums, matrix)
         missing = 0.0
         for a in range(size):
-            change[a] = wanted[a] - change[a] - softness[a] * factors[a]
+            change[a, 0] = wanted[a] - sums[a] - softness[a] * factors[a]
             matrix[a, a] += softness[a]
-            missing = missing if abs(change[a]) <= missing else abs(change[a])
+            if abs(change[a, 0]) > missing or np.isnan(change[a, 0]):
+                missing = abs(change[a, 0])
         if missing < TOLERANCE * wanted[0] or step == NEWTON_STEPS:
             break
-        _eliminate(matrix, change)
+        if not _solve(matrix, change):
+            return found, np.inf
         largest = 1.0
         for i in range(count):
             growth[i] = 0.0
             for a in range(size):
-                growth[i] += powers[i, a] * change[a]
+                growth[i] += powers[i, a] * change[a, 0]
             largest = max(largest, abs(growth[i]))
         for a in range(size):
-            factors[a] += change[a] / largest
+            factors[a] += change[a, 0] / largest
         for i in range(count):
             found[i] *= np.exp(growth[i] / largest)
     return found, missing
@@ -197,16 +200,24 @@ def _take_sums(powers, volumes, sums, matrix):
 
 
 @njit(cache=True)
-def _eliminate(matrix, right):
-    """Solve a symmetric positive definite system in place (Gauss)."""
-    size = right.shape[0]
-    for pivot in range(size):
-        for a in range(pivot + 1, size):
-            factor = matrix[a, pivot] / matrix[pivot, pivot]
-            right[a] -= factor * right[pivot]
-            for b in range(pivot + 1, size):
-                matrix[a, b] -= factor * matrix[pivot, b]
-    for a in range(size - 1, -1, -1):
-        for b in range(a + 1, size):
-            right[a] -= matrix[a, b] * right[b]
-        right[a] /= matrix[a, a]
+def _solve(matrix, right):
+    """Solve a symmetric positive definite system in place, right-hand side `(k, 1)`; False where a pivot vanishes.
+
+    In units of the unknowns that make its diagonal 1: powers of a film's thickness are small, but not dependent.
+    """
+    size = matrix.shape[0]
+    scale = np.empty(size)
+    for a in range(size):
+        if not matrix[a, a] > 0.0:
+            return False
+        scale[a] = 1.0 / np.sqrt(matrix[a, a])
+        right[a, 0] *= scale[a]
+    for a in range(size):
+        for b in range(size):
+            matrix[a, b] *= scale[a] * scale[b]
+    if not factor_spd(matrix, size):
+        return False
+    substitute(matrix, right, size)
+    for a in range(size):
+        right[a, 0] *= scale[a]
+    return True
