@@ -186,7 +186,6 @@ def _by_walls(i, fluids, neighbours, fields, law):
     density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
-    parts = pulls_not(law) and pressure < 0.0  # what no wall pulls at, none stretches: work would come from nothing
     viscosity = own_viscosity(i, fields, law) * lightness if law.no_slip else 0.0
     rate = ax = ay = az = cx = cy = cz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
@@ -203,8 +202,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
             volume = fields.mass[j] / beside * fields.wall_share[j - fluids]
             du, dv, dw = u - hold * fields.u[j], v - hold * fields.v[j], w - side * fields.w[j]
             closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
-            squeezed = pair_terms.continuity(closing, steep, volume, density)
-            rate += positive(squeezed) if parts else squeezed
+            rate += pair_terms.continuity(closing, steep, volume, density)
             other = fields.pressure[j] + weight_below * fields.z[j] * beside
             push = pair_terms.pressure(own, other, steep, volume, lightness)
             drag = pair_terms.shear_viscosity(distance2, 1.0 / (distance2 + softening), steep, volume, 2.0 * viscosity)
