@@ -32,7 +32,10 @@ def _passes(points, a, b, x, y):
 
 @uncounted
 def _crossing(points, a, b, c, place):
-    """Whether the vertical through x, y leaves a body through a triangle (1), enters (-1) or misses it (0); where."""
+    """Whether the vertical through x, y leaves a body through a triangle (1), enters (-1) or misses it (0); where.
+
+    Never above or below the triangle, where rounding would put it: seen from above, a steep one has hardly an area.
+    """
     x, y = place
     sign = _passes(points, a, b, x, y) + _passes(points, b, c, x, y) + _passes(points, c, a, x, y)
     if sign == 0:
@@ -44,7 +47,8 @@ def _crossing(points, a, b, c, place):
     if area == 0.0:
         return sign, az + (bz + cz) / 3.0
     second, third = ((x - ax) * cy - (y - ay) * cx) / area, (bx * (y - ay) - by * (x - ax)) / area
-    return sign, az + second * bz + third * cz
+    height = second * bz + third * cz
+    return sign, az + min(max(height, min(0.0, bz, cz)), max(0.0, bz, cz))
 
 
 @uncounted
@@ -141,6 +145,8 @@ class Windings:
 
     def about(self, places: Floats) -> Indices:
         """Return those of the nodes next to places `(n, 3)` [m], `(n,)`."""
+        if not len(self.keys):
+            return np.zeros(len(places), np.int64)
         (rows, levels), (column, row, level) = self.shape, np.rint((places - self.origin) / self.spacing).astype(int).T
         beside = (column < 0) | (row < 0) | (row >= rows) | (level >= levels)
         key = (column * rows + row + 1) * levels - 1 - np.maximum(level, 0)

@@ -162,7 +162,7 @@ def shape_rows(points, lists, squares, starts, shares):
     density = np.zeros(count)
     for part in prange((count + ROWS - 1) // ROWS):
         places, moments, first, slopes = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 1)), np.empty((4, 3))
-        begin = ROWS * np.int64(part)  # unsigned, it would have all that is called compiled once more
+        begin = ROWS * np.int64(part)  # unsigned, as of prange, all that is called would be compiled twice
         for i in range(begin, min(count, begin + ROWS)):
             support, at = np.sqrt(squares[i]), starts[i]
             columns[at] = i

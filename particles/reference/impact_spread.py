@@ -10,11 +10,12 @@ from math import cos, sqrt
 
 from scipy.optimize import brentq
 
-# Weber and Reynolds number from which on all four are meant to hold.
+# Weber and Reynolds number from which on all four are meant to hold; and up to which Reynolds number, over We^(5/2):
+# beyond it Roisman's width, 0.87 Re^(1/5) - 0.40 Re^(2/5) / sqrt(We), falls as viscosity falls.
 LEAST_WEBER, LEAST_REYNOLDS = 25.0, 100.0
+MOST_REYNOLDS = (0.87 / (2.0 * 0.40)) ** 5
 # Factor of the loss in the boundary layer (Wildeman et al. 2016).
 LAYER_LOSS = 0.7
-WIDEST = 100.0
 
 
 def pasandideh_fard(weber: float, reynolds: float, angle: float) -> float:
@@ -51,7 +52,8 @@ def wildeman(weber: float, reynolds: float, angle: float) -> float:
         surface = 3.0 * (1.0 - cos(angle)) / weber * width**2
         return surface + LAYER_LOSS / sqrt(reynolds) * width**2 * sqrt(width - 1.0) - 12.0 / weber - 0.5
 
-    return float(brentq(excess, 1.0, WIDEST))
+    widest = 1.0 + ((12.0 / weber + 0.5) * sqrt(reynolds) / LAYER_LOSS) ** 0.4  # the layer alone would stop it before
+    return float(brentq(excess, 1.0, widest))
 
 
 def of_measured(weber: float, reynolds: float, angle: float) -> tuple[float, float] | None:
@@ -59,7 +61,7 @@ def of_measured(weber: float, reynolds: float, angle: float) -> tuple[float, flo
 
     Args: as `pasandideh_fard`.
     """
-    if weber < LEAST_WEBER or reynolds < LEAST_REYNOLDS:
+    if weber < LEAST_WEBER or not LEAST_REYNOLDS <= reynolds <= MOST_REYNOLDS * weber**2.5:
         return None
     found = pasandideh_fard(weber, reynolds, angle), roisman(weber, reynolds), laan(weber, reynolds)
     return min(found), max(found)

@@ -42,7 +42,7 @@ def settle(i, fields, middle, law):
 def reflect(i, fields, law):
     """Let a particle behind the mirror z = 0 change places with its image; return the sign of what is across it then.
 
-    Without a branch: where there was one, threads counted references to all fields for every particle.
+    Without a branch: with one, threads would count references to all fields for every particle.
     """
     side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
     fields.z[i] *= side

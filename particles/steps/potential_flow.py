@@ -71,7 +71,7 @@ def _moments(points, mirrors, lists, support):
     offsets, indices = lists
     result = np.empty(points.shape[0])
     for row in prange(points.shape[0]):
-        i, total = np.int64(row), 0.0  # as an unsigned index it would have what is called compiled once more
+        i, total = np.int64(row), 0.0  # unsigned, as of prange, what is called would be compiled twice
         for k in range(offsets[i], offsets[i + 1]):
             total += _edge(points, mirrors, (i, np.int64(indices[k])), support)[1]
         result[i] = total

@@ -116,7 +116,8 @@ def are_outside(places: Floats, surface: tuple[Floats, Indices], normals: Floats
     _find_nearest(points, places, find_beside(points, places, FAR * distance), nearest)
     outside = ((places - points[nearest]) * normals[nearest]).sum(axis=1) > distance
     far = nearest < 0
-    outside[far] = Windings.of(points, triangles, distance).about(places[far]) <= 0
+    if far.any():
+        outside[far] = Windings.of(points, triangles, distance).about(places[far]) <= 0
     return outside
 
 

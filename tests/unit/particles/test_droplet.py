@@ -12,7 +12,7 @@ from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import SurfaceLost, cosines_of, is_folded
+from reflowshock.particles.sph.surface_care import SurfaceLost, cosines_of, is_folded, outward_along, sliding
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
 COARSE = DropletNumerics(particles_per_diameter=8)
@@ -236,6 +236,24 @@ def test_a_wall_holds_a_contact_line_at_rest_and_one_that_moves_has_its_angle():
     assert held[:, 0] == pytest.approx([-0.3, 0.3])
     assert cosines_of((-0.5, 0.4), outward, push, 0.1 * outward)[:, 0] == pytest.approx([-0.5, 0.1])
     assert cosines_of((-0.5, 0.4), outward, push, -outward)[:, 0] == pytest.approx([0.4, 0.4])
+
+
+@pytest.mark.parametrize("across", [8, 12])
+def test_friction_takes_less_than_the_velocity_of_a_contact_line_in_a_step(across):
+    """Shares W, masses m, lengths L: dv/dt = -gamma W / m W^T L v / v_sliding; to take all is unstable."""
+    numerics = DropletNumerics(particles_per_diameter=across)
+    simulation = droplet(drop(contact_angle=0.5 * np.pi, advancing_angle=2.0, numerics=numerics))
+    simulation.step(simulation.time_step())
+    surface, (offsets, indices) = simulation.surface, simulation.surface._lists
+    (ring,) = surface.rings
+    shares = np.zeros((len(ring), len(simulation.fields.mass)))
+    for row, vertex in zip(shares, ring, strict=True):
+        pairs = slice(offsets[vertex], offsets[vertex + 1])
+        row[indices[pairs]] = surface._shares[0, pairs]
+    lengths = np.linalg.norm(outward_along(surface.points[ring]), axis=1)
+    slowness = sliding(np.ones((1, 3)), surface.tension, simulation.law)[0, 0]
+    taken = surface.tension * slowness * (shares / simulation.fields.mass) @ shares.T * lengths
+    assert 0.2 < simulation.time_step() * np.abs(np.linalg.eigvals(taken)).max() < 0.5
 
 
 def test_threads_change_no_droplet(every_thread):

@@ -21,3 +21,13 @@ def test_a_larger_angle_makes_drops_narrower_and_slow_ones_have_no_correlation()
     low, high = of_measured(30.0, 500.0, 0.5 * np.pi)
     assert (round(low, 2), round(high, 2)) == (1.94, 2.24)
     assert of_measured(8.0, 500.0, 1.0) is None and of_measured(30.0, 7.7, 1.0) is None
+
+
+def test_widths_are_some_for_whatever_drop_or_not_told():
+    assert of_measured(25.0, 1e6, np.radians(20.0)) is None
+    for weber in (25.0, 30.0, 1e3, 1e6):
+        for reynolds in (100.0, 2000.0, 1e6, 1e12):
+            for degrees in (1.0, 20.0, 90.0, 180.0):
+                assert wildeman(weber, reynolds, np.radians(degrees)) > 1.0
+                low, high = of_measured(weber, reynolds, np.radians(degrees)) or (1.2, 1.2)
+                assert 1.2 <= low <= high

@@ -16,3 +16,19 @@ def test_a_band_about_a_rough_surface_has_its_distances():
     for band in (0.05, 0.4, 10.0):
         near = within_band(points, triangles, grid, band).values
         assert np.abs(near - np.clip(everywhere, -band, band)).max() < 1e-14
+
+
+def test_a_triangle_as_thin_as_rounding_is_its_edges():
+    """Its normal is one of rounding: with it a plane that is far from the nodes, or a foot that is none."""
+    rng = np.random.default_rng(1)
+    for height in np.repeat([1e-12, 1e-15, 0.0], 30):
+        start, along = rng.uniform(0.3, 0.6, 3), rng.normal(size=3)
+        along /= np.linalg.norm(along)
+        points = start + np.outer([0.0, 1.0, rng.uniform()], along)
+        points[2, 0] += height
+        grid = Grid.around(points, 0.11)
+        near = within_band(points, np.array([[0, 1, 2]], np.int32), grid, 0.4).values
+        places = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1) - start
+        foot = np.clip(places @ along, 0.0, 1.0)[..., None] * along
+        exact = np.minimum(np.linalg.norm(places - foot, axis=-1), 0.4)
+        assert np.abs(np.abs(near) - exact).max() < 1e-8

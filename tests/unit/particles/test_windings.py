@@ -42,6 +42,33 @@ def test_crossings_alone_tell_what_a_grid_tells():
     assert not Windings.of(points, triangles, SPACING).about(far).any()
 
 
+def test_crossings_of_steep_triangles_are_within_them():
+    """Corners in a line, but for rounding, seen from above: the crossing of a node on that line is at their heights."""
+    rng, node, met = np.random.default_rng(0), 7.5 * SPACING, 0
+    for _ in range(2000):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        place = node + np.outer(rng.uniform(-0.8, 0.8, 3), [np.cos(angle), np.sin(angle)])
+        corners = np.column_stack((place, rng.uniform(5.0, 5.5, 3)))
+        found = Windings.of(np.concatenate((np.zeros((1, 3)), corners)), np.array([[1, 2, 3]]), SPACING)
+        below = found.shape[1] - 1 - found.keys % found.shape[1]
+        assert (found.origin[2] + SPACING * below <= corners[:, 2].max()).all()
+        assert (found.origin[2] + SPACING * (below + 1) >= corners[:, 2].min()).all()
+        met += len(below)
+    assert met > 20
+
+
+def test_what_has_no_crossings_winds_round_nothing():
+    points, triangles = ball()
+    found = Windings.of(1e-3 * points, triangles[:0], SPACING)
+    assert found.bounds == (0, 0) and found.about(points).tolist() == [0] * len(points)
+
+
+def test_no_windings_are_found_where_no_place_is_far(monkeypatch):
+    points, triangles = ball()
+    monkeypatch.setattr(Windings, "of", None)
+    assert are_outside(1.2 * points, (points, triangles), vertex_normals(points, triangles, len(points)), SPACING).all()
+
+
 def test_parts_that_are_far_apart_cost_no_more():
     points, triangles = ball()
     apart = several((points, triangles), (points + [1e5, -1e5, 1e5], triangles))
