@@ -29,6 +29,7 @@ from reflowshock.particles.steps.rest import RECORDS, NoRest, Run, StopRule, run
 from reflowshock.particles.steps.shape import JointShape
 
 STEP = 0.01  # of the gap
+OF_WAY = ("time_at_rest", "_loss")  # how metrics end that add up to nothing: places are reached by any way
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +116,8 @@ def _wrenches(flow: LiquidFlow) -> Floats:
 def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
     """Return the shape of a joint in its last place, with the history of its first reflow and of its last exchange.
 
+    The time to rest and what was lost on the way are no metrics of it.
+
     Args:
         place: the last one.
         solder: as carried.
@@ -123,6 +126,11 @@ def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last:
 
     Raises: as `solve_joint`.
     """
+    shape = _last_shape(place, solder, first, last)
+    return replace(shape, metrics={name: one for name, one in shape.metrics.items() if not name.endswith(OF_WAY)})
+
+
+def _last_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
     known = last.read(RECORDS)
     if known is None:
         return solve_joint(place, solder)

@@ -269,3 +269,11 @@ def test_an_exchange_that_ends_with_the_process_passes_no_forces_on(tmp_path):
     for _ in range(2):  # from the start, and from what was left
         with pytest.raises(NoRest, match=r"process ends before the joint is at rest.*solder\.process_time"):
             carry_joint(JOINT, coarse_viscous(2e-4), None, now)
+
+
+def test_a_carried_joint_has_no_time_to_rest_and_no_losses(tmp_path):
+    now, solder = Checkpoint(tmp_path / "state", ("inputs",)), coarse_viscous(1.0)
+    carry_joint(JOINT, solder, None, now)
+    metrics = carried_shape(JOINT, solder, now, now).metrics
+    assert {"energy_imbalance", "particles_lost", "steps"} < set(metrics)
+    assert not any(name == "time_at_rest" or name.endswith("_loss") for name in metrics)
