@@ -66,7 +66,7 @@ def test_what_is_left_of_a_swing_that_is_slower_than_its_rule_takes_it_for(ratio
     run = steps_to_rest(records, StopRule(99999, 1e-6, 1.0, lasting=0.25 * ratio * PERIOD))
     fastest = 0.02 * (1.0 - 1e-4) ** len(run.records) * 2.0 * pi / PERIOD
     assert run.at_rest
-    assert fastest == pytest.approx(most * BOUND, rel=0.04)  # of whole steps, 1 to 2 % of the quarter each
+    assert fastest == pytest.approx(most * BOUND, rel=0.04)  # in whole steps, of which a quarter has 15
 
 
 def test_a_body_that_stops_is_at_rest_after_three_steps_and_only_confirmed_by_more():
