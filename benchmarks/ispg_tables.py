@@ -216,7 +216,7 @@ def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]
             findings = stages.of_drops(found.shape.metrics, 1, found.effects)
         case OscillationCase():
             found = solve_oscillation(case.oscillation, case.molten)
-            findings = stages.of_oscillation(found.metrics, {}, case.oscillation.scheme)
+            findings = stages.of_oscillation(found.metrics, {})
     return findings.metrics, findings.health
 
 

@@ -92,6 +92,11 @@ class Thermal(Parameters):
             return self.corner_displacement
         return self.corner_displacement * (temperature - self.reference) / (self.peak - self.reference)
 
+    @property
+    def lowest_corner(self) -> float:
+        """Lowest displacement of the die's corner while the solder is liquid [m]."""
+        return min(map(self.corner, (self.melting, self.peak, self.solidification)))
+
 
 def in_range(value: float, info: ValidationInfo, low: str | None, high: str | None) -> float:
     """Return a temperature that lies between two others, given by name, where those are valid themselves."""

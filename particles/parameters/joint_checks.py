@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import asin, inf, sin, sqrt
+from math import asin, inf, pi, sin, sqrt
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters import checks
@@ -43,12 +43,19 @@ def unverified_joint(joint: Joint, solder: Solder) -> str | None:
     return _without_inertia(joint.geometry, solder)
 
 
-def unverified_joints(geometries: Collection[JointGeometry], solder: Solder) -> str | None:
-    """What of the joints of a package, each by itself, the scheme ispg is not verified for; None where it is."""
+def unverified_joints(geometries: Collection[JointGeometry], solder: Solder, lowest: float = 0.0) -> str | None:
+    """What of the joints of a package, each by itself, the scheme ispg is not verified for; None where it is.
+
+    Args:
+        geometries: as drawn.
+        solder: of each.
+        lowest: displacement of the package where it is lowest, upwards [m]; one without room for solder is not judged.
+    """
     found = next(filter(None, (_without_inertia(geometry, solder) for geometry in geometries)), None)
-    lowest = min(geometries, key=lambda geometry: geometry.gap)
-    if found is None and _overflows(lowest, solder):
-        return f"joints that overflow both pads, where no edge holds them (gap of {mm(lowest.gap)})"
+    drawn = min(geometries, key=lambda geometry: geometry.gap)
+    for place in (drawn, replace(drawn, gap=drawn.gap + lowest)):
+        if found is None and place.gap > 0.0 and _overflows(place, solder):
+            return f"joints that overflow both pads, where no edge holds them (gap of {mm(place.gap)})"
     return found
 
 
@@ -64,8 +71,8 @@ def _overflows(geometry: JointGeometry, solder: Solder) -> bool:
     discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
     try:
         line = joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).r
-    except NoMeridian:
-        return False
+    except NoMeridian:  # of flat joints it is not always found
+        return solder.volume > 2.0 * pi * max(geometry.radius_board, geometry.radius_package) ** 2 * geometry.gap
     ends = ((line[0], geometry.radius_board), (line[-1], geometry.radius_package))
     return all(rim > (1.0 + OVERFLOWS) * radius for rim, radius in ends)
 

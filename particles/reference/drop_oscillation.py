@@ -10,13 +10,14 @@ def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension
 
 
 def cap_frequency(angle: float, volume: float, density: float, surface_tension: float) -> float:
-    """Angular frequency of the slowest swing of a cap whose foot slides freely, a little too high [rad/s].
+    """Angular frequency of the slowest swing of a cap whose foot slides freely, or above it [rad/s].
 
     The lower of Rayleigh's quotients of two flows: (x, -y, 0), in which the foot becomes an ellipse, and (x, y, -2 z),
     in which the cap rises and sinks: the second derivative of the surface energy over that of the kinetic energy. With
     Sn the integral of sin^n up to the contact angle they are (8 S3 / S5 - 2) and, with c the cosine and the integral I
     of (z - c)^2 (1 - z^2) from c to 1, 4 (4 (1 - c) + 6 S3 - 9 S5 - 2 c (1 - c^2)) / (S5 + 8 I), in gamma / (rho R^3).
-    Both are exact for half a ball. Measured swings are 1.3 % slower at 60 degrees, 10 % at 120 and 26 % at 148.
+    Both are exact for half a ball, else above the frequency: measured swings are 1.3 % slower at 60 degrees, 10 % at
+    120 and 26 % at 148, where a quarter of the period is that much too short.
 
     Args:
         angle: contact angle [rad], in (0, pi).

@@ -25,10 +25,11 @@ from reflowshock.particles.scenes.metrics import reference_meridian
 from reflowshock.particles.scenes.moving_joint import travel
 from reflowshock.particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
 from reflowshock.particles.steps.flow import LiquidFlow
-from reflowshock.particles.steps.rest import RECORDS, Run, StopRule, run_to_rest
+from reflowshock.particles.steps.rest import RECORDS, NoRest, Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 
 STEP = 0.01  # of the gap
+OF_WAY = ("time_at_rest", "_loss")  # how metrics end that add up to nothing: places are reached by any way
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,11 @@ def carry_joint(
         now: where this run continues from, to the last bit, and leaves its state.
         progress: called with the fraction done.
 
-    Raises: as `solve_joint`, but for too little solder: an open joint does nothing to its pads.
+    Raises:
+        NoRest: no rest within `solder.numerics.max_steps`, or before the process ends.
+        SolveFailed: a linear solve failed.
+
+    An open joint, one with too little solder included, does nothing to its pads.
     """
     known = None if before is None else before.read(RECORDS)
     if known is not None:
@@ -80,7 +85,14 @@ def carry_joint(
     flow.physics = replace(flow.physics, motions=(travel(place, flow),))
     last = replace(rule, max_steps=flow.steps + rule.max_steps, end_time=flow.time + rule.end_time)
     run = run_to_rest(flow, last, progress, checkpoint=now)
-    return OPEN if run.ruptured else Carried(_wrenches(flow), len(run.records))
+    if run.ruptured:
+        return OPEN
+    if not run.at_rest:
+        raise NoRest(
+            f"the process ends before the joint is at rest, after {solder.process_time:.3g} s (solder.process_time) "
+            f"and {len(run.records)} steps; a slower process helps"
+        )
+    return Carried(_wrenches(flow), len(run.records))
 
 
 def _resumed(known: Mapping[str, Any], place: JointGeometry, solder: Solder) -> LiquidFlow:
@@ -104,6 +116,8 @@ def _wrenches(flow: LiquidFlow) -> Floats:
 def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
     """Return the shape of a joint in its last place, with the history of its first reflow and of its last exchange.
 
+    The time to rest and what was lost on the way are no metrics of it.
+
     Args:
         place: the last one.
         solder: as carried.
@@ -112,6 +126,11 @@ def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last:
 
     Raises: as `solve_joint`.
     """
+    shape = _last_shape(place, solder, first, last)
+    return replace(shape, metrics={name: one for name, one in shape.metrics.items() if not name.endswith(OF_WAY)})
+
+
+def _last_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
     known = last.read(RECORDS)
     if known is None:
         return solve_joint(place, solder)

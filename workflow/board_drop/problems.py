@@ -1,10 +1,8 @@
 """What does not fit together in the case of a package: its geometry, its solder, its shock."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from reflowshock.particles.parameters.solder import Solder
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import fine_joints, fittings, identical_joints, shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided
@@ -14,9 +12,6 @@ from reflowshock.workflow.case.pulse_files import unreadable_pulses
 from reflowshock.workflow.package import given_surfaces
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase, joint_geometries
 from reflowshock.workflow.reflow import forecast as reflow_forecast
-
-if TYPE_CHECKING:
-    from reflowshock.particles.core.geometry import JointGeometry
 
 
 def package_problems(case: PackageCase) -> list[Problem]:
@@ -63,18 +58,12 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     pads = pad_table(package, case.board, case.warpage)
     geometries = joint_geometries(pads)
     heated = thermal_checks.problems(thermal, case.materials.by_role, case.warpage.corner) if thermal else []
-    of_solder = particles_checks.ispg_problems(case.solder, _unverified(case.solder, geometries.values()))
+    unverified = case.unverified if case.solder.numerics.scheme == "ispg" else None
+    of_solder = particles_checks.ispg_problems(case.solder, unverified)
     of_solder = of_solder or particles_checks.problems(case.solder, geometries, package.pitch)
     if thermal:
         of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
     return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
-
-
-def _unverified(solder: Solder, geometries: "Collection[JointGeometry]") -> str | None:
-    """What of the joints the scheme ispg is not verified for; None where it is."""
-    from reflowshock.particles.parameters.joint_checks import unverified_joints
-
-    return unverified_joints(geometries, solder) if solder.numerics.scheme == "ispg" else None
 
 
 def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:

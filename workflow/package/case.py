@@ -135,14 +135,22 @@ class PackageCase(Case):
     def resolved(self) -> Self:
         """With inertia, and without a scheme given, take ispg where it is verified: it costs less than tetrahedra."""
         from reflowshock.meshing.board.checks import problems
-        from reflowshock.particles.parameters.joint_checks import unverified_joints
 
         if "scheme" in self.solder.numerics.model_fields_set:
             return self
         if problems(self.package, self.board, self.warpage):
             return self
         ispg = changed(self.solder, "numerics.scheme", "ispg")
-        return self if unverified_joints(self.joints.values(), ispg) else self.model_copy(update={"solder": ispg})
+        with_ispg = self.model_copy(update={"solder": ispg})
+        return self if with_ispg.unverified else with_ispg
+
+    @property
+    def unverified(self) -> str | None:
+        """What of joints that can be drawn the scheme ispg is not verified for; None where it is."""
+        from reflowshock.particles.parameters.joint_checks import unverified_joints
+
+        lowest = 0.0 if self.thermal is None else self.thermal.lowest_corner
+        return unverified_joints(self.joints.values(), self.solder, lowest)
 
     @property
     def joints(self) -> "dict[str, JointGeometry]":

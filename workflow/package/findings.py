@@ -68,7 +68,10 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
 
 
 def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
-    """Judge joints that flowed with an account of their energy, by their metrics; nothing where there are none."""
+    """Judge joints that flowed with an account of their energy, by their metrics; nothing where there are none.
+
+    Those that were carried from place to place have no time to rest and no losses on the way.
+    """
     if not joints:
         return Findings()
 
@@ -77,17 +80,19 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
 
     imbalance, lost = worst(values("energy_imbalance")), sum(values("particles_lost"))
     resting = int(sum(values("at_rest")))
-    times = [time for time in values("time_at_rest") if time == time]
+    of_way = {
+        "joint_time_at_rest_max": ([time for time in values("time_at_rest") if time == time], "s"),
+        "joint_viscous_loss_max": (values("viscous_loss"), ""),
+        "joint_smoothing_loss_max": (values("smoothing_loss"), ""),
+    }
     return Findings(
         metrics={
             "joints_at_rest": metric(resting),
-            "joint_time_at_rest_max": metric(worst(times), "s"),
             "joint_steps_max": metric(max(values("steps"), default=0)),
             "joint_energy_imbalance_max": metric(imbalance),
-            "joint_viscous_loss_max": metric(max(values("viscous_loss"))),
-            "joint_smoothing_loss_max": metric(max(values("smoothing_loss"))),
             "joint_particles_lost": metric(int(lost)),
-        },
+        }
+        | {name: metric(max(found), unit) for name, (found, unit) in of_way.items() if found},
         health={
             "joint_energy_imbalance_max": at_most(imbalance, ENERGY_IMBALANCE),
             "joint_particles_lost": at_most(int(lost), 0),

@@ -84,7 +84,7 @@ def problems(
 
 def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iterator[Problem]:
     """Find a package that is moved so far down that the solder has no room between the plates, pitch by pitch."""
-    lowest = min(step.corner for step in load_steps(thermal))
+    lowest = thermal.lowest_corner
     needed = solder.volume / pitch**2
     if thermal.corner_displacement is None or lowest >= 0.0 or gap + lowest > needed:
         return

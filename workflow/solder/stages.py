@@ -16,8 +16,7 @@ PRESSURE_ERROR = 0.005  # of a drop's mean pressure, against the Young-Laplace s
 PRESSURE_SCATTER = 0.01  # of the pressures in a drop, over the capillary pressure
 ANGLE_EXCESS = 3.0  # of contact angles beyond the receding and the advancing one [deg]
 PERIOD_ERROR = 0.01  # of an oscillating drop, against Reid: exact at small amplitude
-# Of its decay rate, against Reid, by scheme: smoothing of the scheme ispg takes 10 to 20 % too much (README.md there).
-DECAY_ERRORS = {"inertia": 0.10, "ispg": 0.20}
+DECAY_RATE_ERROR = 0.10  # of its decay rate, against Reid
 JOINT_ERROR = 0.005  # of a joint's width and waist, against the Young-Laplace shape
 AXIAL_FORCE_ERROR = 0.02  # of a joint, against the Young-Laplace shape, over pi times radius times surface tension
 CAPILLARY_NUMBER = 1.0e-4  # of the largest speed of a surface at rest
@@ -97,7 +96,7 @@ def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
     with progress_bar(f"oscillation of {oscillation.particles} particles") as progress:
         shape = solve_oscillation(oscillation, solder, progress, checkpoint)
     write_body(folder, shape, None)
-    found = of_oscillation(shape.metrics, decide_oscillation(solder), oscillation.scheme)
+    found = of_oscillation(shape.metrics, decide_oscillation(solder))
     return replace(found, continued="the drop" if checkpoint.continued else "")
 
 
@@ -139,9 +138,9 @@ def of_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Fin
     return Findings(_known(metrics), health, dict(effects))
 
 
-def of_oscillation(metrics: Numbers, effects: Mapping[str, Any], scheme: str) -> Findings:
-    """Judge an oscillating drop by volume, and by Reid's period and decay rate as its scheme is verified for."""
-    limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_ERRORS[scheme]}
+def of_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
+    """Judge an oscillating drop by volume, and by Reid's period and decay rate."""
+    limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_RATE_ERROR}
     return Findings(_known(metrics), _at_rest(metrics, limits), dict(effects))
 
 

@@ -2,7 +2,8 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.checks import problems
-from reflowshock.particles.parameters.solder import Solder, SolderNumerics
+from reflowshock.particles.parameters.joint_checks import unverified_joints
+from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 
 GEOMETRIES = {f"A{k}": JointGeometry(gap * 1e-3, 0.24e-3, 0.24e-3) for k, gap in enumerate((0.31, 0.325, 0.34), 1)}
 PITCH = 1e-3
@@ -44,6 +45,15 @@ def test_spacing_must_resolve_the_joint():
 
 def test_the_pad_must_be_wetted_better_than_the_mask():
     assert keys(Solder(volume=0.0724e-9, pad_contact_angle=2.0, mask_contact_angle=1.0)) == ["solder.pad_contact_angle"]
+
+
+def test_joints_overflow_where_the_package_is_lowest_even_if_no_meridian_is_found_there():
+    solder, drawn = Solder(volume=0.0724e-9, effects=SolderEffects(inertia="on")), GEOMETRIES.values()
+    assert unverified_joints(drawn, solder) is None
+    assert unverified_joints(drawn, solder, -0.02e-3) is None
+    for way in (-0.17e-3, -0.26e-3):  # a flat joint of 0.05 mm has no meridian that is found
+        assert f"gap of {0.31 + 1e3 * way:.4g} mm" in unverified_joints(drawn, solder, way)
+    assert unverified_joints(drawn, solder, -0.32e-3) is None  # has no room at all, which other checks tell
 
 
 def test_a_slip_length_belongs_to_a_wall_with_slip():

@@ -59,6 +59,16 @@ def test_a_swing_is_not_at_rest_where_it_turns():
     assert fastest[1] < BOUND / sin(0.25 * pi)
 
 
+@pytest.mark.parametrize(("ratio", "most"), [(0.987, 1.43), (0.9, 1.54), (0.74, 1.82)])
+def test_what_is_left_of_a_swing_that_is_slower_than_its_rule_takes_it_for(ratio, most):
+    """The ratios are those of caps of 60, 120 and 148 degrees: their frequency is one above that of the swing."""
+    records = records_of(swing(amplitude=0.02, decay=1e-4, steps=40000))
+    run = steps_to_rest(records, StopRule(99999, 1e-6, 1.0, lasting=0.25 * ratio * PERIOD))
+    fastest = 0.02 * (1.0 - 1e-4) ** len(run.records) * 2.0 * pi / PERIOD
+    assert run.at_rest
+    assert fastest == pytest.approx(most * BOUND, rel=0.04)  # in whole steps, of which a quarter has 15
+
+
 def test_a_body_that_stops_is_at_rest_after_three_steps_and_only_confirmed_by_more():
     records = records_of([1.0] * 7 + [0.0] * 40)
     three = steps_to_rest(records, StopRule(99, 1e-6, 1.0))

@@ -22,7 +22,7 @@ from reflowshock.particles.scenes.drops import run_drops
 from reflowshock.particles.scenes.free_drop import solve_free_drop
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
 from reflowshock.particles.scenes.reflow import contact_line, start_flow, start_joint, stop_rule
-from reflowshock.particles.steps.rest import RECORDS
+from reflowshock.particles.steps.rest import RECORDS, NoRest
 
 RADIUS = 0.24e-3
 JOINT = JointGeometry(0.31e-3, RADIUS, RADIUS)
@@ -88,6 +88,13 @@ def viscous():
     return SOLDER.model_copy(update={"effects": effects, "numerics": numerics, **fluid})
 
 
+def coarse_viscous(process_time):
+    """The same with fewer particles, which rests after some hundred steps."""
+    solder = viscous()
+    numerics = solder.numerics.model_copy(update={"spacing": 1e-4})
+    return solder.model_copy(update={"numerics": numerics, "process_time": process_time})
+
+
 def moved_in_galerkin_form(motion, checkpoint):
     shape = settle_joint(JOINT, viscous(), (motion,), checkpoint=checkpoint)
     assert len(shape.history["time"]) > 8
@@ -107,7 +114,7 @@ def carry(checkpoint, solder=SOLDER):
 
 
 def carry_in_galerkin_form(checkpoint):
-    return carry(checkpoint, viscous())  # each place for the time of some steps
+    return carry(checkpoint, coarse_viscous(1.0))
 
 
 def stand(checkpoint):
@@ -255,3 +262,18 @@ def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
     assert found.keys() == expected.keys()
     different = [place for place, value in expected.items() if not np.array_equal(found[place], value)]
     assert not different
+
+
+def test_an_exchange_that_ends_with_the_process_passes_no_forces_on(tmp_path):
+    now = Checkpoint(tmp_path / "state", ("inputs",))
+    for _ in range(2):  # from the start, and from what was left
+        with pytest.raises(NoRest, match=r"process ends before the joint is at rest.*solder\.process_time"):
+            carry_joint(JOINT, coarse_viscous(2e-4), None, now)
+
+
+def test_a_carried_joint_has_no_time_to_rest_and_no_losses(tmp_path):
+    now, solder = Checkpoint(tmp_path / "state", ("inputs",)), coarse_viscous(1.0)
+    carry_joint(JOINT, solder, None, now)
+    metrics = carried_shape(JOINT, solder, now, now).metrics
+    assert {"energy_imbalance", "particles_lost", "steps"} < set(metrics)
+    assert not any(name == "time_at_rest" or name.endswith("_loss") for name in metrics)

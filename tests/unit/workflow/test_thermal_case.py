@@ -9,6 +9,7 @@ from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import case_text
+from reflowshock.workflow.reflow.forecast import load_steps
 from tests.support.workflow_command import SMALL_CASE
 
 PAPER = ['thermal.peak="200 degC"', 'thermal.melting="25 degC"', 'thermal.solidification="200 degC"']
@@ -32,6 +33,23 @@ def test_a_new_case_shows_the_table_as_it_would_be_written():
     written = tomllib.loads("\n".join(["[thermal]", *(line for line in lines if "= ..." not in line)]))
     assert written["thermal"]["peak"] == "245 degC"
     assert written["thermal"]["effects"] == {"flexible": "auto", "solder_force": "auto", "residual_stress": "off"}
+
+
+def test_joints_that_overflow_where_the_package_is_lowest_are_not_for_ispg():
+    """Moved 0.17 mm down both lines are on the mask, as drawn neither is; with 0.02 mm neither."""
+    moved = [*PAPER, MOVED[0], "solder.effects.inertia=on"]
+    near, far = ([*moved, f'thermal.corner_displacement="{way} mm"'] for way in (-0.02, -0.17))
+    assert read(*near).solder.numerics.scheme == "ispg"
+    with pytest.raises(CaseError, match=r"overflow both pads.*gap of 0\.14 mm"):
+        read(*far, "solder.numerics.scheme=ispg")
+    with pytest.raises(CaseError, match="load steps are at rest"):
+        read(*far)
+
+
+def test_the_package_is_lowest_in_a_load_step():
+    for way in ("-0.1 mm", "0.1 mm"):
+        thermal = read("thermal.steps=3", MOVED[0], f'thermal.corner_displacement="{way}"').thermal
+        assert thermal.lowest_corner == min(step.corner for step in load_steps(thermal))
 
 
 def test_the_papers_course_of_temperatures():

@@ -50,18 +50,28 @@ def test_joints_with_an_account_of_their_energy_are_judged_by_it(records):
     found = findings.of_reflow(records, {})
     assert found.health["joint_energy_imbalance_max"]["ok"] and found.health["joint_particles_lost"]["ok"]
     assert (found.metrics["joints_at_rest"]["value"], found.metrics["joint_time_at_rest_max"]["value"]) == (3, 2e-3)
+    assert found.metrics["joint_smoothing_loss_max"]["value"] == 0.01
     assert found.health["joints_in_motion"]["value"] == 1 and not found.health["joints_in_motion"]["ok"]
     records["A1"]["metrics"] |= {"energy_imbalance": {"value": -0.03}, "particles_lost": {"value": 1.0}}
     found = findings.of_reflow(records, {})
     assert not found.health["joint_energy_imbalance_max"]["ok"] and not found.health["joint_particles_lost"]["ok"]
 
 
-@pytest.mark.parametrize(("scheme", "limit"), [("inertia", 0.10), ("ispg", 0.20)])
-def test_the_decay_of_a_swing_is_judged_as_its_scheme_is_verified_for(scheme, limit):
-    metrics = {"volume_drift": (0.0, ""), "period_error": (5e-3, ""), "decay_rate_error": (1.01 * limit, "")}
-    health = of_oscillation(metrics, {}, scheme).health
-    assert health["decay_rate_error"]["limit"] == limit and not health["decay_rate_error"]["ok"]
+def test_joints_that_were_carried_have_no_time_to_rest_and_no_losses(records):
+    moved = {"energy_imbalance": 1e-3, "particles_lost": 0.0, "at_rest": 1.0, "steps": 80.0}
+    for record in records.values():
+        record["metrics"] |= {name: {"value": value, "unit": ""} for name, value in moved.items()}
+    found = findings.of_reflow(records, {})
+    assert found.health["joint_energy_imbalance_max"]["ok"] and found.metrics["joint_steps_max"]["value"] == 80
+    assert [name for name in found.metrics if "loss" in name or "time" in name] == []
+
+
+def test_the_decay_of_a_swing_is_judged_to_ten_per_cent_whatever_the_scheme():
+    metrics = {"volume_drift": (0.0, ""), "period_error": (5e-3, ""), "decay_rate_error": (0.101, "")}
+    health = of_oscillation(metrics, {}).health
+    assert health["decay_rate_error"] == {"value": 0.101, "limit": 0.1, "ok": False}
     assert health["period_error"]["ok"]
+    assert of_oscillation(metrics | {"decay_rate_error": (-0.099, "")}, {}).health["decay_rate_error"]["ok"]
 
 
 def test_widths_are_judged_to_one_per_cent_and_counted(records):
