@@ -53,7 +53,7 @@ TOUCH, DRY = 0.3, 0.1
 # about one that it follows, and how far outside a vertex one is still its own, not one of other liquid before it.
 COVER, CREST, OWN = (-0.25, 2.0), 1.5, 0.75
 # The same: distance of the nodes at which sheets that have crossed are looked for.
-OVERLAP = 0.5
+OVERLAP = 0.25
 # In particles: smaller parts are no liquid with a surface; two particles across, a sphere has four, a cube eight.
 FEWEST = 8
 # Of the vertices: with more that have no particle in reach, and follow the nearest one, it is not the liquid's surface
