@@ -40,6 +40,7 @@ from reflowshock.particles.ispg.rigid_motions import (
     rigid_motions,
     wall_velocities,
 )
+from reflowshock.particles.ispg.state import GalerkinState, Prediction, centre, smoothing_passes
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
