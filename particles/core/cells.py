@@ -46,7 +46,8 @@ def sort_into_cells(points: Floats, origin: Floats, size: float, shape: Indices)
         size: Edge length of a cell [m].
         shape: Number of cells along x, y and z, shape (3,).
     """
-    return CellList(*_counting_sort(points, origin, size, shape, get_num_threads()), origin, size, shape)
+    starts, permutation, coordinates = _counting_sort(points, origin, size, shape, get_num_threads())
+    return CellList(starts, permutation, coordinates, origin, size, shape)
 
 
 @njit(cache=True, parallel=True)
