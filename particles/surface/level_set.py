@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,7 +157,7 @@ def _cell_vertices(level: LevelSet, inside: NDArray[np.bool_]) -> tuple[Floats, 
         part = corner[cut, first] / (corner[cut, first] - corner[cut, last])
         total[cut] += CORNERS[first] + part[:, None] * (CORNERS[last] - CORNERS[first])
         count[cut] += 1.0
-    cells: NDArray[Any] = np.argwhere(active)
+    cells = np.argwhere(active).astype(float)
     return level.grid.positions(cells + total / count[:, None]), number
 
 
