@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,8 +157,8 @@ def _cell_vertices(level: LevelSet, inside: NDArray[np.bool_]) -> tuple[Floats, 
         part = corner[cut, first] / (corner[cut, first] - corner[cut, last])
         total[cut] += CORNERS[first] + part[:, None] * (CORNERS[last] - CORNERS[first])
         count[cut] += 1.0
-    cells = np.argwhere(active).astype(float)
-    return level.grid.positions(cells + total / count[:, None]), number
+    indices: NDArray[Any] = np.argwhere(active) + total / count[:, None]
+    return level.grid.positions(indices), number
 
 
 def _from(corner: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[slice, ...]:
