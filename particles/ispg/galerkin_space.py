@@ -16,7 +16,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
-from reflowshock.particles.core.neighbours import find_beside, find_neighbours
+from reflowshock.particles.core.neighbours import find_near, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.ghosts import Ghosts, mirror
@@ -80,7 +80,8 @@ class GalerkinSpace:
         squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
         sparse_rows = np.flatnonzero(squares == 0.0)
         if len(sparse_rows):
-            lists = kernels.with_rows(lists, sparse_rows, find_beside(points[sparse_rows], points, WIDEST * spacing))
+            near = find_near(points[sparse_rows], points, WIDEST * spacing)
+            lists = kernels.with_rows(lists, sparse_rows, near)
             wider = kernels.supports(sparse_rows, points, (*lists, WIDEST * spacing), spacing)
             squares[sparse_rows], lengths[sparse_rows] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
