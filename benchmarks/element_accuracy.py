@@ -1,9 +1,9 @@
 """Work-precision of the elements: error against cost for kind, size and solver, on a cantilever and a plate.
 
-Run: .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
-     .venv/bin/python benchmarks/element_accuracy.py             (some minutes; to benchmarks/results)
-     .venv/bin/python benchmarks/element_accuracy.py --publish   (and to the README of cases/cantilever)
-     .venv/bin/python benchmarks/element_accuracy.py --publish --stored   (writes what is stored again)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
+     PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py             (some minutes; to benchmarks/results)
+     PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py --publish   (and to the README of cases/cantilever)
+     PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py --publish --stored   (writes what is stored again)
 Seconds are those of one core, to follow one period of the first mode: explicit steps of 0.9 of the smallest element
 critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
 whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
@@ -25,6 +25,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.support import results
 from reflowshock.cases.hard.trials.boxes import KINDS, box
 from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.division.tables import prepare
@@ -42,7 +43,7 @@ from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.local_mesh import distribute
 
-RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
+NAME = "element_accuracy"
 README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"
 STORED = README.with_name("work_precision.json")
 BEGIN, END = "<!-- work-precision: written by benchmarks/element_accuracy.py -->", "<!-- work-precision: end -->"
@@ -236,11 +237,10 @@ def run_all(refinements: tuple[Refinement, ...]) -> dict:
     next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
     speed = speeds(refinements[-1].cells[-1])
     result = {"machine": platform.machine(), "rows": [], "speeds": speed, **reference_check(refinements)}
-    RESULTS.parent.mkdir(exist_ok=True)
     for refinement in refinements:
         for row in measure(refinement):
             result["rows"].append(row)
-            RESULTS.write_text(json.dumps(result, indent=1) + "\n")
+            results.write_figures(NAME, result)
             print(" | ".join(cells_of(row)), flush=True)
     return result
 
