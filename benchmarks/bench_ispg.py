@@ -1,6 +1,6 @@
 """Cost of a step of the scheme ispg against the number of particles: a cube of solder, values of the paper, 60 degrees.
 
-Run: PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (10 s; results/ispg.json)
+Run: PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (10 s)
 Seconds are those of the processor, over the first swing, where factors of the pressure equation age fastest.
 """
 
