@@ -14,7 +14,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.steps.descent import MeshSmoothing, Start, correct_volume, highest_energy, smooth_surface
+from reflowshock.particles.steps.descent import MeshSmoothing, StepStart, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.step_solver import SolverTraits
@@ -152,7 +152,7 @@ def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull,
 
 def test_a_step_that_begins_again_starts_where_it_did():
     body, physics = joint()
-    points, start = body.points.copy(), Start.of(body, physics.lines)
+    points, start = body.points.copy(), StepStart.of(body, physics.lines)
     for _ in range(2):
         body.move(0.1, np.ones_like(points), {1: np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])})
         body.velocity, body.triangles = np.ones_like(points), body.triangles[::-1].copy()

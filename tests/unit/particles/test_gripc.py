@@ -11,7 +11,7 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.gripc.collocation import collocate
 from reflowshock.particles.gripc.gripc_step import GripcStep, force_pressure, viscous_pressure
-from reflowshock.particles.gripc.projection import Poisson, Velocities, correct_pressure, smooth, solve_gmres
+from reflowshock.particles.gripc.projection import Material, Poisson, Velocities, correct_pressure, smooth, solve_gmres
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass
@@ -56,7 +56,7 @@ def test_the_corrected_pressure_is_given_on_the_surface(box, operators):
     random = np.random.default_rng(6)
     divergence, pressure, given = random.normal(size=(3, len(box.points)))
     surface = np.arange(len(box.points)) < box.surface_count
-    found = correct_pressure(Poisson(operators, surface, "quadratic"), (3.0, 0.2), divergence, pressure, given)
+    found = correct_pressure(Poisson(operators, surface, "quadratic"), Material(3.0, 0.2), divergence, pressure, given)
     assert found.pressure[surface] == pytest.approx(given[surface], abs=1e-6)
     assert found.pressure == pytest.approx(found.potential + pressure - 0.2 * divergence, abs=1e-9)
     assert (operators.laplacian @ found.potential)[~surface] == pytest.approx(3.0 * divergence[~surface], abs=1e-5)

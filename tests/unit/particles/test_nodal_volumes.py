@@ -23,7 +23,7 @@ def test_volumes_have_the_moments(thickness):
 
 
 def test_particles_in_a_plane_have_none_off_it():
-    with pytest.raises(NoNodalVolumes, match="too unevenly"):
+    with pytest.raises(NoNodalVolumes, match="too uneven"):
         fitted_volumes(np.full(40, 0.025), points(0.0), np.array([1.0, 0.0, 0.0, 0.1]), np.zeros(4))
 
 
