@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import sparse
 
-from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
+from reflowshock.particles.discretisation.schur_complement import LowRank, SchurComplement, VolumeRateRows
 
 COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, those of the surface
 
@@ -29,10 +29,11 @@ def test_it_is_the_dense_matrix():
 
     surface = sparse.bsr_matrix(stiffness[: 3 * MOVED, : 3 * MOVED], blocksize=(3, 3))
     found = SchurComplement.of(
-        PairRates(pairs.indptr.astype(np.int64), pairs.indices, entries),
-        (shares, gradient),
-        StiffMass.of(masses, surface, rigid, TIME_STEP),
-        (columns, core),
+        VolumeRateRows(pairs.indptr.astype(np.int64), pairs.indices, entries),
+        shares,
+        gradient,
+        EffectiveMass.of(masses, surface, rigid, TIME_STEP),
+        LowRank(columns, core),
     )
     pressures = random.normal(size=COUNT)
     np.testing.assert_allclose(found(pressures), expected @ pressures, rtol=1e-10)
