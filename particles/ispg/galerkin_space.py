@@ -16,7 +16,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
-from reflowshock.particles.core.neighbours import find_beside, find_neighbours
+from reflowshock.particles.core.neighbours import find_near, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.ghosts import Ghosts, mirror
@@ -73,7 +73,7 @@ class GalerkinSpace:
         squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
         lacking = np.flatnonzero(squares == 0.0)
         if len(lacking):
-            lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
+            lists = kernels.with_rows(lists, lacking, find_near(points[lacking], points, WIDEST * spacing))
             wider = kernels.supports(lacking, points, (*lists, WIDEST * spacing), spacing)
             squares[lacking], lengths[lacking] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
