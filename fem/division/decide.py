@@ -132,7 +132,7 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     choice = decide_scheme(rules, estimate.steps, estimate.linear, lambda: True)
     macro = estimate.macro if rules.copied is None else ~rules.copied
     plan = plan_estimate(estimate, rules)
-    pace = Pace(estimate.steps, estimate.cost, plan.window, rules.fraction)
+    pace = Pace(estimate.steps, estimate.cost, plan.window, rules.fraction)  # damping changes the levels little
     division = in_two_steps(choice.scheme, macro, ~macro, plan)
     if choice.scheme == "local_steps":
         cells = np.arange(len(estimate.names), dtype=np.int32)[:, None]

@@ -44,7 +44,7 @@ def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
 
 def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes; errors as ``read_package``, ``division.checks``."""
-    shock, numerics = request.shock, request.shock.numerics
+    shock = request.shock
     whole = joined(with_neighbours(read_package(request), request.packages))
     fitted = fitted_board(whole, request)
     plain = survey(whole.mesh, request.materials, treatment_of(request))
