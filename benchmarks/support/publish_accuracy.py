@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from reflowshock.workflow.convergence.measured import FILE, read_accuracy
+from reflowshock.workflow.convergence.accuracy_file import FILE, read_accuracy
 from reflowshock.workflow.convergence.page import PICTURE, markdown
 
 ROOT = Path(__file__).resolve().parents[2]
