@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.adaptation import restore_moments
 from reflowshock.particles.ispg.ispg_step import IspgStep
@@ -26,7 +27,7 @@ from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
 from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, lidded
-from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CONTACT_SPACINGS = 1.0

@@ -18,13 +18,13 @@ from reflowshock.fem.estimates.thermal_effects import (
     solder_force_number,
     warpage_number,
 )
-from reflowshock.fem.materials.library import FR4, SILICON
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.library import FR4, SILICON
+from reflowshock.materials.roles import ELASTIC, Materials
 from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
