@@ -22,7 +22,7 @@ from reflowshock.sources import digest_of_sources
 VARIABLE = "NUMBA_CACHE_DIR"
 CACHING_MODULE = "numba.core.caching"
 ROOT = Path(__file__).parent
-PACKAGES = ("fem", "particles")  # packages with kernels
+PACKAGES = ("fem", "materials", "particles")  # packages whose functions are compiled
 KERNEL_MODULES = tuple(f"{__package__}.{name}." for name in PACKAGES)
 
 

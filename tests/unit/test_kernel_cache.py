@@ -10,8 +10,8 @@ import pytest
 from reflowshock import kernel_cache
 
 ASKED = """
-from reflowshock.particles.core.neighbours import visit
-print(visit._cache.cache_path)
+from reflowshock.particles.core.neighbours import write_near
+print(write_near._cache.cache_path)
 """
 
 
@@ -19,6 +19,7 @@ def test_digest_changes_with_any_file(tmp_path: Path, monkeypatch: pytest.Monkey
     """A constant that is frozen into a kernel is in a file without kernels, as `compiled` kernels do not say njit."""
     monkeypatch.setattr(kernel_cache, "ROOT", tmp_path)
     (tmp_path / "fem").mkdir()
+    (tmp_path / "materials").mkdir()
     source = tmp_path / "particles" / "sph" / "constants.py"
     source.parent.mkdir(parents=True)
     found = []
@@ -31,10 +32,11 @@ def test_digest_changes_with_any_file(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_tests_use_it() -> None:
-    from reflowshock.particles.core.neighbours import visit
+    from reflowshock.particles.core.neighbours import write_near
 
     assert kernel_cache.VARIABLE in os.environ
-    assert visit._cache.cache_path == kernel_cache.ModuleCacheLocator(visit.py_func, __file__).get_cache_path()
+    locator = kernel_cache.ModuleCacheLocator(write_near.py_func, __file__)
+    assert write_near._cache.cache_path == locator.get_cache_path()
 
 
 def test_a_kernel_is_kept_by_its_module_and_all_sources_wherever_they_are(tmp_path: Path, monkeypatch) -> None:

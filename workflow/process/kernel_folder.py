@@ -12,7 +12,7 @@ from pathlib import Path
 from reflowshock.kernel_cache import VARIABLE, digest, ensure_writable, source_cache
 
 # Stage -> one of its kernels, and the CPU time for compiling all of them in jedec_bga, an upper bound for other cases.
-KERNELS = {"reflow": ("neighbours._rows", 24.0), "shock": ("levels.take_steps", 48.0)}
+KERNELS = {"reflow": ("neighbours._compressed_rows", 24.0), "shock": ("levels.take_steps", 48.0)}
 
 
 def choose_kernel_folder(environment: MutableMapping[str, str] = os.environ) -> None:

@@ -179,7 +179,7 @@ COMPARISONS: dict[str, Callable[[StructureCase, Any, Motion], tuple[dict, dict]]
 
 def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     """Return the two layers of a case as bars with their exact solution."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
     lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
@@ -190,7 +190,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
 def layers_of(case: StructureCase) -> exact_layers.Layers:
     """Return all layers of a case as a layered bar with its exact solution."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     materials = case.problem.layer_materials.values()
     return exact_layers.Layers(
@@ -215,7 +215,7 @@ def truncated_waves(case: StructureCase) -> Iterator[Problem]:
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
     """Return the only layer of a case as a strip with its exact solution."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     (material,) = case.problem.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure

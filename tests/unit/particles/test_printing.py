@@ -14,7 +14,7 @@ from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
 from reflowshock.particles.printing.part import Layer, Part
 from reflowshock.particles.printing.part_files import write_part
 from reflowshock.particles.printing.printing import solve_printing
-from reflowshock.workflow.fluid.printed_part import layer_table, part_scene
+from reflowshock.workflow.flows.printed_part import layer_table, part_scene
 
 INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
@@ -94,6 +94,7 @@ def test_the_largest_spray_of_a_print_is_kept():
     assert again.surface.spray == 0.0 and again.spray == deposit.spray
 
 
+@pytest.mark.long
 def test_one_thread_and_two_print_the_same_bits():
     found = []
     for threads in (1, 2):

@@ -1,15 +1,15 @@
-"""The pressure equation's matrix against the dense one that its formula stands for."""
+"""Schur complement of the pressure equation against the dense matrix."""
 
 import numpy as np
 from scipy import sparse
 
-from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
+from reflowshock.particles.discretisation.schur_complement import LowRank, SchurComplement, VolumeRateRows
 
-COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, those of the surface
+COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, surface particles
 
 
-def test_it_is_the_dense_matrix():
+def test_schur_complement_is_the_dense_matrix():
     random = np.random.default_rng(4)
     masses = np.repeat(random.uniform(1.0, 2.0, COUNT), 3)
     root = random.normal(size=(3 * MOVED, 3 * MOVED))
@@ -28,11 +28,12 @@ def test_it_is_the_dense_matrix():
     expected = rows @ np.linalg.solve(inertia, rows.T) + columns @ core @ columns.T
 
     surface = sparse.bsr_matrix(stiffness[: 3 * MOVED, : 3 * MOVED], blocksize=(3, 3))
-    found = SchurComplement.of(
-        PairRates(pairs.indptr.astype(np.int64), pairs.indices, entries),
-        (shares, gradient),
-        StiffMass.of(masses, surface, rigid, TIME_STEP),
-        (columns, core),
+    operator = SchurComplement.of(
+        VolumeRateRows(pairs.indptr.astype(np.int64), pairs.indices, entries),
+        shares,
+        gradient,
+        EffectiveMass.of(masses, surface, rigid, TIME_STEP),
+        LowRank(columns, core),
     )
     pressures = random.normal(size=COUNT)
-    np.testing.assert_allclose(found(pressures), expected @ pressures, rtol=1e-10)
+    np.testing.assert_allclose(operator(pressures), expected @ pressures, rtol=1e-10)
