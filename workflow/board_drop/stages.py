@@ -59,7 +59,7 @@ def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Compute the shock in each mode, one MPI run of ``fem`` each; compare the modes, and real with identical joints."""
+    """Run the shock in each mode, one MPI run of ``fem`` each; compare modes, and real with identical joints."""
     from reflowshock.workflow.board_drop.shock_cooling import with_cooling
     from reflowshock.workflow.board_drop.shock_effects import with_influence
     from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
