@@ -73,7 +73,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
     """Return a note on the strain that small kinematics neglect; empty where it is negligible."""
-    from reflowshock.fem.materials.kinematics import NEGLIGIBLE_STRAIN
+    from reflowshock.fem.problem.kinematics import NEGLIGIBLE_STRAIN
 
     neglected = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
     if kinematics != "small" or neglected <= NEGLIGIBLE_STRAIN:

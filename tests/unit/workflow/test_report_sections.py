@@ -40,7 +40,7 @@ def test_warpage_is_told_in_words_and_by_load_step(structure):
     assert "70.0 µm for the package underside and 12.0 µm for the board" in words
     assert f"{gaps.min():+.1f} to {gaps.max():+.1f} µm" in words and "(217 °C)" in words
     table = warpage.load_steps(structure)
-    assert table["head"][:3] == ["load step", "temperature [degC]", "gap change, B3 [µm]"]  # no corner is moved
+    assert table["head"][:3] == ["load step", "temperature [°C]", "gap change, B3 [µm]"]  # no corner is moved
     assert table["rows"][-1][1:4] == ["217.0", f"{gaps.min():+.2f}", f"{gaps.max():+.2f}"]
     assert table["rows"][-1][-2:] == ["4", "6.00e-04"]
 
