@@ -74,17 +74,17 @@ BETWEEN = "+"  # the names of two joints that are one body
 IMAGE = "_image"  # ends the name of a joint behind a plane of symmetry
 
 
-def mesh_real_joints(run: Run[PackageCase], folder: Path, *, coarse: bool) -> dict[str, dict]:
+def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool) -> dict[str, dict]:
     """Place the package at its position after solidification and mesh the joints; return as ``mesh_array``."""
     from reflowshock.meshing.board.displaced_assembly import prescribed, read_computed, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import read_surface
 
-    case, structure = run.case, run.folder / "reflow/structure.npz"
+    structure = run_folder / "reflow/structure.npz"
     displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
-    side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
-    sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
-    surfaces = {path.stem: read_surface(path) for path in sorted((run.folder / "surface").glob("*.vtu"))}
+    side = write_displaced_assembly(run_folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
+    sites = {site.name: site for site in read_pads(run_folder / "reflow/pads.json")}
+    surfaces = {path.stem: read_surface(path) for path in sorted((run_folder / "surface").glob("*.vtu"))}
     bodies = [(surfaces[name], site) for name, site in sites.items() if name in surfaces]
     bridges = mesh_bridges(surfaces, sites, case, side)
     meshes = mesh_array(bodies, side, case.package, case.board, coarse=coarse)

@@ -41,7 +41,7 @@ def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
     """Place the package at its position after solidification and mesh every joint."""
     from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
 
-    return findings.of_solder_mesh(mesh_real_joints(run, folder, coarse=False), {})
+    return findings.of_solder_mesh(mesh_real_joints(run.case, run.folder, folder, coarse=False), {})
 
 
 def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
@@ -52,7 +52,7 @@ def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
 
     case = run.case
     coarse = needs_coarse_joints(case.shock.coupling)
-    qualities = mesh_real_joints(run, folder, coarse=coarse)
+    qualities = mesh_real_joints(case, run.folder, folder, coarse=coarse)
     if case.shock.identical_joints:
         qualities |= mesh_identical_joints(run, folder, coarse=coarse)
     return findings.of_solder_mesh(qualities, of_joint_meshes(case))
