@@ -97,4 +97,4 @@ def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
 
 def damping_loads(damping: Damping, body: Body) -> list[Load]:
     """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping."""
-    return [RayleighDamping.build(body, damping.coefficients)] if any(damping.coefficients) else []
+    return [RayleighDamping.build(body, *damping.coefficients)] if any(damping.coefficients) else []

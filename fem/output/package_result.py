@@ -222,5 +222,7 @@ def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float)
             "why": f"{pulse.source}, {METHODS[shock.method]}; package facing down: the board is pushed along +z"
             " of the table's frame",
         },
-        **reported_effects(DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)),
+        **reported_effects(
+            DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)
+        ),
     }
