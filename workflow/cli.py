@@ -305,12 +305,12 @@ def study(
     """Run a parametric study; only what is missing is computed. Writes tables, plots and a page."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
-    from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
+    from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_forecast
 
     points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL, force)
     store = Store(out or Path("runs") / points.study.about.name)
     if dry_run:
-        show_outlook(points, store)
+        show_forecast(points, store)
         return
     cases = [point.case for point in points.possible.values()]
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, cases))

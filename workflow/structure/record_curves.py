@@ -43,7 +43,7 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
 def input_spectra(case: StructureCase) -> list[Chart]:
     """Return the shock response spectrum of every input-G over the duration of the run."""
     from reflowshock.fem.loads.structure_pulses import pulses_of
-    from reflowshock.fem.problem.structure import InputG
+    from reflowshock.fem.problem.load_kinds import InputG
 
     inputs = {name: load for name, load in case.loads.items() if isinstance(load, InputG)}
     return spectrum_curves(pulses_of(inputs), case.dynamics.duration)

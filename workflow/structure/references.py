@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.fem.problem.structure import Pressure, StructureProblem
+from reflowshock.fem.problem.load_kinds import Pressure
+from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.names import nearest
 from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem
