@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.coupling.held_velocity import Answered, local_interface
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.dynamics.participant import Continued, explicit_motion
+from reflowshock.fem.dynamics.participant import Restartable, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.kernels.motion import link_velocities
 from reflowshock.fem.loads.load import Load
@@ -71,7 +71,7 @@ class LinkedMacro(Answered):
         self.take_force()
 
 
-class LinkedMeso(Continued):
+class LinkedMeso(Restartable):
     """Joints and package on copies of the macro nodes: m substeps a window, each with its link."""
 
     motion: ExplicitMotion

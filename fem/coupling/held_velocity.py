@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.dynamics.participant import Continued
+from reflowshock.fem.dynamics.participant import Restartable
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
@@ -39,7 +39,7 @@ class HeldVelocity:
         return HeldVelocityMeso(body, loads, plan, channels)
 
 
-class Answered(Continued):
+class Answered(Restartable):
     """A macro model that takes one step a window and gets a force at the interface back."""
 
     motion: ExplicitMotion
@@ -146,7 +146,7 @@ class WindowMotion(ExplicitMotion):
         return self._known[1]
 
 
-class Driven(Continued):
+class Driven(Restartable):
     """A meso model whose interface moves at the macro model's velocity."""
 
     motion: WindowMotion

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.coupling.held_velocity import WindowMotion, counted_interface, local_interface
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.dynamics.participant import Continued
+from reflowshock.fem.dynamics.participant import Restartable
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -38,7 +38,7 @@ class Impulse:
         return ImpulseMeso(body, loads, plan, channels)
 
 
-class ImpulseMacro(Continued):
+class ImpulseMacro(Restartable):
     """The board: one step a window, its interface where the meso model has taken it."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
@@ -74,7 +74,7 @@ class ImpulseMacro(Continued):
         return self._zero
 
 
-class ImpulseMeso(Continued):
+class ImpulseMeso(Restartable):
     """Joints, package, buffer and the interface itself: m substeps a window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:

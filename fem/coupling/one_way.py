@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.coupling.held_velocity import Driven
-from reflowshock.fem.dynamics.participant import Alone, explicit_motion
+from reflowshock.fem.dynamics.participant import SingleModel, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Kept, Load
 from reflowshock.fem.model.body import Body
@@ -34,7 +34,7 @@ class OneWay:
         return Submodel(body, loads, plan, channels)
 
 
-class Driver(Alone):
+class Driver(SingleModel):
     """The whole structure: one step a window, whose velocity at the interface is sent."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:

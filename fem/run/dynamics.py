@@ -18,7 +18,7 @@ from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.dynamics.history import History, Signal, Watch
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.motion import Motion
-from reflowshock.fem.dynamics.participant import Alone, Participant, explicit_motion
+from reflowshock.fem.dynamics.participant import Participant, SingleModel, explicit_motion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.materials.elasticity import materials_of_parts
@@ -138,7 +138,7 @@ def make_participants(comms: Communicators, problem: DynamicProblem, models: Mod
     else:
         [(role, body)] = bodies.items()
         motion = make_motion(comms.models[role], body, loads[role], steps.plan.step, problem.request)
-        made = CoupledRun({role: Alone(motion, steps.plan)}, [])
+        made = CoupledRun({role: SingleModel(motion, steps.plan)}, [])
     for participant in made.participants.values():
         if any(problem.request.initial_velocity):
             participant.motion.launch(np.array(problem.request.initial_velocity))

@@ -113,7 +113,7 @@ def test_energy_that_the_interface_has_is_told_as_such():
     coupled = pushed("held_velocity", Pair(4, 3.0, 2, layers=3))
     balance = EnergyBalance(limit=1e-4, trivial=0.0)
     balance.judge(coupled.sums(), 0.0)
-    with pytest.raises(EnergyError, match="the coupling of both models holds most of what is missing"):
+    with pytest.raises(EnergyError, match="the coupling interface accounts for most of the imbalance"):
         for window in range(1, 200):
             coupled.run()
             balance.judge(coupled.sums(), window * coupled.plan.window)
