@@ -39,7 +39,7 @@ from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.shock import Ranks
-from reflowshock.fem.setup.models import Divided
+from reflowshock.fem.setup.models import DividedModels
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"
@@ -88,7 +88,7 @@ class Measured:
     latency: float
 
 
-def works_of(divided: Divided[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
+def works_of(divided: DividedModels[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
     """Return the models of a divided mesh as what is to be distributed."""
     works: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():

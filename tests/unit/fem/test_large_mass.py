@@ -11,7 +11,7 @@ from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from tests.support.fem_models import BOARD_X, BOARD_Y, small_assembly, write_msh
 
 SIZE = 0.5e-3
@@ -45,7 +45,7 @@ def results(files: Path, assembly: str = "assembly.msh", **changes) -> tuple[dic
     output = files / "_".join(["out", *changes])
     output.mkdir(exist_ok=True)
     meshes = (files / assembly, files / "joints.msh")
-    run(
+    run_package(
         MPI.COMM_SELF,
         RunInput(mode="two_scale", meshes=meshes, materials=ELASTIC, shock=SHOCK | changes, output=output),
     )

@@ -181,7 +181,7 @@ def test_pressure_follows_the_surface_where_it_may_turn(tmp_path, kinematics, ki
 def test_implicit_solver_with_nothing_to_solve(tmp_path):
     supports = {side: {"on": side, "hold": ["x", "y", "z"]} for side in ("z_min", "z_max")}
     request = structure_input(tmp_path, strip_mesh((4, 2, 1)), supports=supports, solver="implicit")
-    with pytest.raises(AgreedError, match="implicit solver: the supports hold every node"):
+    with pytest.raises(AgreedError, match="implicit solver: the supports fix every node"):
         run_structure(MPI.COMM_SELF, request)
 
 
