@@ -13,10 +13,10 @@ import numpy as np
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls import SUPPORT, derivatives
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import solve_joint
-from reflowshock.particles.steps.rest import NoRest
+from reflowshock.particles.steps.rest import NotAtRest
 
 RESULTS = Path(__file__).parent / "results" / "reflow.json"
 BALL, RADIUS, MM = 0.0724e-9, 0.24e-3, 1e-3
@@ -41,7 +41,7 @@ def joint(gap: float, numerics: SolderNumerics) -> dict:
     row = {"gap_mm": gap, "spacing_mm": numerics.spacing / MM, "time_step_limit": numerics.time_step_limit}
     try:
         shape = solve_joint(JointGeometry(gap * MM, RADIUS, RADIUS), solder)
-    except NoRest as failure:
+    except NotAtRest as failure:
         return row | {"failure": str(failure)}
     return row | {"verdict": shape.verdict} | {name: shape.metrics[name][0] for name in COLUMNS}
 

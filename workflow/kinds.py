@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,7 +13,6 @@ from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
 from reflowshock.names import nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
-from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS, PRINTING_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
@@ -24,17 +24,11 @@ from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STA
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
 from reflowshock.workflow.convergence.series import ConvergenceStudy
-from reflowshock.workflow.fluid import case as fluid_case
-from reflowshock.workflow.fluid import stages as fluid_stages
-from reflowshock.workflow.fluid.case import (
-    DamBreakCase,
-    DropletCase,
-    FlowCase,
-    PoiseuilleCase,
-    PrintingCase,
-    TaylorGreenCase,
-)
-from reflowshock.workflow.fluid.forecast import flow_size, flow_tables, forecast_flow
+from reflowshock.workflow.flows.flow_kind import STAGE as FLOW_STAGE
+from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
+from reflowshock.workflow.flows.forecast import flow_size, flow_tables, forecast_flow
+from reflowshock.workflow.flows.registry import FLOWS
+from reflowshock.workflow.flows.stage import run_flow
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.reflow.stage import reflow
 from reflowshock.workflow.report.errors import Discretisation
@@ -148,32 +142,32 @@ def _solder_study(case: Case) -> ConvergenceStudy:
     return STUDIES[case.kind](case)
 
 
-def _flow_report(run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
-    if (run_folder / "particles/flow.h5").exists():
-        from reflowshock.workflow.fluid.report import add_flow
+def _flow_report(flow: FlowKind, run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
+    if (run_folder / FLOW_STAGE / "flow.h5").exists():
+        from reflowshock.workflow.flows.report import add_flow
 
-        add_flow(run_folder, case, context, summary)
-
-
-def _flow_study(case: FlowCase) -> ConvergenceStudy:
-    from reflowshock.workflow.convergence.fluid import flow_study
-
-    return flow_study(case)
+        add_flow(flow, run_folder, case, context, summary)
 
 
-def _flow_kind(case: type[Case], problems: Callable[[Any], list[Problem]], flow: StageFunction) -> Kind:
-    """Return a kind of case of a liquid that flows."""
+def _flow_study(flow: FlowKind, case: FlowCase) -> ConvergenceStudy:
+    from reflowshock.workflow.flows.convergence import flow_study
+
+    return flow_study(flow, case)
+
+
+def _flow_kind(flow: FlowKind) -> Kind:
+    """Return the kind of case of a kind of flow."""
     return Kind(
-        case=case,
-        problems=problems,
-        stages={"particles": flow},
-        forecast=forecast_flow,
-        size=flow_size,
-        plan=flow_tables,
+        case=flow.case,
+        problems=flow.problems,
+        stages={FLOW_STAGE: partial(run_flow, flow)},
+        forecast=partial(forecast_flow, flow),
+        size=partial(flow_size, flow),
+        plan=partial(flow_tables, flow),
         acts="flow",
-        report=_flow_report,
-        study=_flow_study,
-        effects=FLOW_EFFECTS,
+        report=partial(_flow_report, flow),
+        study=partial(_flow_study, flow),
+        effects=flow.effects,
     )
 
 
@@ -243,17 +237,7 @@ KINDS = (
     _solder_kind(DropsCase, solder_case.of_drops, solder_stages.reflow_drops),
     _solder_kind(OscillationCase, solder_case.of_oscillation, solder_stages.reflow_oscillation),
     STRUCTURE,
-    _flow_kind(DamBreakCase, fluid_case.of_dam_break, fluid_stages.flow_dam_break),
-    _flow_kind(PoiseuilleCase, fluid_case.of_viscous, fluid_stages.flow_poiseuille),
-    _flow_kind(TaylorGreenCase, fluid_case.of_viscous, fluid_stages.flow_taylor_green),
-    replace(
-        _flow_kind(DropletCase, fluid_case.of_droplet, fluid_stages.flow_droplet),
-        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS),
-    ),
-    replace(
-        _flow_kind(PrintingCase, fluid_case.of_printing, fluid_stages.flow_printing),
-        effects=(*FLOW_EFFECTS, *DROPLET_EFFECTS, *PRINTING_EFFECTS),
-    ),
+    *map(_flow_kind, FLOWS),
     PACKAGE,
 )
 NAMES = tuple(dict.fromkeys(kind.name for kind in KINDS))

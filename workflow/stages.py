@@ -3,7 +3,7 @@
 Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report (`board_drop/stages.py`,
 `reflow/stage.py`), the shock only where the case has one. Structure: geometry -> shock -> comparison -> report
 (`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`). A liquid that flows: particles -> report
-(`fluid/stages.py`).
+(`flows/stage.py`).
 
 Each stage reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it
 found. Packages are imported inside the functions, so that a stage loads only what it uses.

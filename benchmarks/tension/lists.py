@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_beside, have_moved
+from reflowshock.particles.core.neighbours import find_near, have_moved
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 
@@ -35,7 +35,7 @@ class Lists:
         """Return the lists of places `(m, 3)` among points `(n, 3)` [m]."""
         together, skin = np.concatenate((places, points)), SKIN * self.spacing
         if len(together) != len(self._built_at) or have_moved(together.T, self._built_at.T, skin):
-            self.rows, self._built_at = find_beside(places, points, self.reach + skin), together
+            self.rows, self._built_at = find_near(places, points, self.reach + skin), together
         return self.rows
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, prange
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import uncounted
+from reflowshock.particles.core.cells import uncounted
 
 
 @uncounted

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
 from reflowshock.particles.discretisation.lagged_cholesky import Band
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
 
 
 @dataclass(frozen=True, slots=True)
-class PairRates:
+class VolumeRateRows:
     """Rates of volume of n particles' velocities, those that walls admit, as rows of pairs.
 
     Attributes:
@@ -51,14 +51,14 @@ class SchurComplement:
         low, across: `(n, r)` and `(r, n)`, whose product is what is low in rank.
     """
 
-    rates: PairRates
-    inertia: StiffMass
+    rates: VolumeRateRows
+    inertia: EffectiveMass
     low: Floats
     across: Floats
 
     @classmethod
     def of(
-        cls, rates: PairRates, missed: tuple[Floats, Floats], inertia: StiffMass, more: tuple[Floats, Floats]
+        cls, rates: VolumeRateRows, missed: tuple[Floats, Floats], inertia: EffectiveMass, more: tuple[Floats, Floats]
     ) -> Self:
         """Join them.
 
@@ -80,7 +80,7 @@ class SchurComplement:
         core = np.zeros((low.shape[1],) * 2)
         core[0, 0], core[0, 1], core[1, 0] = gradient[:, 0] @ answer[:, 0], 1.0, 1.0
         core[2:last, 2:last], core[last:, last:] = -inertia.core, pairs
-        ordered = PairRates(rates.starts, place[rates.columns], rates.entries)
+        ordered = VolumeRateRows(rates.starts, place[rates.columns], rates.entries)
         return cls(ordered, inertia, low, core @ low.T)
 
     def __call__(self, pressure: Floats) -> Floats:

@@ -21,7 +21,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.past import GalerkinPast
+from reflowshock.particles.ispg.state import GalerkinState
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, extreme_edges, split_long
 
@@ -73,7 +73,7 @@ class Adaptation:
 
     def update(self, body: Body) -> None:
         """Change the particles where they are too far apart or too near."""
-        if self.solver.past is None:
+        if self.solver.state is None:
             return
         on_rings = not any(line.has_edge for line in self.physics.lines)
         for find in (_longer, _shorter):
@@ -89,8 +89,8 @@ class Adaptation:
         return False
 
     def _apply(self, body: Body, change: Change) -> None:
-        past = self.solver.past
-        if past is None:
+        state = self.solver.state
+        if state is None:
             raise ValueError("only a body that has moved changes its particles")
         volume, first, _ = body_moments(body)
         before = self.physics.energy(body)
@@ -101,9 +101,9 @@ class Adaptation:
         if changed:
             restore_moments(body, self.physics, volume, first)
         after = self.physics.energy(body)
-        losses = replace(past.losses, rebuilding=past.losses.rebuilding + before - after)
-        past = replace(_taken(past, change), potential=past.potential + after - before, losses=losses)
-        self.solver.past = past
+        losses = replace(state.losses, rebuilding=state.losses.rebuilding + before - after)
+        state = replace(_taken(state, change), potential=state.potential + after - before, losses=losses)
+        self.solver.state = state
 
 
 def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) -> None:
@@ -273,17 +273,17 @@ def _take(body: Body, change: Change) -> None:
     )
 
 
-def _taken(past: GalerkinPast, change: Change) -> GalerkinPast:
+def _taken(state: GalerkinState, change: Change) -> GalerkinState:
     """What the last step left, at the new particles."""
-    last = past.history
+    last = state.history
     displacement, change_of_velocity = change.mean(last.displacement), change.mean(last.velocity_change)
     return replace(
-        past,
-        points=change.mean(past.points),
-        velocity=change.mean(past.velocity),
-        gradient=change.mean(past.gradient),
-        pressure=change.mean(past.pressure),
-        acceleration=change.mean(past.acceleration),
-        volumes=change.mean(past.volumes),
+        state,
+        points=change.mean(state.points),
+        velocity=change.mean(state.velocity),
+        gradient=change.mean(state.gradient),
+        pressure=change.mean(state.pressure),
+        acceleration=change.mean(state.acceleration),
+        volumes=change.mean(state.volumes),
         history=replace(last, displacement=displacement, velocity_change=change_of_velocity),
     )

@@ -36,6 +36,7 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
 from reflowshock.particles.discretisation.lagged_cholesky import (
     Apply,
     Band,
@@ -43,11 +44,11 @@ from reflowshock.particles.discretisation.lagged_cholesky import (
     Tolerance,
     conjugate_gradients,
 )
-from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
+from reflowshock.particles.discretisation.schur_complement import SchurComplement, VolumeRateRows
 from reflowshock.particles.ispg import step_kernels as kernels
-from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.rigid_motions import Riders, rigid_part, wall_velocities
+from reflowshock.particles.ispg.galerkin_space import GalerkinSpace
+from reflowshock.particles.ispg.moving_plates import FloatingModes
+from reflowshock.particles.ispg.rigid_motions import rigid_part, wall_velocities
 from reflowshock.particles.steps.descent import ARRIVED
 
 Drive = Callable[[Floats, Floats], Floats]
@@ -57,7 +58,7 @@ MOMENTUM_TOLERANCE, VOLUME_TOLERANCE = 1e-7, 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class LiquidProperties:
     """What the liquid is made of, and how fast velocities that the shape functions do not show die away.
 
     Attributes:
@@ -97,13 +98,13 @@ class GalerkinEquations:
         time_step: [s].
     """
 
-    space: Galerkin
-    fluid: Flow
+    space: GalerkinSpace
+    fluid: LiquidProperties
     admitted: Floats
     stiffness: sparse.spmatrix
     rigid: Floats
     drag: Floats
-    inertia: StiffMass
+    inertia: EffectiveMass
     walls: Floats
     unbalanced: Floats
     spacing: float
@@ -226,7 +227,7 @@ class GalerkinEquations:
         each to A.
         """
         space, images, riders = self.space, self._image_rates(), self.space.riders
-        rates = PairRates(*kernels.admitted_rates(space.rows, space.images, space.volumes, self.admitted))
+        rates = VolumeRateRows(*kernels.admitted_rates(space.rows, space.images, space.volumes, self.admitted))
         missed = space.volumes / space.volumes.sum(), kernels.projected(self.admitted, self.unbalanced)
         still = np.zeros_like(self.walls)
         moved = [drive(still, unit) for unit in np.eye(len(images))]
@@ -247,7 +248,7 @@ class GalerkinEquations:
         riders = self.space.riders
         return rates if riders is None else rates + riders.rates(field) @ images
 
-    def _ridden(self, riders: Riders, operator: Apply) -> Apply:
+    def _ridden(self, riders: FloatingModes, operator: Apply) -> Apply:
         """An operator on velocities `(n, 3)` that walls admit, with those of plates that float and of their images.
 
         The forces on images that a motion of a plate makes have a power in the others, and on the particles.
@@ -266,7 +267,7 @@ class GalerkinEquations:
 
         return ridden
 
-    def _admitted_load(self, riders: Riders, force: Floats, on_images: Floats) -> Floats:
+    def _admitted_load(self, riders: FloatingModes, force: Floats, on_images: Floats) -> Floats:
         """Forces `(n, 3)` that walls admit; on plates that float by these, and by more `(k,)` on images and plates."""
         on_plates = np.tensordot(riders.fields, force, 2) + on_images
         return kernels.projected(self.admitted, force) + np.tensordot(on_plates, riders.momenta, 1)

@@ -8,7 +8,7 @@ number of threads.
 import numpy as np
 from numba import njit, prange
 
-from reflowshock.particles.ispg.mls import factor_spd, substitute
+from reflowshock.particles.ispg.stencils import factor_spd, substitute
 
 # Support radius in spacings; but the 16th neighbour lies within 1 / 1.2 of it: four must not lie in a plane.
 SUPPORT, FEWEST, WIDER = 2.0, 16, 1.2

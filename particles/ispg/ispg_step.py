@@ -22,26 +22,25 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.surface_measure import area_stiffness
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
 from reflowshock.particles.discretisation.lagged_cholesky import LaggedCholesky
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
-from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
-from reflowshock.particles.ispg.galerkin_equations import Flow, GalerkinEquations, admitted_stiffness
-from reflowshock.particles.ispg.ledger import Ledger, LostEnergy, StepAction, StepEnd
+from reflowshock.particles.ispg.energy_budget import EnergyBudget, EnergyLosses, StepEnd, StepSolution
+from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations, LiquidProperties, admitted_stiffness
+from reflowshock.particles.ispg.galerkin_space import AT_REST, GalerkinSpace
+from reflowshock.particles.ispg.moving_plates import FloatingModes, PlateHistory
 from reflowshock.particles.ispg.nodal_volumes import wall_shares
-from reflowshock.particles.ispg.normal_pull import has_friction, kept_share, normal_pull
-from reflowshock.particles.ispg.past import GalerkinPast, Prediction, centre, evening_passes
+from reflowshock.particles.ispg.normal_forces import has_friction, normal_pull, tangential_share
 from reflowshock.particles.ispg.rigid_motions import (
     TURN,
-    PlateSteps,
-    Riders,
     admitted_motions,
-    edges_turn,
+    edges_are_coaxial,
     held,
     orthonormal,
     rigid_momenta,
     rigid_motions,
     wall_velocities,
 )
+from reflowshock.particles.ispg.state import GalerkinState, Prediction, centre, smoothing_passes
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass, NavierSlip, NoSlip, Viscosity
@@ -71,64 +70,64 @@ class IspgStep:
     """The Galerkin scheme with memory of the last step.
 
     Attributes:
-        past: what the last step left, None before the first.
+        state: what the last step left, None before the first.
         first_energy: of the forces and the motion before the first step [J].
         factors: of the pressure equation.
     """
 
-    past: GalerkinPast | None = None
+    state: GalerkinState | None = None
     first_energy: float = 0.0
     factors: LaggedCholesky = field(default_factory=LaggedCholesky)
 
     @property
     def traits(self) -> SolverTraits:
         """It does not descend: the energy that falls is one of the surface and of the velocities."""
-        evening = 1.0 if self.past is None else self.past.evening
+        evening = 1.0 if self.state is None else self.state.evening
         return SolverTraits(SUPPORT, evening, FLIP_WORTH)
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedIspgStep":
         """Carry the velocity to where the particles are now; without inertia it is zero."""
         projections = physics.projections(body)
-        if self.past is None:
+        if self.state is None:
             self.first_energy = physics.energy(body)
-            self.past = GalerkinPast.start(body, self.first_energy)
+            self.state = GalerkinState.start(body, self.first_energy)
         elif not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
-            self.past = GalerkinPast.start(body, physics.energy(body), self.past.losses)
+            self.state = GalerkinState.start(body, physics.energy(body), self.state.losses)
         admitted = admitted_motions(body.points, projections)
-        if self.past.kinetic is not None:
-            self.past = self.past.carried_on(body, physics, projections, admitted[:3])
-        return PreparedIspgStep(self, body, physics, self.past, physics.energy(body), projections, admitted)
+        if self.state.kinetic is not None:
+            self.state = self.state.carried_on(body, physics, projections, admitted[:3])
+        return PreparedIspgStep(self, body, physics, self.state, physics.energy(body), projections, admitted)
 
     @property
     def mass(self) -> sparse.csr_matrix:
         """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
-        if self.past is None:
+        if self.state is None:
             raise ValueError("the first step gives the particles their volumes")
-        return sparse.diags(self.past.volumes, format="csr")
+        return sparse.diags(self.state.volumes, format="csr")
 
     def stop(self, body: Body) -> None:
         """Bring the body to rest."""
-        body.velocity, self.past = np.zeros_like(body.velocity), None
+        body.velocity, self.state = np.zeros_like(body.velocity), None
 
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
-        past = self.past
-        kept = past and fields_of(past) | {
-            "history": fields_of(past.history),
-            "losses": fields_of(past.losses),
-            "plates": {str(wall): moved for wall, moved in past.plates.items()},
+        state = self.state
+        kept = state and fields_of(state) | {
+            "history": fields_of(state.history),
+            "losses": fields_of(state.losses),
+            "plates": {str(wall): moved for wall, moved in state.plates.items()},
         }
-        return {"past": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
+        return {"state": kept, "first_energy": self.first_energy, "factors": self.factors.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
-        past = saved["past"]
-        if past:
-            history, losses = OneLeg(**past["history"]), LostEnergy(**past["losses"])
-            plates = {int(wall): moved for wall, moved in past["plates"].items()}
-            past = GalerkinPast(**{**past, "history": history, "losses": losses, "plates": plates})
-        self.past, self.first_energy = past, saved["first_energy"]
+        state = saved["state"]
+        if state:
+            history, losses = OneLeg(**state["history"]), EnergyLosses(**state["losses"])
+            plates = {int(wall): moved for wall, moved in state["plates"].items()}
+            state = GalerkinState(**{**state, "history": history, "losses": losses, "plates": plates})
+        self.state, self.first_energy = state, saved["first_energy"]
         self.factors.restore(saved["factors"])
 
 
@@ -140,7 +139,7 @@ class PreparedIspgStep:
         solver: remembers the step.
         body: the liquid body.
         physics: what acts on it.
-        past: of the particles where they are now.
+        state: of the particles where they are now.
         energy: of the forces there [J].
         projections: `(n, 3, 3)` of velocities onto those that walls admit.
         admitted: `(6,)` which rigid motions walls admit.
@@ -149,7 +148,7 @@ class PreparedIspgStep:
     solver: IspgStep
     body: Body
     physics: Physics
-    past: GalerkinPast
+    state: GalerkinState
     energy: float
     projections: Floats
     admitted: NDArray[np.bool_]
@@ -162,7 +161,7 @@ class PreparedIspgStep:
         Raises:
             SolveFailed: a linear solve failed.
             DegenerateStencil: a particle has too few neighbours.
-            NoVolumes: the particles do not fill the body.
+            NoNodalVolumes: the particles do not fill the body.
         """
         rubbing, releases = [line for line in self.physics.lines if isinstance(line, RubbingLine)], True
         while True:
@@ -177,7 +176,7 @@ class PreparedIspgStep:
         return replace(
             self,
             body=replace(self.body, velocity=projected(projections, self.body.velocity)),
-            past=self.past.stopped(self.body, self.physics, projections),
+            state=self.state.stopped(self.body, self.physics, projections),
             projections=projections,
             admitted=admitted_motions(self.body.points, projections),
         )
@@ -194,19 +193,19 @@ class PreparedIspgStep:
             if any(changed):
                 return None
         end = self._end(start, acting, time_step)
-        kinetic = start.equations.kinetic(start.past.velocity)
-        if start.past.kinetic is None and kinetic:  # it starts in motion
+        kinetic = start.equations.kinetic(start.state.velocity)
+        if start.state.kinetic is None and kinetic:  # it starts in motion
             self.solver.first_energy = self.energy + kinetic
-        ledger = Ledger(self.physics, start.equations, start.body, start.given, acting, end)
-        losses, before = start.past.carried_losses(kinetic, self.energy), (start.past.velocity, self.energy)
+        ledger = EnergyBudget(self.physics, start.equations, start.body, start.given, acting, end)
+        losses, before = start.state.carried_losses(kinetic, self.energy), (start.state.velocity, self.energy)
         losses, force = ledger.booked(losses, before, rubbing, self.tension)
-        self.solver.past = self._left(start, acting, end, losses)
+        self.solver.state = self._left(start, acting, end, losses)
         return self._motion(start.equations, acting, end, force)
 
     def _predicted(self, time_step: float) -> Prediction:
         """Where the equations of a step [s] hold."""
-        body, past = self.body, self.past
-        base = past.history.base(body.points, past.velocity, time_step)
+        body, state = self.body, self.state
+        base = state.history.base(body.points, state.velocity, time_step)
         pace = self._pace(base)
         given = self._plates.given(self.physics.motions, body, time_step)
         guessed = self._plates.guessed(self.physics.motions, pace)
@@ -215,46 +214,46 @@ class PreparedIspgStep:
         predicted = body.placed(base.points + base.time_step * guess, ways)
         equations = self.equations(predicted, base.time_step, given)
         motions = rigid_motions(predicted.points)
-        if past.kinetic is not None:
-            past = past.with_momenta(equations, motions, self.admitted)
-            base = past.history.base(body.points, past.velocity, time_step)
-        return Prediction(past, base, given, guessed, guess, predicted, equations, motions)
+        if state.kinetic is not None:
+            state = state.with_momenta(equations, motions, self.admitted)
+            base = state.history.base(body.points, state.velocity, time_step)
+        return Prediction(state, base, given, guessed, guess, predicted, equations, motions)
 
-    def _acting(self, start: Prediction, end: tuple[float, float], of_walls: bool) -> StepAction:
+    def _acting(self, start: Prediction, end: tuple[float, float], of_walls: bool) -> StepSolution:
         """What acts in a step [s] that ends at a volume [m^3], both in `end`, and whether forces of walls are asked."""
-        equations, past, before = start.equations, start.past, start.base.velocity
+        equations, state, before = start.equations, start.state, start.base.velocity
         force = self._surface_force(start.body, equations) + start.base.time_step * equations.tension(start.guess)
-        expected = equations.momentum(past.acceleration)
+        expected = equations.momentum(state.acceleration)
         rubbed = equations.rubbed(before, expected)
-        load = equations.momentum(rubbed) / start.base.time_step + force + equations.push(past.pressure) - expected
+        load = equations.momentum(rubbed) / start.base.time_step + force + equations.push(state.pressure) - expected
         drive = equations.driver()
-        reached = equations.given + drive(equations.beyond_given(load), equations.on_plates(past.pressure))
+        reached = equations.given + drive(equations.beyond_given(load), equations.on_plates(state.pressure))
         rate = self._rate_of_volume(start.guess, start.body, start.given | start.guessed, end)
         change = equations.project(reached, rate, self.solver.factors, drive)
         mean = reached + drive(equations.push(change), equations.on_images(change))
-        pressure = past.pressure + change
+        pressure = state.pressure + change
         walls = equations.reaction((before, rubbed, mean), force, pressure) if of_walls else None
-        return StepAction(force, before, rubbed, mean, pressure, walls)
+        return StepSolution(force, before, rubbed, mean, pressure, walls)
 
-    def _end(self, start: Prediction, acting: StepAction, time_step: float) -> StepEnd:
+    def _end(self, start: Prediction, acting: StepSolution, time_step: float) -> StepEnd:
         """Where the body and its plates are after a step [s], and how fast."""
-        body, past = self.body, start.past
+        body, state = self.body, start.state
         twists = start.given | start.equations.twists(acting.mean, start.guessed)
         plates = self._plates.next(twists, time_step)
-        history = past.history.followed_by(past.velocity, acting.mean, time_step)
-        velocity = past.velocity + history.velocity_change
+        history = state.history.followed_by(state.velocity, acting.mean, time_step)
+        velocity = state.velocity + history.velocity_change
         moved = body.placed(body.points + history.displacement, {w: plate.displacement for w, plate in plates.items()})
         history = replace(history, displacement=moved.points - body.points)
         return StepEnd(moved, velocity, self.physics.energy(moved), history, plates, twists)
 
-    def _left(self, start: Prediction, acting: StepAction, end: StepEnd, losses: LostEnergy) -> GalerkinPast:
+    def _left(self, start: Prediction, acting: StepSolution, end: StepEnd, losses: EnergyLosses) -> GalerkinState:
         """What the step leaves to the next one."""
-        equations, past, body = start.equations, start.past, self.body
+        equations, state, body = start.equations, start.state, self.body
         momenta = rigid_momenta(start.motions, equations.masses, end.velocity)
-        if past.kinetic is not None and not self.admitted[TURN] and edges_turn(body, self.physics):
-            momenta[TURN] = past.momenta[TURN]
+        if state.kinetic is not None and not self.admitted[TURN] and edges_are_coaxial(body, self.physics):
+            momenta[TURN] = state.momenta[TURN]
         gradient, time_step = equations.space.gradient(end.velocity), end.history.time_step
-        return GalerkinPast(
+        return GalerkinState(
             points=end.body.points,
             centre=centre(body) + equations.masses @ end.history.displacement / equations.masses.sum(),
             velocity=end.velocity,
@@ -262,17 +261,17 @@ class PreparedIspgStep:
             kinetic=equations.kinetic(end.velocity),
             potential=end.potential,
             pressure=acting.pressure,
-            acceleration=past.acceleration + (acting.mean - acting.rubbed) / equations.time_step,
+            acceleration=state.acceleration + (acting.mean - acting.rubbed) / equations.time_step,
             volumes=equations.space.carried,
-            evening=evening_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
+            evening=smoothing_passes(gradient, equations.fluid.smoothing / SMOOTHING, time_step),
             momenta=momenta,
-            momenta_change=np.zeros(6) if past.kinetic is None else momenta - past.momenta,
+            momenta_change=np.zeros(6) if state.kinetic is None else momenta - state.momenta,
             history=end.history,
             losses=losses,
             plates=self._plates.kept(end.plates),
         )
 
-    def _motion(self, equations: GalerkinEquations, acting: StepAction, end: StepEnd, pull: float) -> Motion:
+    def _motion(self, equations: GalerkinEquations, acting: StepSolution, end: StepEnd, pull: float) -> Motion:
         """The motion that the step asks of the body; plates are pulled by a force [N]."""
         slides = None if has_friction(self.physics) else equations.slide(end.velocity, SLIDING * abs(self.energy))
         return Motion(
@@ -290,22 +289,22 @@ class PreparedIspgStep:
         self, guess: Floats, predicted: Body, twists: Mapping[int, Floats], end: tuple[float, float]
     ) -> float:
         """Rate [m^3/s] with which a step [s] ends at a volume [m^3], both in `end`; slopes are those predicted."""
-        (time_step, volume), past = end, self.past
-        way = past.history.followed_by(past.velocity, guess, time_step).displacement
+        (time_step, volume), state = end, self.state
+        way = state.history.followed_by(state.velocity, guess, time_step).displacement
         ways = {wall: plate.displacement for wall, plate in self._plates.next(twists, time_step).items()}
         enclosed = self.body.placed(self.body.points + way, ways).volume()[0]
-        return (volume - enclosed) / past.history.leg(time_step) + float((predicted.volume()[1] * guess).sum())
+        return (volume - enclosed) / state.history.leg(time_step) + float((predicted.volume()[1] * guess).sum())
 
     def _surface_force(self, body: Body, equations: GalerkinEquations) -> Floats:
         """Forces of the surface of a body at other positions, `(n, 3)` [N]."""
         if has_friction(self.physics):
-            kept = kept_share(self.past.gradient, equations.fluid.smoothing / SMOOTHING)
+            kept = tangential_share(self.state.gradient, equations.fluid.smoothing / SMOOTHING)
             return normal_pull(body, self.physics, equations.masses, kept)
         return self.physics.force(body)
 
     @property
-    def _plates(self) -> PlateSteps:
-        return PlateSteps(self.past.plates, self.past.history.time_step)
+    def _plates(self) -> PlateHistory:
+        return PlateHistory(self.state.plates, self.state.history.time_step)
 
     def _pace(self, base: Base) -> float:
         """Share of the last velocity that the prediction has: with more a particle would go too far in a step."""
@@ -315,7 +314,7 @@ class PreparedIspgStep:
 
     def _before(self) -> Floats:
         """Velocity of a part of a step ago `(n, 3)` [m/s]."""
-        moving = self.body.velocity - GUESS_BEFORE * self.past.history.velocity_change
+        moving = self.body.velocity - GUESS_BEFORE * self.state.history.velocity_change
         return moving if self.physics.momenta else np.zeros_like(moving)
 
     def _guess(self, pace: float, twists: Mapping[int, Floats]) -> Floats:
@@ -325,12 +324,12 @@ class PreparedIspgStep:
             return velocity
         return projected(self.projections, velocity) + held(self.projections, wall_velocities(self.body, twists))
 
-    def fluid(self, spacing: float) -> Flow:
+    def fluid(self, spacing: float) -> LiquidProperties:
         """What the liquid is made of, of particles at a spacing [m]."""
         parts = self.physics.operators
         density = sum(part.density for part in parts if isinstance(part, Mass))
         viscosity = sum(part.coefficient for part in parts if isinstance(part, Viscosity))
-        return Flow(density, viscosity, SMOOTHING * float(np.sqrt(self.tension / (density * spacing**3))))
+        return LiquidProperties(density, viscosity, SMOOTHING * float(np.sqrt(self.tension / (density * spacing**3))))
 
     @property
     def tension(self) -> float:
@@ -343,9 +342,9 @@ class PreparedIspgStep:
         friction = sum(part.coefficient for part in self.physics.frictions if isinstance(part, NavierSlip))
         clings = any(isinstance(hold, NoSlip) for hold in self.physics.holds)
         slip = fluid.viscosity / friction if friction else np.inf
-        space, spacing = Galerkin.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
+        space, spacing = GalerkinSpace.of(body, 0.0 if clings else slip, twists), body.cloud.spacing
         masses, motions = fluid.density * space.carried, self.physics.motions
-        space = replace(space, riders=Riders.of(motions, body, self.projections, masses, space.drift_of))
+        space = replace(space, riders=FloatingModes.of(motions, body, self.projections, masses, space.drift_of))
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
         stiffness = self.tension * area_stiffness(body.points, body.triangles, body.cloud.surface_count)
         free = admitted_stiffness(stiffness, self.projections)
@@ -360,5 +359,5 @@ class PreparedIspgStep:
             drag=friction * wall_shares(body, space.volumes) if friction else np.zeros(len(space.volumes)),
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             time_step=time_step,
-            inertia=StiffMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), 3 * len(masses)), time_step),
+            inertia=EffectiveMass.of(np.repeat(masses, 3), free, rigid.reshape(len(rigid), 3 * len(masses)), time_step),
         )

@@ -18,7 +18,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.core.symmetry import share
-from reflowshock.particles.ispg.mls import factor_spd, substitute
+from reflowshock.particles.ispg.stencils import factor_spd, substitute
 
 Moments: TypeAlias = tuple[float, Floats, Floats]
 PAIRS = np.triu_indices(3)
@@ -30,7 +30,7 @@ TOLERANCE = 1e-12
 SOFTNESS = 0.03
 
 
-class NoVolumes(RuntimeError):
+class NoNodalVolumes(RuntimeError):
     """No positive volumes of the particles have the centre of the body."""
 
 
@@ -97,7 +97,7 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
         moments: of the body.
 
     Raises:
-        NoVolumes: there are none.
+        NoNodalVolumes: there are none.
     """
     # Around a particle of the free surface only half of its surroundings are liquid.
     on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
@@ -108,7 +108,7 @@ def with_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
     """The volumes `(n,)` [m^3] closest to some cells `(n,)`, in any unit, that have the moments of the body.
 
     Raises:
-        NoVolumes: there are none.
+        NoNodalVolumes: there are none.
     """
     volume, first, second = moments
     centre, length = first / volume, np.cbrt(volume)
@@ -144,13 +144,13 @@ def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floa
         softness: `(k,)` of them [m^3], 0 where they are exact.
 
     Raises:
-        NoVolumes: there are none.
+        NoNodalVolumes: there are none.
     """
     volume = wanted[0]
     found, missing = _fitted(powers, found, wanted, softness)
     if missing < TOLERANCE * volume:
         return found
-    raise NoVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+    raise NoNodalVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
 
 
 @njit(cache=True)

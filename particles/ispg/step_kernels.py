@@ -82,7 +82,7 @@ def friction_operator(rows, images, resisted, field):
 
 @njit(cache=True)
 def admitted_rates(rows, images, volumes, admitted):
-    """Rows of rates of volume by particle, as `PairRates`, of velocities that projections `(n, 3, 3)` admit.
+    """Rows of rates of volume by particle, as `VolumeRateRows`, of velocities that projections `(n, 3, 3)` admit.
 
     Without what is unbalanced. A particle and its images make one entry.
     """

@@ -44,6 +44,9 @@ class Droplet(SphFlow):
     wall holds the contact line; where one of them is not given it is the contact angle.
     """
 
+    dimension = 3
+    has_free_surface = True
+
     diameter: Annotated[float, Quantity("um")] = Field(gt=0)
     surface_tension: Annotated[float, Quantity("N/m")] = Field(gt=0)
     speed: Annotated[float | None, Quantity("m/s")] = Field(None, gt=0)
@@ -64,6 +67,11 @@ class Droplet(SphFlow):
         if self.weber is not None:
             return sqrt(self.weber * self.surface_tension / (self.density * self.diameter))
         return self.speed or 0.0
+
+    @property
+    def tension(self) -> float:
+        """Surface tension [N/m]."""
+        return self.surface_tension
 
     @property
     def liquid_viscosity(self) -> float:

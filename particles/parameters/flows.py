@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from math import pi, sqrt
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -59,7 +59,15 @@ class SphEffects(Parameters):
 
 
 class SphFlow(Parameters):
-    """What all flows have: a liquid, and how it is computed; its viscosity may depend on the rate of shear."""
+    """Base of all flows: a liquid, and how it is computed; its viscosity may depend on the rate of shear.
+
+    Attributes:
+        dimension: Dimension of the flow, 2 or 3.
+        has_free_surface: Whether part of the surface of the liquid is free.
+    """
+
+    dimension: ClassVar[int]
+    has_free_surface: ClassVar[bool] = False
 
     density: Annotated[float, Quantity("kg/m^3")] = Field(1000.0, gt=0)
     viscosity: Annotated[float, Quantity("Pa*s")] = Field(1.0e-3, gt=0)
@@ -103,6 +111,11 @@ class SphFlow(Parameters):
         return self.density * self.fastest * self.length / self.liquid_viscosity
 
     @property
+    def tension(self) -> float:
+        """Surface tension that acts on the liquid [N/m]; 0 where none does."""
+        return 0.0
+
+    @property
     def liquid_viscosity(self) -> float:
         """Of the liquid, however the case says it [Pa s]; where it depends on the rate of shear, that in its law."""
         return self.viscosity
@@ -114,9 +127,18 @@ class SphFlow(Parameters):
             return self.liquid_viscosity
         return self.rheology.largest(self.liquid_viscosity, self.fastest / self.spacing)
 
+    def expected_time_step(self, is_viscous: bool) -> float:
+        """Return the time step [s] that the flow is expected to take, with or without viscosity."""
+        length, viscosity = self.numerics.smoothing_length * self.spacing, 0.0
+        if is_viscous:
+            viscosity = self.largest_viscosity * (CENTRAL if self.has_free_surface else 1.0)
+        return largest_time_step(length, self.sound + self.fastest, self.density, viscosity, self.tension)
+
 
 class PlaneFlow(SphFlow):
     """A flow in a plane, that particles stand across."""
+
+    dimension = 2
 
     numerics: SphNumerics = SphNumerics()
 
@@ -132,6 +154,8 @@ class DamBreak(PlaneFlow):
     Walls are smooth: liquid slides along them. Pressures are told over rho g H, times in sqrt(H / g), H being the
     column's height.
     """
+
+    has_free_surface = True
 
     height: Annotated[float, Quantity("m")] = Field(gt=0)
     width: Annotated[float, Quantity("m")] = Field(gt=0)

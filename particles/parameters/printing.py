@@ -56,6 +56,9 @@ class Printing(SphFlow):
     cools down to the plate before the next one lands.
     """
 
+    dimension = 3
+    has_free_surface = True
+
     drop_volume: Annotated[float, Quantity("pL")] = Field(gt=0)
     surface_tension: Annotated[float, Quantity("N/m")] = Field(gt=0)
     speed: Annotated[float, Quantity("m/s")] = Field(gt=0)
@@ -72,6 +75,11 @@ class Printing(SphFlow):
     freezing: Freezing | None = None
     effects: PrintingEffects = PrintingEffects()
     numerics: PrintingNumerics = PrintingNumerics()
+
+    @property
+    def tension(self) -> float:
+        """Surface tension of the ink [N/m]."""
+        return self.surface_tension
 
     @property
     def light(self) -> Cure:

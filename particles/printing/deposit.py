@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.particles.scenes.droplet import liquid_of, start_shape
 from reflowshock.particles.sph import flow
@@ -25,7 +26,7 @@ from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
 from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import mirrored
-from reflowshock.particles.surface.level_set import Grid, LevelSet, within_band
+from reflowshock.particles.surface.level_set import LevelSet, within_band
 
 LIQUID, HELD, SOLID = 0, 1, 2
 # In spacings: how far the surface of a new drop is from particles below it.
@@ -278,14 +279,9 @@ class Deposit:
 def join(ground: LevelSet, body: CuredBody) -> None:
     """Add a solid body to a level set, with its image behind the plate."""
     points, triangles = mirrored(body.points, body.triangles)
-    grid, spacing = ground.grid, ground.grid.spacing
-    low = np.floor((points.min(axis=0) - grid.origin) / spacing).astype(int) - MARGIN
-    high = np.ceil((points.max(axis=0) - grid.origin) / spacing).astype(int) + MARGIN + 1
-    low, high = np.maximum(low, 0), np.minimum(high, grid.counts)
-    box = tuple(slice(first, last) for first, last in zip(low, high, strict=True))
-    x, y, z = (int(count) for count in high - low)
-    own = within_band(points, triangles, Grid(grid.origin + spacing * low, spacing, (x, y, z)), MARGIN * spacing)
-    ground.values[box] = np.minimum(ground.values[box], own.values)
+    part, nodes = ground.grid.part_around(points, MARGIN)
+    distance = within_band(points, triangles, part, MARGIN * part.spacing)
+    ground.values[nodes] = np.minimum(ground.values[nodes], distance.values)
 
 
 def nothing_of(scene: Printing, spacing: float) -> LevelSet:
@@ -295,4 +291,4 @@ def nothing_of(scene: Printing, spacing: float) -> LevelSet:
     top = (scene.layers + 1.0) * scene.length
     corners = np.array([[*(places.min(axis=0) - aside), 0.0], [*(places.max(axis=0) + aside), top]])
     grid = Grid.around(corners, NODES * spacing)
-    return LevelSet(grid, np.full(grid.counts, MARGIN * NODES * spacing))
+    return LevelSet(grid, np.full(grid.shape, MARGIN * NODES * spacing))

@@ -25,7 +25,7 @@ from reflowshock.particles.scenes.metrics import reference_meridian
 from reflowshock.particles.scenes.moving_joint import travel
 from reflowshock.particles.scenes.reflow import joint_flow, joint_shape, parted, solve_joint, start_joint, stop_rule
 from reflowshock.particles.steps.flow import LiquidFlow
-from reflowshock.particles.steps.rest import RECORDS, NoRest, Run, StopRule, run_to_rest
+from reflowshock.particles.steps.rest import RECORDS, NotAtRest, Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 
 STEP = 0.01  # of the gap
@@ -65,7 +65,7 @@ def carry_joint(
         progress: called with the fraction done.
 
     Raises:
-        NoRest: no rest within `solder.numerics.max_steps`, or before the process ends.
+        NotAtRest: no rest within `solder.numerics.max_steps`, or before the process ends.
         SolveFailed: a linear solve failed.
 
     An open joint, one with too little solder included, does nothing to its pads.
@@ -88,7 +88,7 @@ def carry_joint(
     if run.ruptured:
         return OPEN
     if not run.at_rest:
-        raise NoRest(
+        raise NotAtRest(
             f"the process ends before the joint is at rest, after {solder.process_time:.3g} s (solder.process_time) "
             f"and {len(run.records)} steps; a slower process helps"
         )

@@ -55,7 +55,7 @@ def drop_to_rest(
         checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises:
-        NoRest: no rest within `solder.numerics.max_steps`.
+        NotAtRest: no rest within `solder.numerics.max_steps`.
         SolveFailed: a linear solve failed.
     """
     effects = decide_drop(solder, drop.is_free)

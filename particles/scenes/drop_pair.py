@@ -49,7 +49,7 @@ def pair_to_rest(
         checkpoint: where the run continues from, to the last bit, and leaves its state.
 
     Raises:
-        NoRest: a drop is not at rest within `solder.numerics.max_steps`.
+        NotAtRest: a drop is not at rest within `solder.numerics.max_steps`.
         SolveFailed: a linear solve failed.
     """
     effects = decide_drop(solder, scene.is_free)

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.checkpoint import Checkpoint
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.parameters.droplets import Droplet, cap
 from reflowshock.particles.parameters.flow_effects import decide_flow
 from reflowshock.particles.reference.impact_spread import of_measured, wildeman
@@ -22,7 +23,7 @@ from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.surface.breakup import largest_part
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface, relax
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax
 from reflowshock.particles.surface.profile import width
 
 COLUMNS = (

@@ -14,7 +14,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.scenes.rebuild import collapsing, hand_over, overlap, rebuild, touch
 from reflowshock.particles.steps.flow import LiquidFlow, StepRecord
-from reflowshock.particles.steps.rest import RECORDS, NoRest, StopRule, fraction_done, is_calm, is_lasting
+from reflowshock.particles.steps.rest import RECORDS, NotAtRest, StopRule, fraction_done, is_calm, is_lasting
 from reflowshock.particles.steps.shape import Snapshot
 
 LARGEST_OVERLAP = 0.5  # spacings
@@ -105,7 +105,7 @@ def run_drops(
 
     Raises:
         OverlappingDrops: drops overlap at the start: they cannot both have their volume.
-        NoRest: a drop took too many steps.
+        NotAtRest: a drop took too many steps.
         CannotRebuild: drops touch, or one collapses, between walls.
     """
     saved = checkpoint.read(RECORDS) if checkpoint else None
@@ -113,7 +113,8 @@ def run_drops(
     while moving := [drop for drop in drops if drop.moves(rule)]:
         drop = min(moving, key=lambda candidate: candidate.flow.time)
         if len(drop.records) >= rule.max_steps:
-            raise NoRest(f"drop {drop.origins} is not at rest after {rule.max_steps} steps (solder.numerics.max_steps)")
+            steps = f"{rule.max_steps} steps (solder.numerics.max_steps)"
+            raise NotAtRest(f"drop {drop.origins} is not at rest after {steps}")
         drop.step(rule)
         if drop.moves(rule) and collapsing(drop.flow.body):
             drop.flow = _restarted(start, drop)

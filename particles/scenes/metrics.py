@@ -12,8 +12,8 @@ from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeome
 from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
 from reflowshock.particles.core.windings import winding_numbers
+from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.ledger import total_losses
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import Force, plate_wrench
@@ -292,15 +292,15 @@ def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
 
     And how fast a body slides, which on smooth walls it may do for ever, as it is.
     """
-    moved = [(flow, flow.solver.past, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
-    known = [(flow, past, first) for flow, past, first in moved if past is not None]
+    moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
+    known = [(flow, state, first) for flow, state, first in moved if state is not None]
     if not known:
         return {}
     first = sum(energy for _, _, energy in known)
-    now = sum(flow.physics.energy(flow.body) + (past.kinetic or 0.0) for flow, past, _ in known)
-    lost = total_losses([past.losses for _, past, _ in known])
+    now = sum(flow.physics.energy(flow.body) + (state.kinetic or 0.0) for flow, state, _ in known)
+    lost = total_losses([state.losses for _, state, _ in known])
     metrics: Metrics = {f"{entry.name}_loss": (getattr(lost, entry.name) / first, "") for entry in fields(lost)}
-    slides = max(float(np.linalg.norm(past.volumes @ past.velocity)) / past.volumes.sum() for _, past, _ in known)
+    slides = max(float(np.linalg.norm(state.volumes @ state.velocity)) / state.volumes.sum() for _, state, _ in known)
     return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, ""), "slide_speed": (slides, "m/s")}
 
 

@@ -14,11 +14,12 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg.adaptation import restore_moments
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.motion_transfer import MovingBody, transfer_motion
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.rebuilt import Moving, take_over
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -26,7 +27,7 @@ from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, numbered_on, together
 from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, lidded
-from reflowshock.particles.surface.level_set import Grid, LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CONTACT_SPACINGS = 1.0
@@ -119,15 +120,15 @@ def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
     before, after = _moving(old), _moving(new)
     if len(before) == len(old) and len(after) == len(new):
         _keep_centre(before, after)
-        take_over(after, before)
+        transfer_motion(after, before)
 
 
-def _moving(flows: Sequence[LiquidFlow]) -> list[Moving]:
+def _moving(flows: Sequence[LiquidFlow]) -> list[MovingBody]:
     """Those that the scheme ispg moves."""
-    return [Moving(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
+    return [MovingBody(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
 
 
-def _keep_centre(old: Sequence[Moving], new: Sequence[Moving]) -> None:
+def _keep_centre(old: Sequence[MovingBody], new: Sequence[MovingBody]) -> None:
     """Give new bodies the centre of volume that the old ones had together; each moves by as much."""
     before, after = ([body_moments(part.body) for part in parts] for parts in (old, new))
     missing = np.sum([first for _, first, _ in before], axis=0) - np.sum([first for _, first, _ in after], axis=0)

@@ -19,8 +19,8 @@ from reflowshock.particles.core.cloud import Cloud, TooLittleSolder, box_cloud, 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
+from reflowshock.particles.gripc.gripc_step import GripcStep
 from reflowshock.particles.ispg.adaptation import Adaptation
-from reflowshock.particles.ispg.gripc_step import GripcStep
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
@@ -66,7 +66,7 @@ def solve_joint(
 
     Raises:
         TooLittleSolder: no cone of the volume spans the gap, though a drop would reach the other disc.
-        NoRest: no rest within `solder.numerics.max_steps`.
+        NotAtRest: no rest within `solder.numerics.max_steps`.
         SolveFailed: a linear solve failed.
     """
     try:

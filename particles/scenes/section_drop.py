@@ -14,8 +14,8 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, SurfaceTension
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes.reflow import build_physics
-from reflowshock.particles.section.chain import Chain
-from reflowshock.particles.section.forces import ChainTension, ChainWeight, ChainWetting
+from reflowshock.particles.section.forces import PolylineTension, PolylineWeight, PolylineWetting
+from reflowshock.particles.section.polyline import Polyline
 from reflowshock.particles.section.section import Section, block
 from reflowshock.particles.section.section_step import SectionFlow, SectionStep
 from reflowshock.particles.steps.time_step import TimeStep, largest_step
@@ -24,9 +24,9 @@ from reflowshock.particles.steps.time_step import TimeStep, largest_step
 def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> SectionFlow:
     """Set up the flow of a drop's section from rest, with only the effects that are on."""
     if drop.section == "plane":
-        chain, width = Chain.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
+        chain, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
     else:
-        chain, width = Chain.meridian(), drop.edge / np.sqrt(np.pi)
+        chain, width = Polyline.meridian(), drop.edge / np.sqrt(np.pi)
     body = Section.filled(block(chain, width, drop.edge, drop.count), chain)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
@@ -36,12 +36,12 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
 def section_physics(solder: Solder, effects: dict[str, bool]) -> Physics:
     """What acts on a section of a drop: the effects that are on, those of its surface by its chain."""
     physics = build_physics(solder, effects | {"wall_adhesion": False}, ())
-    wetting = (ChainWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
+    wetting = (PolylineWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
 
     forces = [part for part in physics.forces if not isinstance(part, SurfaceTension | Gravity)]
-    forces += [ChainTension(part.coefficient) for part in physics.forces if isinstance(part, SurfaceTension)]
-    forces += [ChainWeight(part.weight) for part in physics.forces if isinstance(part, Gravity)]
+    forces += [PolylineTension(part.coefficient) for part in physics.forces if isinstance(part, SurfaceTension)]
+    forces += [PolylineWeight(part.weight) for part in physics.forces if isinstance(part, Gravity)]
     operators = [
-        ChainTension(part.coefficient) if isinstance(part, SurfaceTension) else part for part in physics.operators
+        PolylineTension(part.coefficient) if isinstance(part, SurfaceTension) else part for part in physics.operators
     ]
     return replace(physics, forces=(*forces, *wetting), operators=tuple(operators))

@@ -11,7 +11,7 @@ from reflowshock.particles.physics.forces import Gravity, SurfaceTension
 from reflowshock.particles.section.section import as_section
 
 
-class ChainTension(SurfaceTension):
+class PolylineTension(SurfaceTension):
     """Energy gamma A of the surface."""
 
     def energy(self, body: Body) -> float:
@@ -30,7 +30,7 @@ class ChainTension(SurfaceTension):
         return self.coefficient * section.chain.stiffness(section.line, len(section.points))
 
 
-class ChainWeight(Gravity):
+class PolylineWeight(Gravity):
     """Potential energy of the weight, zero at the height of the origin."""
 
     def energy(self, body: Body) -> float:
@@ -45,7 +45,7 @@ class ChainWeight(Gravity):
 
 
 @dataclass(frozen=True, slots=True)
-class ChainWetting:
+class PolylineWetting:
     """Energy -gamma cos(theta) A_wet of the wetted wall.
 
     Attributes:

@@ -12,7 +12,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.section.chain import Chain
+from reflowshock.particles.section.polyline import Polyline
 
 NO_TRIANGLES = np.zeros((0, 3), np.int32)
 NARROW = 1e-3  # [rad], or spacings
@@ -28,10 +28,10 @@ class Section(Body):
         chain: what the surface stands for.
     """
 
-    chain: Chain
+    chain: Polyline
 
     @classmethod
-    def filled(cls, cloud: Cloud, chain: Chain) -> "Section":
+    def filled(cls, cloud: Cloud, chain: Polyline) -> "Section":
         """Start at rest from a cloud."""
         count = len(cloud.points)
         still = (np.zeros((count, 3)), np.zeros(count), 0.0)
@@ -146,7 +146,7 @@ def sheets(depth: float) -> tuple[Floats, Floats]:
     return np.broadcast_to(np.eye(3), (2, 3, 3)), depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
 
 
-def block(chain: Chain, width: float, height: float, count: int) -> Cloud:
+def block(chain: Polyline, width: float, height: float, count: int) -> Cloud:
     """A lattice on the wall z = 0.
 
     Below the surface none lie on the axis, the first are half a spacing away: each particle has a pressure that keeps
@@ -177,7 +177,7 @@ def block(chain: Chain, width: float, height: float, count: int) -> Cloud:
     return Cloud(points, len(surface), NO_TRIANGLES, *walls, wall, height / last, axes)
 
 
-def disc(chain: Chain, radius: float, rings: int) -> Cloud:
+def disc(chain: Polyline, radius: float, rings: int) -> Cloud:
     """Circles about a particle at the origin, half circles of a meridian, as in `block`; no wall touches it.
 
     Args:

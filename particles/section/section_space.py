@@ -1,4 +1,4 @@
-"""Space of the Galerkin scheme in section: as `ispg/galerkin.py`, with matrices, and the strain of hoops about an axis.
+"""Space of the Galerkin scheme in section, as sparse matrices, with the hoop strain about an axis.
 
 Linear MLS in x and z, the wall and the axis mirrored. Around the axis a velocity v_x stretches hoops by N v_x / x; on
 the axis that is dv_x/dx.
@@ -13,9 +13,10 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import find_neighbours
-from reflowshock.particles.ispg.collocation import mirror
-from reflowshock.particles.ispg.galerkin import check_stencils, symmetry_planes
+from reflowshock.particles.ispg.galerkin_space import symmetry_planes
+from reflowshock.particles.ispg.ghosts import mirror
 from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
+from reflowshock.particles.ispg.stencils import check_stencils
 from reflowshock.particles.section.section import Section
 
 REACHES = (2.6, 3.4, 4.4)  # of the search for neighbours, in spacings
@@ -52,7 +53,7 @@ class SectionSpace:
 
         Raises:
             DegenerateStencil: a particle has too few neighbours, or they lie on a line.
-            NoVolumes: the particles do not fill the body.
+            NoNodalVolumes: the particles do not fill the body.
         """
         count, spacing = len(body.points), body.cloud.spacing
         least = np.full(count, SUPPORT * spacing)
@@ -114,13 +115,13 @@ class SectionSpace:
         return (self.slopes[0] @ field.ravel()).reshape(-1, 3, 3)
 
     def lost_power(self, fields: tuple[Floats, Floats], factors: Floats, _walls: Floats) -> tuple[float, float, float]:
-        """Power [W] that roughness, walls, which take none, and viscosity take, as `Galerkin.lost_power`."""
+        """Power [W] that roughness, walls, which take none, and viscosity take, as `GalerkinSpace.lost_power`."""
         (first, second), (before, after) = (map(act, fields) for act in (self.gradient, self.rough))
         stress = factors[:, 2, None, None] * (first + first.transpose(0, 2, 1))
         return float((factors[:, :1] * before * after).sum()), 0.0, float((stress * second).sum())
 
     def resistance(self, field: Floats, factors: Floats) -> Floats:
-        """Forces `(n, 3)` [N] that resist a velocity, as `Galerkin.resistance`."""
+        """Forces `(n, 3)` [N] that resist a velocity, as `GalerkinSpace.resistance`."""
         smoothing, drag, viscosity = factors.T
         rough, gradient = self.rough(field), self.gradient(field)
         friction = smoothing[:, None] * rough
@@ -231,7 +232,7 @@ def section_volumes(body: Section, density: Floats) -> Floats:
         density: `(n,)` of particles around each, walls mirrored, the free surface counted by `cell_share`.
 
     Raises:
-        NoVolumes: there are none.
+        NoNodalVolumes: there are none.
     """
     chain, volume = body.chain, body.volume()[0]
     areas = cell_share(body) ** 2 / density * np.where(body.cloud.wall >= 0, 0.5, 1.0)

@@ -16,23 +16,23 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.symmetry import on_plane
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
 from reflowshock.particles.discretisation.lagged_cholesky import Apply, Band, Tolerance, conjugate_gradients
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
-from reflowshock.particles.ispg.galerkin import AT_REST, Galerkin
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
     Drive,
     GalerkinEquations,
 )
+from reflowshock.particles.ispg.galerkin_space import AT_REST, GalerkinSpace
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
 from reflowshock.particles.ispg.rigid_motions import orthonormal, rigid_motions
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.section.chain import Chain
-from reflowshock.particles.section.forces import ChainTension
+from reflowshock.particles.section.forces import PolylineTension
+from reflowshock.particles.section.polyline import Polyline
 from reflowshock.particles.section.section import Section, as_section
 from reflowshock.particles.section.section_space import SectionSpace
-from reflowshock.particles.steps.descent import Evening, correct_volume
+from reflowshock.particles.steps.descent import MeshSmoothing, correct_volume
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.surface.profile import Profile, fit_areas
@@ -111,7 +111,7 @@ class PreparedSectionStep(PreparedIspgStep):
     def equations(self, body: Body, time_step: float, _twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
         """The equations of a section at other positions, for a time step [s]; its wall rests."""
         section, fluid = as_section(body), self.fluid(body.cloud.spacing)
-        tensions = [part for part in self.physics.operators if isinstance(part, ChainTension)]
+        tensions = [part for part in self.physics.operators if isinstance(part, PolylineTension)]
         space, basis = SectionSpace.of(section), admissible(body)
         masses = fluid.density * space.volumes
         rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
@@ -120,7 +120,7 @@ class PreparedSectionStep(PreparedIspgStep):
         free_stiffness = sparse.bsr_matrix(basis.T @ stiffness @ basis, blocksize=(1, 1))
         free = (basis.T @ np.repeat(masses, 3), free_stiffness, motions)
         return SectionEquations(
-            space=cast(Galerkin, space),  # what a step asks of either is the same
+            space=cast(GalerkinSpace, space),  # what a step asks of either is the same
             matrices=space,
             admitted=self.projections,
             fluid=fluid,
@@ -132,7 +132,7 @@ class PreparedSectionStep(PreparedIspgStep):
             unbalanced=body.volume()[1] - space.divergence_load(space.volumes),
             spacing=body.cloud.spacing,
             time_step=time_step,
-            inertia=StiffMass.of(*free, time_step),
+            inertia=EffectiveMass.of(*free, time_step),
         )
 
 
@@ -150,7 +150,7 @@ class SectionFlow(LiquidFlow):
     """A liquid body that flows in section."""
 
     body: Section
-    records: ClassVar[tuple[type, ...]] = (*FLOW_RECORDS, Section, Chain)
+    records: ClassVar[tuple[type, ...]] = (*FLOW_RECORDS, Section, Polyline)
 
     def profile(self) -> Profile:
         """Cross-sections of the body against their height."""
@@ -161,7 +161,7 @@ class SectionFlow(LiquidFlow):
         """Unit normals of the chain `(s, 3)`."""
         return self.body.chain.normals(self.body.line)
 
-    def _follow(self, motion: Motion, evening: Evening) -> int:
+    def _follow(self, motion: Motion, evening: MeshSmoothing) -> int:
         """Move the body along, and space its vertices evenly; nothing is flipped."""
         body, passes = self.body, evening.passes
         body.move(self.time_step.size, motion.transport, motion.twists)

@@ -47,8 +47,7 @@ def reflected(ground: LevelSet, points: Floats, vectors: Floats, reach: float) -
 def _distance_and_normals(ground: LevelSet, points: Floats) -> tuple[Floats, Floats]:
     """Distance to the ground [m] and its normals at points `(m, 3)`: `LevelSet.at` of order 1, in one loop."""
     distance, normals = np.empty(len(points)), np.empty_like(points)
-    places = (points - ground.grid.origin) / ground.grid.spacing
-    _interpolate(ground.values, places, distance, normals)
+    _interpolate(ground.values, ground.grid.indices(points), distance, normals)
     return distance, normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_beside
+from reflowshock.particles.core.grid import Grid
+from reflowshock.particles.core.neighbours import find_near
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas, volume_and_gradient
 from reflowshock.particles.core.windings import Windings
@@ -28,13 +29,7 @@ from reflowshock.particles.surface.cloud_level_set import (
     mirrored,
 )
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
-from reflowshock.particles.surface.level_set import (
-    Grid,
-    LevelSet,
-    extract_surface,
-    relax,
-    signed_distance,
-)
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax, signed_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
 # In spacings of the particles: edges of triangles.
@@ -260,7 +255,7 @@ def beside(vertices: Floats, particles: Floats, reach: float) -> tuple[Indices, 
         particles: `(n, 3)` [m].
         reach: [m].
     """
-    offsets, indices = find_beside(vertices, particles, reach)
+    offsets, indices = find_near(vertices, particles, reach)
     is_alone = np.diff(offsets) == 0
     if is_alone.any():
         nearest = cKDTree(particles).query(vertices[is_alone])[1]

@@ -14,7 +14,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import have_moved, list_beside
+from reflowshock.particles.core.neighbours import have_moved, tabulate_near
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.particle_motion import correct, cover, predict, settle, shift, speed2_of, take_slope
 from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_values
@@ -76,7 +76,8 @@ class Rows:
         reach = SUPPORT * self.law.length + skin
         images, source = self._images(np.stack(here, axis=1), reach)
         alone = len(images) == count  # images are numbered behind the walls
-        rows, counts = list_beside(images[:count], images, reach, self.fluids if alone else len(images), self.lists[0])
+        movers = self.fluids if alone else len(images)
+        rows, counts = tabulate_near(images[:count], images, reach, movers, self.lists[0])
         if not alone:
             rows = source[np.where(np.arange(rows.shape[1]) < counts[:, None], rows, 0)]
         if count > self.fluids:

@@ -75,7 +75,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class Evening:
+class MeshSmoothing:
     """How the triangles are evened out.
 
     Attributes:
@@ -113,7 +113,7 @@ def is_driven(body: Body, physics: Physics, time_step: float) -> bool:
     return False
 
 
-def even_out(body: Body, physics: Physics, volume: float, evening: Evening) -> int | None:
+def smooth_surface(body: Body, physics: Physics, volume: float, evening: MeshSmoothing) -> int | None:
     """Flip edges and smooth the surface as far as the energy permits; correct the volume [m^3], stop lines at edges.
 
     Returns:
@@ -132,7 +132,7 @@ def even_out(body: Body, physics: Physics, volume: float, evening: Evening) -> i
     return 0 if _smooth(body, physics, volume, evening) else None
 
 
-def _smooth(body: Body, physics: Physics, volume: float, evening: Evening) -> bool:
+def _smooth(body: Body, physics: Physics, volume: float, evening: MeshSmoothing) -> bool:
     """Smooth as far as the energy permits, at a volume [m^3]; return whether it permits any."""
     start, offset, held = body.points, _offset(body, physics, evening.passes), Held.of(physics.lines)
 

@@ -17,7 +17,7 @@ from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
+from reflowshock.particles.steps.descent import MeshSmoothing, Start, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.interior_shift import interior_shift
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
@@ -148,7 +148,7 @@ class LiquidFlow:
         body, start = self.body, Start.of(self.body, self.physics.lines)
         highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
         traits = self.solver.traits
-        evening = Evening(traits.smoothing_passes, self.steps % FLIP_INTERVAL == 0, traits.flip_worth, highest)
+        evening = MeshSmoothing(traits.smoothing_passes, self.steps % FLIP_INTERVAL == 0, traits.flip_worth, highest)
         attempted = [event.attempt(body) for event in self.physics.events]
         if any(attempted):
             correct_volume(body, self.physics, self.volume)
@@ -165,7 +165,7 @@ class LiquidFlow:
             start.restore(body, self.physics.lines)
             self.time_step.cut_for_energy()
 
-    def _move(self, evening: Evening) -> tuple[Motion, int] | None:
+    def _move(self, evening: MeshSmoothing) -> tuple[Motion, int] | None:
         """Move the body by one step; None where its energy is too high after it."""
         body = self.body
         motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
@@ -181,10 +181,10 @@ class LiquidFlow:
         flips = self._follow(motion, evening)
         return None if flips is None else (motion, flips)
 
-    def _follow(self, motion: Motion, evening: Evening) -> int | None:
+    def _follow(self, motion: Motion, evening: MeshSmoothing) -> int | None:
         """Move the body along; return the number of flips, None where its energy is too high after it."""
         self.body.move(self.time_step.size, motion.transport, motion.twists)
-        return even_out(self.body, self.physics, self.volume, evening)
+        return smooth_surface(self.body, self.physics, self.volume, evening)
 
     def _steady_steps(self, motion: Motion) -> float:
         """Over how many steps a motion goes on that is steady: at the rate of its change, until nothing of it is left.

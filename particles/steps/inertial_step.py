@@ -37,7 +37,7 @@ NO_NEIGHBOURS = NeighbourList(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class InertialState:
     """What the last step left.
 
     Attributes:
@@ -55,7 +55,7 @@ class Past:
     plates: dict[int, Floats]
 
     @classmethod
-    def start(cls, body: Body, density: float, viscosity: float) -> "Past":
+    def start(cls, body: Body, density: float, viscosity: float) -> "InertialState":
         """Fill a body that has not moved yet with tetrahedra."""
         space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
         return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)), {})
@@ -67,7 +67,7 @@ class Past:
         return fields_of(self) | {"space": kept, "history": fields_of(self.history), "plates": plates}
 
     @classmethod
-    def restored(cls, saved: Mapping[str, Any], density: float) -> "Past":
+    def restored(cls, saved: Mapping[str, Any], density: float) -> "InertialState":
         """Make it again of what `saved` returned."""
         space, points = saved["space"], saved["points"]
         mass = particle_mass(space["cells"], space["volumes"], len(points))
@@ -85,15 +85,15 @@ class Past:
         same_surface = np.array_equal(self.triangles, body.triangles)
         return same_surface and shift < SHIFT_TOLERANCE * body.cloud.spacing and not self.space.is_worn(body.points)
 
-    def transferred(self, body: Body, physics: Physics) -> tuple["Past", Floats]:
-        """The past on new tetrahedra, and the velocity `(n, 3)` of the particles where they are now [m/s]."""
+    def transferred(self, body: Body, physics: Physics) -> tuple["InertialState", Floats]:
+        """The state on new tetrahedra, and the velocity `(n, 3)` of the particles where they are now [m/s]."""
         new = LinearTetrahedra.start(body.points, fill(body), self.space.density, self.space.viscosity)
         values = interpolation(self.points, self.space.cells, body.points - self.points)
         unit_fields = [physics.admit(body, np.broadcast_to(axis, body.points.shape)) for axis in np.eye(3)]
         transfer = Transfer(values, self.space.mass, new.mass, unit_fields)
         old = self.history
         history = BackwardDifference(values @ old.displacement, transfer(old.velocity_change), old.time_step)
-        return Past(new, body.triangles, body.points, history, self.plates), transfer(body.velocity)
+        return InertialState(new, body.triangles, body.points, history, self.plates), transfer(body.velocity)
 
 
 @dataclass(slots=True)
@@ -102,11 +102,11 @@ class InertialStep:
 
     Attributes:
         density: of the liquid [kg/m^3].
-        past: what the last step left, None before the first.
+        state: what the last step left, None before the first.
     """
 
     density: float
-    past: Past | None = None
+    state: InertialState | None = None
 
     @property
     def traits(self) -> SolverTraits:
@@ -119,35 +119,35 @@ class InertialStep:
 
     def start(self, body: Body, physics: Physics) -> "PreparedInertialStep":
         """Provide tetrahedra and the velocity of the particles where they are now; without inertia it is zero."""
-        if self.past is None or not physics.momenta:
+        if self.state is None or not physics.momenta:
             viscosity = sum(part.coefficient for part in physics.operators if isinstance(part, Viscosity))
-            self.past = Past.start(body, self.density, viscosity)
-        elif not self.past.fits(body):
-            self.past, body.velocity = self.past.transferred(body, physics)
+            self.state = InertialState.start(body, self.density, viscosity)
+        elif not self.state.fits(body):
+            self.state, body.velocity = self.state.transferred(body, physics)
         if not physics.momenta:
             body.velocity = np.zeros_like(body.velocity)
-        return PreparedInertialStep(body, physics, self, self.past)
+        return PreparedInertialStep(body, physics, self, self.state)
 
     def saved(self) -> dict[str, Any]:
         """What it remembers of earlier steps, for a checkpoint."""
-        return {"past": self.past and self.past.saved()}
+        return {"state": self.state and self.state.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `saved` returned."""
-        self.past = saved["past"] and Past.restored(saved["past"], self.density)
+        self.state = saved["state"] and InertialState.restored(saved["state"], self.density)
 
     def stop(self, body: Body) -> None:
         """Bring the body to rest."""
         body.velocity = np.zeros_like(body.velocity)
-        if self.past is not None:
-            self.past = replace(self.past, history=BackwardDifference.start(len(body.points)), plates={})
+        if self.state is not None:
+            self.state = replace(self.state, history=BackwardDifference.start(len(body.points)), plates={})
 
     @property
     def mass(self) -> sparse.csr_matrix:
         """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
-        if self.past is None:
+        if self.state is None:
             raise ValueError("the first step gives the particles their volumes")
-        return self.past.space.mass
+        return self.state.space.mass
 
     def kinetic_energy(self, body: Body) -> float:
         """Kinetic energy of the body with the velocity of the last step [J]."""
@@ -162,13 +162,13 @@ class PreparedInertialStep:
         body: the liquid body.
         physics: what acts on it.
         solver: remembers the step.
-        past: tetrahedra at the body's positions and the step before.
+        state: tetrahedra at the body's positions and the step before.
     """
 
     body: Body
     physics: Physics
     solver: InertialStep
-    past: Past
+    state: InertialState
 
     def solve(self, time_step: float, volume: float) -> Motion:
         """Return the motion in a time step [s] that ends at a volume [m^3].
@@ -176,14 +176,14 @@ class PreparedInertialStep:
         Raises:
             SolveFailed: the linear solve failed.
         """
-        body, past = self.body, self.past
-        base = past.history.base(body.points, body.velocity, time_step)
+        body, state = self.body, self.state
+        base = state.history.base(body.points, body.velocity, time_step)
         guess = self._guess(base)
         carried = {
-            motion.wall: base.weight * past.plates.get(motion.wall, np.zeros(6)) for motion in self.physics.motions
+            motion.wall: base.weight * state.plates.get(motion.wall, np.zeros(6)) for motion in self.physics.motions
         }
         predicted = replace(body, points=base.points + base.time_step * guess, velocity=base.velocity)
-        space = past.space(predicted)
+        space = state.space(predicted)
         equations = StepEquations(predicted, stepped(self.physics, guess, carried, time_step), space)
         swept = base.time_step * float((space.constraint @ guess.T.ravel()).sum())
         problem = equations.problem(base.time_step, volume + swept)
@@ -192,7 +192,7 @@ class PreparedInertialStep:
         points = base.points + base.time_step * velocity
         plates = {wall: carried[wall] + base.time_step * twist for wall, twist in twists.items()}
         history = BackwardDifference(points - body.points, velocity - body.velocity, time_step)
-        self.solver.past = Past(past.space, past.triangles, points, history, plates)
+        self.solver.state = InertialState(state.space, state.triangles, points, history, plates)
         return Motion(
             velocity=velocity,
             transport=history.displacement / time_step,
@@ -210,7 +210,7 @@ class PreparedInertialStep:
         return velocity if way <= bound else bound / way * velocity
 
 
-class HasMass(StepSolver, Protocol):
+class InertialSolver(StepSolver, Protocol):
     """A step solver whose particles carry momentum."""
 
     @property
@@ -224,7 +224,7 @@ class HasMass(StepSolver, Protocol):
 class InertialFlow:
     """A body without walls and its steps; triangles and particles are left as they move."""
 
-    def __init__(self, body: Body, physics: Physics, solver: HasMass) -> None:
+    def __init__(self, body: Body, physics: Physics, solver: InertialSolver) -> None:
         """Remember the volume to keep.
 
         Args:

@@ -28,11 +28,11 @@ RECORDS = (*FLOW_RECORDS, Snapshot)  # that a flow and its run consist of in a c
 COUNTS = ("seconds", "ruptured", "calm", "at_rest", "moved")
 
 
-class SchemeBroke(RuntimeError):
+class SchemeUnstable(RuntimeError):
     """A scheme that does not hold has come to its end."""
 
 
-class NoRest(RuntimeError):
+class NotAtRest(RuntimeError):
     """The body did not come to rest within the allowed steps."""
 
 
@@ -147,7 +147,7 @@ def run_to_rest(
         checkpoint: where the run continues from, to the last bit, and leaves its state, that at rest included.
 
     Raises:
-        NoRest: too many steps; names step, displacement and time.
+        NotAtRest: too many steps; names step, displacement and time.
     """
     run, done = _start(flow, on_snapshot, checkpoint), 0.0
     while not run.at_rest and flow.time < rule.end_time and not run.ruptured:
@@ -189,7 +189,7 @@ def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:
     if flow.steps < rule.max_steps:
         return
     last = run.records[-1]
-    raise NoRest(
+    raise NotAtRest(
         f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
         f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
         f"{CALM_DISPLACEMENT:g}{_for_how_long(rule)}; {_what_helps(flow)}"
@@ -228,7 +228,7 @@ def _step(flow: LiquidFlow) -> StepRecord:
             return flow.step()
     except (ArithmeticError, SolveFailed, StepCollapsed) as error:
         if flow.solver.traits.flaw is not None:
-            raise SchemeBroke(f"{where}: {flow.solver.traits.flaw} ({type(error).__name__}: {error})") from error
+            raise SchemeUnstable(f"{where}: {flow.solver.traits.flaw} ({type(error).__name__}: {error})") from error
         if not isinstance(error, SolveFailed | ZeroDivisionError):
             raise
         raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
@@ -237,7 +237,7 @@ def _step(flow: LiquidFlow) -> StepRecord:
 def _refuse_plates_that_met(flow: LiquidFlow) -> None:
     low, high = flow.body.span()
     if len(flow.body.cloud.rings) == 2 and high <= low:
-        raise NoRest(
+        raise NotAtRest(
             f"step {flow.steps} at time {flow.time:.4g} s: the package has sunk to the board, the solder does not bear "
             "it; a smaller joint.package.load or a larger joint.volume helps"
         )

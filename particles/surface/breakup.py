@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core.neighbours import find_beside
+from reflowshock.particles.core.neighbours import find_near
 from reflowshock.particles.core.windings import Windings
 from reflowshock.particles.surface.closing import groups, part_of_vertex
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops
@@ -113,7 +113,7 @@ def are_outside(places: Floats, surface: tuple[Floats, Indices], normals: Floats
     """
     points, triangles = surface
     nearest = np.full(len(places), -1)
-    _find_nearest(points, places, find_beside(points, places, FAR * distance), nearest)
+    _find_nearest(points, places, find_near(points, places, FAR * distance), nearest)
     outside = ((places - points[nearest]) * normals[nearest]).sum(axis=1) > distance
     far = nearest < 0
     if far.any():

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core import windings
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.surface import near_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
 
@@ -18,45 +19,6 @@ if TYPE_CHECKING:
 
 RELAXATIONS = 30
 CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """A regular grid.
-
-    Attributes:
-        origin: `(3,)` of the first node [m].
-        spacing: of the nodes [m].
-        counts: nodes along each axis.
-    """
-
-    origin: Floats
-    spacing: float
-    counts: tuple[int, int, int]
-
-    @classmethod
-    def around(cls, points: Floats, spacing: float, walls: Sequence[float] = (0.0,)) -> "Grid":
-        """Cover points `(n, 3)` with two nodes to spare.
-
-        Walls lie midway between nodes: the net of a surface that is symmetric about one has vertices in it.
-
-        Args:
-            points: what to cover [m].
-            spacing: of the nodes [m]; between two walls the nearest one that divides their distance.
-            walls: heights of one or two horizontal walls [m].
-        """
-        if len(walls) == 2:
-            gap = walls[1] - walls[0]
-            spacing = gap / round(gap / spacing)
-        datum = np.array([0.0, 0.0, walls[0]])
-        first = np.floor((points.min(axis=0) - datum) / spacing) - 2.0
-        last = np.ceil((points.max(axis=0) - datum) / spacing) + 2.0 + np.array([0.0, 0.0, 1.0])
-        x, y, z = (last - first).astype(int) + 1
-        return cls(datum + (first - np.array([0.0, 0.0, 0.5])) * spacing, spacing, (int(x), int(y), int(z)))
-
-    def axes(self) -> list[Floats]:
-        """Coordinates of the nodes along each axis [m]."""
-        return [start + self.spacing * np.arange(count) for start, count in zip(self.origin, self.counts, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +35,7 @@ class LevelSet:
 
     def at(self, points: Floats, order: int = 3) -> Floats:
         """Values at points `(n, 3)` by splines, `(n,)` [m]; those of order 1 do without the whole grid's."""
-        place = ((points - self.grid.origin) / self.grid.spacing).T
-        return map_coordinates(self.values, place, order=order, mode="nearest")
+        return map_coordinates(self.values, self.grid.indices(points).T, order=order, mode="nearest")
 
     def gradient(self, points: Floats, order: int = 3) -> Floats:
         """Gradient at points, by central differences over a node spacing, `(n, 3)`."""
@@ -93,14 +54,14 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
     """
     import pyvista  # most reflows need no level set, and start without it
 
-    nodes = pyvista.ImageData(dimensions=grid.counts, spacing=(grid.spacing,) * 3, origin=grid.origin)
-    distance = _distance(nodes, points, triangles).reshape(grid.counts, order="F")
+    nodes = pyvista.ImageData(dimensions=grid.shape, spacing=(grid.spacing,) * 3, origin=grid.origin)
+    distance = _distance(nodes, points, triangles).reshape(grid.shape, order="F")
     return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
 
 
 def within_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
     """Return what `signed_distance` does; nodes farther from the surface than a band [m] are told as that far."""
-    distance = np.full(grid.counts, band)
+    distance = np.full(grid.shape, band)
     near_distance.narrow(points, triangles, grid.origin, grid.spacing, distance)
     return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
 
@@ -124,7 +85,7 @@ def _distance(nodes: "pyvista.DataSet", points: Floats, triangles: Indices) -> F
 
 def windings_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
     """How often a closed surface winds round the nodes of a grid, an array of its counts."""
-    found = np.zeros(grid.counts, np.int32)
+    found = np.zeros(grid.shape, np.int32)
     windings.on_grid(points, np.ascontiguousarray(triangles), grid.origin, grid.spacing, found)
     return found
 
@@ -196,8 +157,8 @@ def _cell_vertices(level: LevelSet, inside: NDArray[np.bool_]) -> tuple[Floats, 
         part = corner[cut, first] / (corner[cut, first] - corner[cut, last])
         total[cut] += CORNERS[first] + part[:, None] * (CORNERS[last] - CORNERS[first])
         count[cut] += 1.0
-    cells = np.argwhere(active)
-    return level.grid.origin + level.grid.spacing * (cells + total / count[:, None]), number
+    indices: NDArray[Any] = np.argwhere(active) + total / count[:, None]
+    return level.grid.positions(indices), number
 
 
 def _from(corner: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[slice, ...]:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from reflowshock.particles.surface.level_set import Grid, LevelSet
+from reflowshock.particles.core.grid import Grid
+from reflowshock.particles.surface.level_set import LevelSet
 
 
 def ball(grid, centre, radius, mirrored=False):

@@ -10,8 +10,8 @@ import pytest
 from reflowshock import kernel_place
 
 ASKED = """
-from reflowshock.particles.core.neighbours import visit
-print(visit._cache.cache_path)
+from reflowshock.particles.core.neighbours import write_near
+print(write_near._cache.cache_path)
 """
 
 
@@ -31,10 +31,10 @@ def test_digest_changes_with_any_file(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_tests_use_it() -> None:
-    from reflowshock.particles.core.neighbours import visit
+    from reflowshock.particles.core.neighbours import write_near
 
     assert kernel_place.VARIABLE in os.environ
-    assert visit._cache.cache_path == kernel_place.PlaceByModule(visit.py_func, __file__).get_cache_path()
+    assert write_near._cache.cache_path == kernel_place.PlaceByModule(write_near.py_func, __file__).get_cache_path()
 
 
 def test_a_kernel_is_kept_by_its_module_and_all_sources_wherever_they_are(tmp_path: Path, monkeypatch) -> None:

@@ -8,10 +8,10 @@ import pytest
 
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure
-from reflowshock.particles.ispg.mls import DegenerateStencil
-from reflowshock.particles.ispg.projection import Poisson, predict_velocity
+from reflowshock.particles.gripc.collocation import collocate
+from reflowshock.particles.gripc.gripc_step import GripcStep, force_pressure
+from reflowshock.particles.gripc.projection import Poisson, predict_velocity
+from reflowshock.particles.ispg.stencils import DegenerateStencil
 from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian

@@ -265,12 +265,12 @@ def test_a_free_drop_swings_with_its_period():
     decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
     assert abs(exact / found - 1.0) < 0.015
     assert 1.0 < decay / exact_decay < 1.5
-    past, first = flow.solver.past, flow.solver.first_energy
+    state, first = flow.solver.state, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
-    assert past.losses.viscous / start == pytest.approx(1.0 - np.exp(-2.0 * exact_decay * flow.time), rel=0.1)
-    assert past.losses.smoothing < 0.15 * past.losses.viscous
-    gained = swing.energy(ball) + past.kinetic - first
-    assert abs(gained + past.losses.total) < 0.01 * start
+    assert state.losses.viscous / start == pytest.approx(1.0 - np.exp(-2.0 * exact_decay * flow.time), rel=0.1)
+    assert state.losses.smoothing < 0.15 * state.losses.viscous
+    gained = swing.energy(ball) + state.kinetic - first
+    assert abs(gained + state.losses.total) < 0.01 * start
 
 
 @pytest.mark.parametrize("shells", [5, pytest.param(8, marks=pytest.mark.long)])

@@ -57,13 +57,13 @@ def test_slow_plates_do_the_work_of_the_surface():
     flow, rule = start_joint(START, solder())
     run_to_rest(flow, rule)
     end, plates = place(0.365e-3), flow.body.plates
-    before, given = flow.physics.energy(flow.body), flow.solver.past.losses.plates
+    before, given = flow.physics.energy(flow.body), flow.solver.state.losses.plates
     flow.physics = replace(flow.physics, motions=(Travel(1, joint_plates(end)[1], 0.02, RADIUS),))
     while is_driven(flow.body, flow.physics, flow.time_step.size):
         flow.step()
         heights = flow.body.points[:, 2] * 1e3
         assert heights.min() > -1e-9 and heights.max() < flow.body.plates[1].origin[2] * 1e3 + 1e-9
-    work = given - flow.solver.past.losses.plates
+    work = given - flow.solver.state.losses.plates
     assert flow.body.plates[1].origin - plates[1].origin == pytest.approx([0.0, 0.0, 0.015e-3], abs=1e-12)
     assert work == pytest.approx(flow.physics.energy(flow.body) - before, rel=0.02)
     exact = [named(solve_joint(place(gap), solder("energy")))["axial_force"] for gap in (0.35e-3, 0.3575e-3, 0.365e-3)]

@@ -53,11 +53,11 @@ def test_the_neck_of_two_drops_grows_with_the_root_of_time():
     slope, offset = np.polyfit(time, neck**2, 1)
     assert np.sqrt(slope) == pytest.approx(1.1, abs=0.1)
     assert np.sqrt(slope * time + offset) == pytest.approx(neck, rel=5e-3)
-    past = flow.solver.past
-    kept = flow.physics.energy(flow.body) + past.kinetic + past.losses.total
+    state = flow.solver.state
+    kept = flow.physics.energy(flow.body) + state.kinetic + state.losses.total
     assert kept == pytest.approx(flow.solver.first_energy, rel=2e-3)
     assert flow.body.volume()[0] == pytest.approx(2.0 * BALL, rel=1e-3)  # polyhedra of the balls' volume
-    assert np.abs(past.momenta[:3]).max() < 1e-6 * np.sqrt(2.0 * past.kinetic * solder.density * 2.0 * BALL)
+    assert np.abs(state.momenta[:3]).max() < 1e-6 * np.sqrt(2.0 * state.kinetic * solder.density * 2.0 * BALL)
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls import SUPPORT, derivatives
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
 
 COUNTS = (8, 12, 18)
 

@@ -81,7 +81,7 @@ def test_steady_torsion(condition, length):
         velocity = step.solve(LONG, body.volume()[0]).velocity
         x, y, z = body.points.T
         exact = SPIN * (z + length) / (GAP + 2.0 * length) * np.stack((-y, x, 0.0 * z))
-        stress = Viscosity(VISCOSITY).matrix(body, step.past.space(body), LONG) @ velocity.T.ravel()
+        stress = Viscosity(VISCOSITY).matrix(body, step.state.space(body), LONG) @ velocity.T.ravel()
         top, (fx, fy, _) = body.cloud.wall == 1, stress.reshape(3, -1)
         moment = VISCOSITY * np.pi * RADIUS**4 / 2.0 * SPIN / (GAP + 2.0 * length)
         excess.append((x * fy - y * fx)[top].sum() / moment - 1.0)
@@ -94,7 +94,7 @@ def test_steady_torsion(condition, length):
 def test_walls_share_their_area():
     body = cylinder(0.2)
     step = InertialStep(DENSITY).start(body, physics("slip", inertia=False, spins=True))
-    areas = wall_areas(body, step.past.space(body))
+    areas = wall_areas(body, step.state.space(body))
     corners = np.linalg.norm(body.points[body.cloud.rings[0]], axis=1)
     polygon = 0.5 * len(corners) * corners[0] ** 2 * np.sin(2.0 * np.pi / len(corners))
     for wall in (0, 1):
@@ -118,7 +118,7 @@ def ispg(body, acting, time_step, steps):
         motion = solver.prepare(body, acting, NeighbourList(1.0, 0.0)).solve(time_step, volume)
         body.velocity, body.pressure = motion.velocity, motion.pressure
         body.move(time_step, motion.transport, {})
-        yield solver.past.kinetic
+        yield solver.state.kinetic
 
 
 def decay_rate(scheme, condition, wave, spacing):

@@ -3,16 +3,14 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import ceil
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from reflowshock.particles.parameters.effects import decide_drop
 from reflowshock.units import from_si
-from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun
+from reflowshock.workflow.convergence.metrics import read_metric_errors
+from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SolderCase
-from reflowshock.workflow.store.product import read_record
 
 Settings = Mapping[str, str]
 
@@ -53,32 +51,11 @@ SHAPE = {"shape_error": "free surface, RMS distance over V^(1/3)", "max_width_er
 ROUNDING = 1e-9
 
 
-def of_metrics(exact: str, errors: Mapping[str, str], stage: str, case: Case, run_folder: Path) -> dict[str, Quantity]:
-    """Read errors that a run has found itself; where it could not, the answer, to be compared with finer ones.
-
-    Args:
-        exact: what they are errors from.
-        errors: names of metrics -> anything; that of the answer has no ``_error``.
-        stage: whose record has them.
-        case: the case.
-        run_folder: of the run.
-    """
-    record = read_record(run_folder / stage)
-    metrics = {} if record is None else record["metrics"]
-    found = {}
-    for name in errors:
-        if name in metrics:
-            found[name] = Quantity(metrics[name]["value"], 0.0, 1.0, exact)
-        elif name.removesuffix("_error") in metrics:
-            found[name] = Quantity(metrics[name.removesuffix("_error")]["value"])
-    return found
-
-
 def _study(
     exact: str, errors: Mapping[str, str], parameters: tuple[Parameter, ...], choices: tuple[StudyRun, ...] = ()
 ) -> ConvergenceStudy:
     """Return the study of a reflow whose errors are those from an exact answer."""
-    measure = partial(of_metrics, exact, errors, "reflow")
+    measure = partial(read_metric_errors, exact, errors, "reflow")
     return ConvergenceStudy("reflow", ("reflow",), errors, measure, parameters, choices)
 
 

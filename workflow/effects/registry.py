@@ -11,12 +11,13 @@ APART = "_in_the_shock"
 @cache
 def registry() -> dict[str, Effect]:
     """Return the effects by name: those of reflows, of heating, of drops and of flows."""
-    from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS, PRINTING_EFFECTS
+    from reflowshock.workflow.flows.registry import FLOWS
     from reflowshock.workflow.kinds import BOARD_DROP
 
     stages = list(BOARD_DROP.stages)
     of_drops = sorted(BOARD_DROP.effects, key=lambda effect: stages.index(effect.stage))
-    return {effect.name: effect for effect in (*of_drops, *FLOW_EFFECTS, *DROPLET_EFFECTS, *PRINTING_EFFECTS)}
+    of_flows = (effect for flow in FLOWS for effect in flow.effects)
+    return {effect.name: effect for effect in (*of_drops, *of_flows)}
 
 
 def effect_of(name: str, reflowed: bool) -> Effect | None:

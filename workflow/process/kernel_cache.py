@@ -10,7 +10,7 @@ from reflowshock.kernel_place import VARIABLE, digest, is_made, present
 
 # Stage -> one of the kernels that it compiles, and the processor seconds that it takes to compile all of them, as on
 # jedec_bga; a stage of the same name in another kind of case takes no more.
-KERNELS = {"reflow": ("neighbours._rows", 24.0), "shock": ("levels.take_steps", 48.0)}
+KERNELS = {"reflow": ("neighbours._compressed_rows", 24.0), "shock": ("levels.take_steps", 48.0)}
 
 
 def keep_kernels_by_source(environment: MutableMapping[str, str] = os.environ) -> None:

@@ -144,7 +144,7 @@ def bridge_shapes(
     """
     from reflowshock.particles.scenes.bridge import solve_bridge
     from reflowshock.particles.scenes.reflow import solve_joint
-    from reflowshock.particles.steps.rest import NoRest
+    from reflowshock.particles.steps.rest import NotAtRest
     from reflowshock.particles.surface.cloud_level_set import CannotRebuild
 
     bridges, relaxing = {}, _relaxing(solder)
@@ -155,7 +155,7 @@ def bridge_shapes(
         try:
             alone = [solve_joint(end, relaxing) for end in ends]
             bridges[name] = solve_bridge(ends, alone, pair.distance, relaxing)
-        except (CannotRebuild, NoRest) as error:  # the verdict stands without it
+        except (CannotRebuild, NotAtRest) as error:  # the verdict stands without it
             logger.warning("%s are bridged, but their common body was not found: %s", name, error)
     return bridges
 

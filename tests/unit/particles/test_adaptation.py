@@ -38,29 +38,29 @@ def moving(stretch=1.0, keep=None):
     for _ in range(2):
         flow.step()
     body.points = body.points * [stretch**-0.5, stretch**-0.5, stretch]
-    past = flow.solver.past
-    flow.solver.past = replace(past, points=body.points, potential=LIQUID.energy(body))
+    state = flow.solver.state
+    flow.solver.state = replace(state, points=body.points, potential=LIQUID.energy(body))
     return flow, Adaptation(flow.solver, LIQUID)
 
 
 def ledger(flow):
-    return LIQUID.energy(flow.body) + flow.solver.past.losses.total
+    return LIQUID.energy(flow.body) + flow.solver.state.losses.total
 
 
 def check_kept(flow, event):
     """Volume, centre and ledger by the event alone, momenta with the step after it."""
-    before, losses, momenta = body_moments(flow.body), ledger(flow), flow.solver.past.momenta
+    before, losses, momenta = body_moments(flow.body), ledger(flow), flow.solver.state.momenta
     event.update(flow.body)
     after = body_moments(flow.body)
     assert after[0] == pytest.approx(before[0], rel=1e-13)
     assert after[1] == pytest.approx(before[1], abs=1e-13)
     assert ledger(flow) == pytest.approx(losses, rel=1e-13)
-    body, past = flow.body, flow.solver.past
-    assert len(body.points) == len(body.velocity) == len(body.cloud.wall) == len(past.points) == len(past.gradient)
+    body, state = flow.body, flow.solver.state
+    assert len(body.points) == len(body.velocity) == len(body.cloud.wall) == len(state.points) == len(state.gradient)
     assert boundary_loops(body.triangles) == ()
     flow.step()
     assert np.abs(momenta).min() > 1e-4
-    assert flow.solver.past.momenta == pytest.approx(momenta, abs=1e-6)  # what the linear solve leaves
+    assert flow.solver.state.momenta == pytest.approx(momenta, abs=1e-6)  # what the linear solve leaves
 
 
 def test_long_edges_split_and_the_event_keeps_what_it_must():
@@ -76,7 +76,7 @@ def test_short_edges_collapse_and_the_event_keeps_what_it_must():
     a, b, _ = body.triangles[7]
     body.points = body.points.copy()
     body.points[b] = body.points[a] + 0.2 * (body.points[b] - body.points[a])
-    flow.solver.past = replace(flow.solver.past, points=body.points, potential=LIQUID.energy(body))
+    flow.solver.state = replace(flow.solver.state, points=body.points, potential=LIQUID.energy(body))
     flow.volume = body.volume()[0]
     assert pdist(body.points).min() < 0.3 * BALL.spacing
     check_kept(flow, event)

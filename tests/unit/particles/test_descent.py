@@ -14,7 +14,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.steps.descent import Evening, Start, correct_volume, even_out, highest_energy
+from reflowshock.particles.steps.descent import MeshSmoothing, Start, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.step_solver import SolverTraits
@@ -55,7 +55,7 @@ def lowered(body, physics, steps):
 def evened(body, physics, highest, flips):
     """Energy, volume and flips of a copy of the body that was evened out."""
     copy, volume = replace(body), body.volume()[0]
-    done = even_out(copy, physics, volume, Evening(12, flips, 0.0, highest))
+    done = smooth_surface(copy, physics, volume, MeshSmoothing(12, flips, 0.0, highest))
     return physics.energy(copy), copy.volume()[0] / volume, done
 
 

@@ -1,10 +1,11 @@
-"""Freezing: a layer that grows on a cold plate against Neumann's exact solution, heat kept, a drop that freezes."""
+"""Freezing: layer growth on a cold plate against Neumann's exact solution, conservation of heat, a freezing drop."""
 
 from math import erf, exp, pi, sqrt
 
 import numpy as np
 import pytest
 
+from reflowshock.materials import enthalpy
 from reflowshock.particles.parameters.freezing import Freezing
 from reflowshock.particles.parameters.printing import LITTLE_FROZEN, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import LIQUID, SOLID, Deposit
@@ -20,7 +21,7 @@ DENSITY = 7400.0
 
 
 def column(count, mirror=1, **changes):
-    """Heat of a column of particles 1 um apart on the plate, and their fields."""
+    """Return the heat of a column of particles 1 um apart on the plate, and their fields."""
     scene = Printing(
         drop_volume=2.5e-13, surface_tension=0.55, viscosity=2e-3, speed=1.5, delay=1.0, pitch=1e-4, columns=1, rows=1,
         density=DENSITY,
@@ -30,8 +31,8 @@ def column(count, mirror=1, **changes):
     points = np.zeros((3, count))
     points[2] = 1e-6 * (np.arange(count) + 0.5)
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(count), law)
-    given = Freezing(**(SOLDER | changes))
-    return Heat(given, law, np.full(count, enthalpy_at(given, given.temperature))), fields
+    freezing = Freezing(**(SOLDER | changes))
+    return Heat(freezing, law, np.full(count, enthalpy_at(freezing, freezing.temperature))), fields
 
 
 @pytest.mark.parametrize("temperature", [490.0, 540.0])
@@ -47,7 +48,7 @@ def test_a_layer_freezes_as_fast_as_in_the_exact_solution(temperature):
         assert abs(share.sum() / thickness - 1.0) < 0.01
         depth = fields.z / (2.0 * sqrt(heat.freezing.diffusivity(DENSITY) * until))
         solid = depth < 0.9 * heat.freezing.growth
-        rise = np.array([erf(one) for one in depth[solid]]) / erf(heat.freezing.growth)
+        rise = np.array([erf(scaled) for scaled in depth[solid]]) / erf(heat.freezing.growth)
         exact = 350.0 + 140.0 * rise
         errors.append(np.abs(heat.temperature[solid] - exact).max() / 140.0)
     assert errors[1] < 0.02 and errors[1] < 0.7 * errors[0], errors
@@ -59,7 +60,7 @@ def test_growth_solves_the_equation_of_stefan():
     assert Freezing(**(SOLDER | {"substrate_temperature": 490.0})).growth == 0.0
 
 
-def test_heat_is_kept_where_there_is_no_plate():
+def test_heat_is_conserved_without_a_plate():
     heat, fields = column(40, mirror=0)
     heat.enthalpy[:10] = enthalpy_at(heat.freezing, 300.0)
     before = heat.enthalpy.sum()
@@ -69,8 +70,17 @@ def test_heat_is_kept_where_there_is_no_plate():
     assert heat.temperature[:10].mean() > 310.0
 
 
+def test_enthalpy_and_temperature_are_inverse_outside_the_latent_heat():
+    properties = {"melting_point": 490.0, "heat_capacity": 250.0, "latent_heat": 5.9e4}
+    temperatures = np.array([350.0, 489.0, 491.0, 540.0])
+    stored = enthalpy.enthalpy(temperatures, **properties)
+    assert enthalpy.temperature(stored, **properties) == pytest.approx(temperatures, rel=1e-12)
+    assert enthalpy.temperature(2.0e4, **properties) == 490.0
+    assert enthalpy.enthalpy(490.0, **properties) == 5.9e4
+
+
 def frozen(restart_after=None):
-    """A drop of solder that lands on a plate and freezes, and the particles that had stood still halfway."""
+    """Let a drop of solder land on a plate and freeze; return it and the particles that were solid halfway."""
     scene = Printing(
         drop_volume=2.5e-13, surface_tension=0.345, viscosity=1.3e-3, speed=1.5, delay=1.0, pitch=1e-4, columns=1,
         rows=1, density=DENSITY, freezing=Freezing(**SOLDER), numerics=PrintingNumerics(particles_per_diameter=8),
@@ -93,29 +103,29 @@ def frozen(restart_after=None):
     return scene, deposit, halfway
 
 
-def test_a_drop_freezes_from_the_plate_upwards_and_what_is_frozen_stands_still():
+def test_a_drop_freezes_from_the_plate_upwards_and_frozen_particles_stay_fixed():
     scene, deposit, (solid, points) = frozen()
     assert points[solid, 2].mean() < 0.6 * points[~solid, 2].mean()
     assert np.array_equal(deposit.points[solid], points[solid])
     assert (deposit.state == SOLID).all() and len(deposit.bodies) == 1
     top = deposit.points[:, 2].max() + 0.5 * scene.spacing
-    assert 0.7 < deposit.time / scene.freezing.time_for(top, DENSITY) < 1.6  # the drop is no layer without end
+    assert 0.7 < deposit.time / scene.freezing.time_for(top, DENSITY) < 1.6  # a drop is not an infinite layer
     _, again, _ = frozen(restart_after=150)
     assert np.array_equal(again.points, deposit.points) and again.time == deposit.time
 
 
-GIVEN = {
+DROP = {
     "drop_volume": 2.5e-13, "surface_tension": 0.345, "speed": 1.5, "delay": 1e-3, "pitch": 1e-4, "columns": 1,
     "rows": 1, "density": DENSITY, "numerics": PrintingNumerics(particles_per_diameter=8),
 }  # fmt: skip
 SLOW = Freezing(**(SOLDER | {"conductivity": 1e-5}))
 
 
-def test_light_cures_what_does_not_freeze():
-    assert Printing(**GIVEN, freezing=Freezing(**SOLDER)).freezes
-    assert Printing(**GIVEN, freezing=SLOW, effects={"freezing": "on"}).freezes
+def test_light_cures_drops_that_do_not_freeze():
+    assert Printing(**DROP, freezing=Freezing(**SOLDER)).freezes
+    assert Printing(**DROP, freezing=SLOW, effects={"freezing": "on"}).freezes
     off = {"freezing": Freezing(**SOLDER), "effects": {"freezing": "off"}}
-    for scene in (Printing(**GIVEN), Printing(**GIVEN, freezing=SLOW), Printing(**GIVEN, **off)):
+    for scene in (Printing(**DROP), Printing(**DROP, freezing=SLOW), Printing(**DROP, **off)):
         assert not scene.freezes
         deposit = Deposit(scene)
         deposit.add_drop((0.0, 0.0))
@@ -123,16 +133,16 @@ def test_light_cures_what_does_not_freeze():
         assert deposit.heat is None and deposit.cure()
 
 
-def test_little_freezing_does_little():
-    ended = []
+def test_slow_freezing_changes_little():
+    final_points = []
     for switch in ("off", "on"):
-        scene = Printing(**GIVEN, freezing=SLOW, effects={"freezing": switch})
+        scene = Printing(**DROP, freezing=SLOW, effects={"freezing": switch})
         deposit = Deposit(scene)
         deposit.add_drop((0.0, 0.0))
         for _ in range(60):
             deposit.step(1.0)
         assert (deposit.heat is not None) == (switch == "on")
         deposit.cure()
-        ended.append(deposit.points)
+        final_points.append(deposit.points)
     assert scene.share_frozen < LITTLE_FROZEN
-    assert np.abs(ended[1] - ended[0]).max() < scene.share_frozen * scene.length
+    assert np.abs(final_points[1] - final_points[0]).max() < scene.share_frozen * scene.length

@@ -12,15 +12,16 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.discretisation.lagged_cholesky import Band, LaggedCholesky, Tolerance
-from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.galerkin import Galerkin
-from reflowshock.particles.ispg.galerkin_equations import Flow
-from reflowshock.particles.ispg.gripc_step import force_pressure
+from reflowshock.particles.gripc.collocation import collocate
+from reflowshock.particles.gripc.gripc_step import force_pressure
+from reflowshock.particles.ispg.galerkin_equations import LiquidProperties
+from reflowshock.particles.ispg.galerkin_space import GalerkinSpace
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.mls import DegenerateStencil
+from reflowshock.particles.ispg.moving_plates import FloatingModes
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.past import centre
-from reflowshock.particles.ispg.rigid_motions import Riders, rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.state import centre
+from reflowshock.particles.ispg.stencils import DegenerateStencil
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
@@ -46,7 +47,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def space(body):
-    return Galerkin.of(body)
+    return GalerkinSpace.of(body)
 
 
 def test_linear_velocities_along_the_wall_are_exact(body, space):
@@ -88,7 +89,7 @@ def test_particles_of_a_thin_film_keep_their_volumes():
     above = film.points[:, 2] > 0.5
     film.points = film.points * [1.0, 1.0, 0.2]
     film.points[inner, 2] = 0.1 + np.where(above, 0.072, -0.072)[inner]
-    volumes = Galerkin.of(film).volumes
+    volumes = GalerkinSpace.of(film).volumes
     assert volumes.min() > 0.2 * volumes.mean()
     assert volumes @ film.points == pytest.approx(body_moments(film)[1])
 
@@ -150,7 +151,7 @@ def test_plates_do_the_work_that_liquid_gains(between_plates):
     joint, twists, equations = between_plates
     before = np.random.default_rng(7).normal(size=joint.points.shape)
     before = projected(equations.admitted, before) + equations.given
-    equations = replace(equations, fluid=Flow(1.0, 0.1, 3.0))
+    equations = replace(equations, fluid=LiquidProperties(1.0, 0.1, 3.0))
     still, drive, none = np.zeros_like(before), equations.driver(), np.zeros(0)
     rubbed = equations.rubbed(before, still)
     start = equations.given + drive(equations.beyond_given(equations.momentum(rubbed) / 1e-3), none)
@@ -169,14 +170,14 @@ def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
     joint, _, equations = between_plates
     free = Floating(1, np.vstack([LIFT, SHIFT]), np.array([0.0, 0.0, -2.0]))
     parts = joint, equations.admitted, equations.masses, equations.space.drift_of
-    riders = Riders.of((free,), *parts)
+    riders = FloatingModes.of((free,), *parts)
     assert riders.twists.shape == (1, 2, 6)
     on_plate = joint.cloud.wall == 1
     lift = 1.0 / np.sqrt(equations.masses[on_plate].sum())
     assert riders.fields[0] == pytest.approx(np.outer(on_plate, [0.0, 0.0, lift]))
     assert riders.twists[0, 1] == pytest.approx([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     assert riders.loads == pytest.approx(-2.0 * lift)
-    assert Riders.of((Floating(1, SHIFT, np.zeros(3)),), *parts) is None
+    assert FloatingModes.of((Floating(1, SHIFT, np.zeros(3)),), *parts) is None
 
 
 def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
@@ -257,7 +258,7 @@ def test_a_lonely_particle_is_named():
     lonely = shaken(box_cloud(1.0, 6))
     lonely.points[-1] += 7.0
     with pytest.raises(DegenerateStencil, match=f"particle {len(lonely.points) - 1} at .* fewer than 16"):
-        Galerkin.of(lonely)
+        GalerkinSpace.of(lonely)
 
 
 def water(inertia=True):
@@ -330,10 +331,10 @@ def test_a_swing_keeps_its_momenta(ball):
     flow = LiquidFlow(body, water(), TimeStep(0.3, body.cloud.spacing, 0.3), IspgStep())
     for _ in range(12):
         flow.step()
-    motions, past = rigid_motions(flow.body.points), flow.solver.past
-    size = np.sqrt(2.0 * past.kinetic * np.array([(motion**2).sum(axis=1).mean() for motion in motions]))
-    assert past.kinetic > 0.05
-    assert past.momenta / size == pytest.approx(0.0, abs=1e-6)  # what the linear solve leaves
+    motions, state = rigid_motions(flow.body.points), flow.solver.state
+    size = np.sqrt(2.0 * state.kinetic * np.array([(motion**2).sum(axis=1).mean() for motion in motions]))
+    assert state.kinetic > 0.05
+    assert state.momenta / size == pytest.approx(0.0, abs=1e-6)  # what the linear solve leaves
 
 
 def test_a_swing_keeps_its_centre(ball):

@@ -3,8 +3,8 @@ import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.ispg.collocation import mirror
-from reflowshock.particles.ispg.mls import derivatives
+from reflowshock.particles.gripc.moving_least_squares import derivatives
+from reflowshock.particles.ispg.ghosts import mirror
 
 REACH = 0.3
 

@@ -9,16 +9,16 @@ from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
-from reflowshock.particles.ispg.collocation import collocate
-from reflowshock.particles.ispg.gripc_step import GripcStep, force_pressure, viscous_pressure
-from reflowshock.particles.ispg.projection import Poisson, Velocities, correct_pressure, smooth, solve_gmres
+from reflowshock.particles.gripc.collocation import collocate
+from reflowshock.particles.gripc.gripc_step import GripcStep, force_pressure, viscous_pressure
+from reflowshock.particles.gripc.projection import Poisson, Velocities, correct_pressure, smooth, solve_gmres
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.scenes.reflow import start_flow
-from reflowshock.particles.steps.rest import SchemeBroke, StopRule, run_to_rest
+from reflowshock.particles.steps.rest import SchemeUnstable, StopRule, run_to_rest
 from reflowshock.particles.surface.contact_line import ContactLine
 
 
@@ -111,7 +111,7 @@ def test_the_end_of_the_printed_scheme_says_why(monkeypatch):
     other = start_flow(box_cloud(1e-3, 5), Solder(volume=1e-9), effects, ())
     for flow in (printed, other):
         monkeypatch.setattr(flow, "step", lambda: 1 // 0)
-    with pytest.raises(SchemeBroke, match=r"step 1 at time 0 s: .*strong form.*\"ispg\".*ZeroDivisionError"):
+    with pytest.raises(SchemeUnstable, match=r"step 1 at time 0 s: .*strong form.*\"ispg\".*ZeroDivisionError"):
         run_to_rest(printed, StopRule(10, 1e-6, 1.0))
     with pytest.raises(SolveFailed, match=r"step 1 at time 0 s: .*division.*; a smaller spacing"):
         run_to_rest(other, StopRule(10, 1e-6, 1.0))

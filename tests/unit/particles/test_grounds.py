@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.sph import grounds
-from reflowshock.particles.surface.level_set import Grid, LevelSet
+from reflowshock.particles.surface.level_set import LevelSet
 
 RADIUS = 1.0
 

@@ -7,8 +7,8 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.ispg.motion_transfer import MovingBody, carried
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.rebuilt import Moving, carried
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
@@ -49,14 +49,14 @@ def spinning(cloud, shift, velocity, spin, steps=2):
 def totals(flows):
     """Volume, first moments, and momenta of flows that have stepped."""
     moments = [body_moments(flow.body) for flow in flows]
-    momenta = sum(flow.solver.past.momenta for flow in flows)
+    momenta = sum(flow.solver.state.momenta for flow in flows)
     return sum(one[0] for one in moments), sum(one[1] for one in moments), momenta
 
 
 def energy(flows):
     """Surface, kinetic and lost energy."""
-    kept = sum(flow.physics.energy(flow.body) + flow.solver.past.kinetic for flow in flows)
-    return kept + sum(flow.solver.past.losses.total for flow in flows)
+    kept = sum(flow.physics.energy(flow.body) + flow.solver.state.kinetic for flow in flows)
+    return kept + sum(flow.solver.state.losses.total for flow in flows)
 
 
 def merged(old):
@@ -88,27 +88,27 @@ def test_drops_that_become_one_keep_volume_centre_and_momenta(pair):
 
 def test_what_an_event_takes_stands_in_the_ledger(pair):
     one = merged(pair)
-    past = one.solver.past
+    state = one.solver.state
     assert one.solver.first_energy == sum(flow.solver.first_energy for flow in pair)
-    lost = past.losses.rebuilding
+    lost = state.losses.rebuilding
     assert 0.03 < lost / one.solver.first_energy < 0.12  # the neck, 2.5 spacings wide at this resolution
-    evened = sum(flow.solver.past.potential - flow.physics.energy(flow.body) for flow in pair)
+    evened = sum(flow.solver.state.potential - flow.physics.energy(flow.body) for flow in pair)
     assert energy([one]) == pytest.approx(energy(pair) + evened, rel=1e-12)
     start = energy([one])
-    momenta = past.momenta
+    momenta = state.momenta
     for _ in range(4):
         one.step()
     assert energy([one]) == pytest.approx(start, rel=2e-3)
-    assert one.solver.past.momenta == pytest.approx(momenta, abs=1e-6)
+    assert one.solver.state.momenta == pytest.approx(momenta, abs=1e-6)
 
 
 def test_velocities_that_are_linear_in_space_come_over_as_they_are():
     flow = spinning(sphere_cloud(BALL, 3), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), steps=0)
     slope = np.array([[0.3, -0.2, 0.1], [0.5, 0.1, 0.0], [-0.4, 0.2, -0.4]])
     flow.body.velocity = 0.7 + flow.body.points @ slope.T
-    moving = Moving(flow.body, flow.physics, flow.solver)
+    moving = MovingBody(flow.body, flow.physics, flow.solver)
     places = rebuild(flow.body).points
-    assert carried(places, [moving], [moving.past]) == pytest.approx(0.7 + places @ slope.T, abs=1e-12)
+    assert carried(places, [moving], [moving.state]) == pytest.approx(0.7 + places @ slope.T, abs=1e-12)
 
 
 def test_on_a_wall_the_centre_and_the_momenta_along_it_stay():
@@ -146,7 +146,7 @@ def test_a_joint_that_parts_keeps_volume_centre_and_ledger(monkeypatch):
     before, after = totals([flow]), totals(drops)
     assert after[0] == pytest.approx(before[0], rel=1e-12)
     assert after[1] == pytest.approx(before[1], abs=1e-12 * before[0] * geometry.gap)
-    evened = flow.solver.past.potential - flow.physics.energy(flow.body)
+    evened = flow.solver.state.potential - flow.physics.energy(flow.body)
     assert energy(drops) == pytest.approx(energy([flow]) + evened, rel=1e-12)
     assert sum(drop.solver.first_energy for drop in drops) == flow.solver.first_energy
     for drop in drops:

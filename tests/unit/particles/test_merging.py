@@ -4,13 +4,14 @@ import numba
 import numpy as np
 import pytest
 
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
 from reflowshock.particles.scenes.droplet import droplet
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.surface.closing import Meeting, closed_level, narrowest_gap, part_of_vertex, parts_of
-from reflowshock.particles.surface.level_set import Grid, LevelSet, extract_surface
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0, "gravity": 0.0}
 

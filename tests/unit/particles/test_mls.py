@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls import SUPPORT, DegenerateStencil, derivatives, shape_functions
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives, shape_functions
+from reflowshock.particles.ispg.stencils import DegenerateStencil
 
 
 @pytest.fixture

@@ -3,7 +3,8 @@
 import numpy as np
 import pyvista
 
-from reflowshock.particles.surface.level_set import Grid, signed_distance, within_band
+from reflowshock.particles.core.grid import Grid
+from reflowshock.particles.surface.level_set import signed_distance, within_band
 
 
 def test_a_band_about_a_rough_surface_has_its_distances():

@@ -1,12 +1,14 @@
+"""Neighbour lists against all pairs in NumPy, and when they are rebuilt."""
+
 import numpy as np
 import pytest
 
 from reflowshock.particles.core import neighbours
-from reflowshock.particles.core.neighbours import NeighbourList, find_beside, find_neighbours, have_moved
+from reflowshock.particles.core.neighbours import NeighbourList, find_near, find_neighbours, have_moved, tabulate_near
 
 
-def brute_force(points, radius):
-    """NumPy twin: all pairs."""
+def all_pairs(points, radius):
+    """Return the set of neighbours of each point by comparing all pairs."""
     distance = np.linalg.norm(points[:, None] - points[None, :], axis=2)
     return [set(np.flatnonzero((row < radius) & (np.arange(len(points)) != i))) for i, row in enumerate(distance)]
 
@@ -15,36 +17,45 @@ def brute_force(points, radius):
 def test_rows_equal_all_pairs(shape):
     points = np.random.default_rng(1).uniform(size=(300, 3)) * shape
     offsets, indices = find_neighbours(points, 0.2)
-    found = [set(indices[offsets[i] : offsets[i + 1]]) for i in range(len(points))]
-    assert found == brute_force(points, 0.2)
+    rows = [set(indices[offsets[i] : offsets[i + 1]]) for i in range(len(points))]
+    assert rows == all_pairs(points, 0.2)
 
 
-def test_rows_made_in_blocks_are_the_same(monkeypatch):
+def test_rows_found_in_blocks_are_the_same(monkeypatch):
     points = np.random.default_rng(2).uniform(size=(300, 3))
-    whole = [find_neighbours(points, 0.2), find_beside(points[:90], points, 0.2, movers=50)]
-    monkeypatch.setattr(neighbours, "BLOCK", 40)
-    blocks = [find_neighbours(points, 0.2), find_beside(points[:90], points, 0.2, movers=50)]
-    assert all(
-        np.array_equal(*pair) for one, other in zip(whole, blocks, strict=True) for pair in zip(one, other, strict=True)
-    )
-    assert find_beside(points[:0], points, 0.2)[0].tolist() == [0]
+    whole = [find_neighbours(points, 0.2), find_near(points[:90], points, 0.2, movers=50)]
+    monkeypatch.setattr(neighbours, "ROWS_PER_BLOCK", 40)
+    blocks = [find_neighbours(points, 0.2), find_near(points[:90], points, 0.2, movers=50)]
+    for expected, rows in zip(whole, blocks, strict=True):
+        assert all(np.array_equal(*pair) for pair in zip(expected, rows, strict=True))
+    assert find_near(points[:0], points, 0.2)[0].tolist() == [0]
 
 
-def test_points_beside_places_are_those_of_all_pairs_and_the_fixed_see_the_moving_alone():
+def test_points_near_centres_equal_all_pairs_and_pairs_of_fixed_ones_are_left_out():
     random = np.random.default_rng(4)
-    places, points = random.uniform(-0.5, 1.5, (80, 3)), random.uniform(size=(200, 3))  # some far outside
-    distance = np.linalg.norm(places[:, None] - points[None], axis=2)
-    offsets, indices = find_beside(places, points, 0.3)
+    centres, points = random.uniform(-0.5, 1.5, (80, 3)), random.uniform(size=(200, 3))  # some far outside
+    distance = np.linalg.norm(centres[:, None] - points[None], axis=2)
+    offsets, indices = find_near(centres, points, 0.3)
     for i in range(80):
         assert sorted(indices[offsets[i] : offsets[i + 1]]) == np.flatnonzero(distance[i] < 0.3).tolist()
-    offsets, indices = find_beside(points, points, 0.3, movers=60)
+    offsets, indices = find_near(points, points, 0.3, movers=60)
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     for i in range(200):
         near = np.flatnonzero(distance[i] < 0.3)
         assert sorted(indices[offsets[i] : offsets[i + 1]]) == [j for j in near if i < 60 or j < 60]
 
 
-def test_what_moves_all_alike_changes_no_list():
+def test_a_table_has_the_same_neighbours_as_compressed_rows():
+    points = np.random.default_rng(8).uniform(size=(300, 3))
+    offsets, indices = find_near(points, points, 0.3, movers=200)
+    table, counts = tabulate_near(points, points, 0.3, 200, np.empty((0, 0), np.int32))
+    assert np.array_equal(counts, np.diff(offsets))
+    for i in range(300):
+        assert sorted(table[i, : counts[i]]) == sorted(indices[offsets[i] : offsets[i + 1]])
+    assert tabulate_near(points, points, 0.25, 200, table)[0] is table
+
+
+def test_a_translation_of_all_points_is_no_motion():
     points = np.random.default_rng(6).uniform(size=(50, 3))
     moved = points + [5.0, -1.0, 2.0]
     assert not have_moved(moved.T, points.T, 0.1)
@@ -70,16 +81,16 @@ def test_list_is_rebuilt_only_past_half_the_skin():
 
 
 def test_list_keeps_all_neighbours_while_points_move_within_the_skin():
-    rng = np.random.default_rng(3)
-    points = rng.uniform(size=(200, 3))
+    random = np.random.default_rng(3)
+    points = random.uniform(size=(200, 3))
     neighbours = NeighbourList(radius=0.2, skin=0.1)
     neighbours.update(points)
-    direction = rng.normal(size=points.shape)
+    direction = random.normal(size=points.shape)
     moved = points + 0.049 * direction / np.linalg.norm(direction, axis=1)[:, None]
     neighbours.update(moved)
     assert neighbours.builds == 1
-    for i, row in enumerate(brute_force(moved, 0.2)):
-        assert row <= set(neighbours.indices[neighbours.offsets[i] : neighbours.offsets[i + 1]])
+    for i, expected in enumerate(all_pairs(moved, 0.2)):
+        assert expected <= set(neighbours.indices[neighbours.offsets[i] : neighbours.offsets[i + 1]])
 
 
 def test_positions_must_be_finite():

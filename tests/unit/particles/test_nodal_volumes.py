@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.ispg.nodal_volumes import NoVolumes, _solve, fitted_volumes
+from reflowshock.particles.ispg.nodal_volumes import NoNodalVolumes, _solve, fitted_volumes
 
 RANDOM = np.random.default_rng(5)
 
@@ -23,7 +23,7 @@ def test_volumes_have_the_moments(thickness):
 
 
 def test_particles_in_a_plane_have_none_off_it():
-    with pytest.raises(NoVolumes, match="too unevenly"):
+    with pytest.raises(NoNodalVolumes, match="too unevenly"):
         fitted_volumes(np.full(40, 0.025), points(0.0), np.array([1.0, 0.0, 0.0, 0.1]), np.zeros(4))
 
 
@@ -33,7 +33,7 @@ def test_a_moment_that_is_no_number_is_missing(place):
     powers, found = points(1.0), np.full(40, 0.025)
     wanted = powers.T @ found
     wanted[place] = np.nan
-    with pytest.raises(NoVolumes):
+    with pytest.raises(NoNodalVolumes):
         fitted_volumes(found, powers, wanted, np.zeros(4))
 
 

@@ -8,8 +8,8 @@ import pytest
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.ispg.normal_pull import kept_share, normal_pull
-from reflowshock.particles.ispg.rigid_motions import edges_turn, rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.normal_forces import normal_pull, tangential_share
+from reflowshock.particles.ispg.rigid_motions import edges_are_coaxial, rigid_momenta, rigid_motions
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import NoSlip
@@ -54,8 +54,8 @@ def test_nothing_pulls_along_the_surface_but_a_swirl(body):
 def test_fast_strain_keeps_all_of_the_forces(body):
     physics = Physics((SurfaceTension(1.0),), (), (), (), ())
     still, fast = np.zeros((3, 3, 3)), np.broadcast_to(np.diag([1.0, -1.0, 0.0]), (3, 3, 3))
-    assert (kept_share(still, 1.0), kept_share(fast, 1.0)) == (0.0, 1.0)
-    assert 0.0 < kept_share(0.01 * fast, 1.0) < 1.0
+    assert (tangential_share(still, 1.0), tangential_share(fast, 1.0)) == (0.0, 1.0)
+    assert 0.0 < tangential_share(0.01 * fast, 1.0) < 1.0
     whole = normal_pull(body, physics, np.ones(len(body.points)), kept=1.0)
     assert whole == pytest.approx(physics.force(body), abs=1e-12)
 
@@ -64,4 +64,4 @@ def test_fast_strain_keeps_all_of_the_forces(body):
 def test_round_edges_about_the_axis_do_not_turn_a_body(offset, turns):
     geometry, solder = JointGeometry(0.35e-3, 0.24e-3, 0.24e-3, (offset, 0.0)), Solder(volume=7.2e-11)
     flow, _ = start_joint(geometry, solder)
-    assert edges_turn(flow.body, flow.physics) == turns
+    assert edges_are_coaxial(flow.body, flow.physics) == turns

@@ -14,7 +14,7 @@ from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
 from reflowshock.particles.printing.part import Layer, Part
 from reflowshock.particles.printing.part_files import write_part
 from reflowshock.particles.printing.printing import solve_printing
-from reflowshock.workflow.fluid.printed_part import layer_table, part_scene
+from reflowshock.workflow.flows.printed_part import layer_table, part_scene
 
 INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,

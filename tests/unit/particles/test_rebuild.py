@@ -6,12 +6,12 @@ import pytest
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, joint_cloud
 from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
 from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
 from reflowshock.particles.surface.level_set import (
-    Grid,
     LevelSet,
     depths,
     extract_surface,

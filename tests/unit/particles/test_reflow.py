@@ -4,7 +4,7 @@ import pytest
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.scenes.reflow import build_physics, solve_joint
-from reflowshock.particles.steps.rest import NoRest
+from reflowshock.particles.steps.rest import NotAtRest
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)
 COARSE = SolderNumerics(spacing=1e-4)
@@ -36,7 +36,7 @@ def test_an_effect_that_is_off_is_absent():
 
 def test_too_few_steps_are_an_error_that_says_where_it_stopped():
     numerics = SolderNumerics(spacing=1e-4, max_steps=2)
-    with pytest.raises(NoRest, match=r"2 steps \(solder.numerics.max_steps\) at time .* spacings"):
+    with pytest.raises(NotAtRest, match=r"2 steps \(solder.numerics.max_steps\) at time .* spacings"):
         solve_joint(JOINT, Solder(volume=0.0724e-9, numerics=numerics))
 
 

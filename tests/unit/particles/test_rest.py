@@ -12,7 +12,7 @@ from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.reference.drop_oscillation import cap_frequency, rayleigh_frequency
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.flow import StepRecord
-from reflowshock.particles.steps.rest import CALM_STEPS, NoRest, Run, StopRule, is_calm, is_lasting, run_to_rest
+from reflowshock.particles.steps.rest import CALM_STEPS, NotAtRest, Run, StopRule, is_calm, is_lasting, run_to_rest
 
 PERIOD = 60  # steps
 # Surface of a body that moves by this in a step, of the spacing, is at the bound of calm.
@@ -125,5 +125,5 @@ def test_a_drop_of_real_solder_that_swings_is_not_found_at_rest_where_it_turns()
         return flow
 
     assert run_to_rest(pushed(), replace(rule, lasting=0.0)).at_rest
-    with pytest.raises(NoRest, match=r"at rest it would be 0.0001 for 0.00115 s"):
+    with pytest.raises(NotAtRest, match=r"at rest it would be 0.0001 for 0.00115 s"):
         run_to_rest(pushed(), rule)

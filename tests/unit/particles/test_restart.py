@@ -22,7 +22,7 @@ from reflowshock.particles.scenes.drops import run_drops
 from reflowshock.particles.scenes.free_drop import solve_free_drop
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
 from reflowshock.particles.scenes.reflow import contact_line, start_flow, start_joint, stop_rule
-from reflowshock.particles.steps.rest import RECORDS, NoRest
+from reflowshock.particles.steps.rest import RECORDS, NotAtRest
 
 RADIUS = 0.24e-3
 JOINT = JointGeometry(0.31e-3, RADIUS, RADIUS)
@@ -130,7 +130,7 @@ def stand_with_inertia(checkpoint):
     drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=7)
     flow, run = flow_to_rest(drop, solder, checkpoint=checkpoint)
     assert len(run.records) > 8
-    assert flow.solver.past.losses.line > 0.0
+    assert flow.solver.state.losses.line > 0.0
     return [
         flow.body.points,
         flow.body.velocity,
@@ -267,7 +267,7 @@ def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
 def test_an_exchange_that_ends_with_the_process_passes_no_forces_on(tmp_path):
     now = Checkpoint(tmp_path / "state", ("inputs",))
     for _ in range(2):  # from the start, and from what was left
-        with pytest.raises(NoRest, match=r"process ends before the joint is at rest.*solder\.process_time"):
+        with pytest.raises(NotAtRest, match=r"process ends before the joint is at rest.*solder\.process_time"):
             carry_joint(JOINT, coarse_viscous(2e-4), None, now)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import sparse
 
-from reflowshock.particles.discretisation.schur_complement import PairRates, SchurComplement
-from reflowshock.particles.discretisation.stiff_mass import StiffMass
+from reflowshock.particles.discretisation.effective_mass import EffectiveMass
+from reflowshock.particles.discretisation.schur_complement import SchurComplement, VolumeRateRows
 
 COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, those of the surface
 
@@ -29,9 +29,9 @@ def test_it_is_the_dense_matrix():
 
     surface = sparse.bsr_matrix(stiffness[: 3 * MOVED, : 3 * MOVED], blocksize=(3, 3))
     found = SchurComplement.of(
-        PairRates(pairs.indptr.astype(np.int64), pairs.indices, entries),
+        VolumeRateRows(pairs.indptr.astype(np.int64), pairs.indices, entries),
         (shares, gradient),
-        StiffMass.of(masses, surface, rigid, TIME_STEP),
+        EffectiveMass.of(masses, surface, rigid, TIME_STEP),
         (columns, core),
     )
     pressures = random.normal(size=COUNT)

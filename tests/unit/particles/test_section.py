@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.mls import DegenerateStencil
 from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.stencils import DegenerateStencil
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
@@ -15,15 +15,15 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.free_drop import fit_oscillation
 from reflowshock.particles.scenes.metrics import particles_lost
-from reflowshock.particles.section.chain import Chain
-from reflowshock.particles.section.forces import ChainTension, ChainWeight, ChainWetting
+from reflowshock.particles.section.forces import PolylineTension, PolylineWeight, PolylineWetting
+from reflowshock.particles.section.polyline import Polyline
 from reflowshock.particles.section.section import Section, block, disc
 from reflowshock.particles.section.section_space import SectionSpace
 from reflowshock.particles.section.section_step import SectionFlow, SectionStep
 from reflowshock.particles.steps.inertial_step import InertialFlow
 from reflowshock.particles.steps.time_step import TimeStep
 
-MERIDIAN, PLANE, RING = Chain.meridian(), Chain.plane(is_closed=False), Chain.plane(is_closed=True)
+MERIDIAN, PLANE, RING = Polyline.meridian(), Polyline.plane(is_closed=False), Polyline.plane(is_closed=True)
 CLOUDS = {
     "meridian on a wall": (MERIDIAN, block(MERIDIAN, 1.0, 1.0, 7)),
     "plane on a wall": (PLANE, block(PLANE, 1.0, 1.0, 7)),
@@ -47,7 +47,7 @@ def body(request):
 
 def water(*forces, viscosity=0.0, inertia=True):
     """Density and surface tension are one."""
-    tension = ChainTension(1.0)
+    tension = PolylineTension(1.0)
     operators = (Mass(1.0), tension, *((Viscosity(viscosity),) if viscosity else ()))
     return Physics((tension, *forces), operators, (Inertia(1.0),) if inertia else (), (), ())
 
@@ -61,7 +61,7 @@ def test_forces_are_gradients_of_their_energies(body):
     way = body.on_particles(random.normal(size=body.line.shape) * [1.0, 0.0, 1.0])
     if body.chain.power:
         way[body.points[:, 0] == 0.0, 0] = 0.0
-    forces = [ChainTension(2.0), ChainWeight(3.0)] + ([ChainWetting(4.0, 1.0)] if body.plates else [])
+    forces = [PolylineTension(2.0), PolylineWeight(3.0)] + ([PolylineWetting(4.0, 1.0)] if body.plates else [])
     for force in forces:
         after, before = (replace(body, points=body.points + step * way) for step in (1e-6, -1e-6))
         slope = (force.energy(after) - force.energy(before)) / 2e-6
@@ -173,7 +173,7 @@ def test_long_steps_damp_a_swing(chain):
     """By little more than viscosity; with tension in a prediction alone it grew."""
     _, decay, flow = swung(chain, 8, 16, 2)
     assert 0.9 < decay < 1.5
-    assert flow.solver.past.losses.integration > 0.0
+    assert flow.solver.state.losses.integration > 0.0
 
 
 def test_a_thrown_drop_keeps_its_momenta_and_energy():
@@ -188,10 +188,10 @@ def test_a_thrown_drop_keeps_its_momenta_and_energy():
     energy = flow.physics.energy(drop) + 0.5 * (first @ (drop.velocity**2).sum(axis=1))
     for _ in range(40):
         flow.step()
-    past = flow.solver.past
-    assert past.momenta[kept] == pytest.approx(before, rel=2e-2)
+    state = flow.solver.state
+    assert state.momenta[kept] == pytest.approx(before, rel=2e-2)
     assert drop.volume()[0] == pytest.approx(flow.volume, rel=1e-12)
-    now = flow.physics.energy(drop) + past.kinetic + past.losses.total
+    now = flow.physics.energy(drop) + state.kinetic + state.losses.total
     assert now == pytest.approx(energy, rel=1e-3)
 
 
@@ -199,7 +199,7 @@ def test_a_plane_drop_becomes_a_circular_segment():
     angle = 2.0 * np.pi / 3.0
     drop = Section.filled(block(PLANE, 1.0, 1.0, 8), PLANE)
     flow = SectionFlow(
-        drop, water(ChainWetting(1.0, angle), viscosity=0.2), TimeStep(0.2, drop.cloud.spacing, 0.02), SectionStep()
+        drop, water(PolylineWetting(1.0, angle), viscosity=0.2), TimeStep(0.2, drop.cloud.spacing, 0.02), SectionStep()
     )
     for _ in range(150):
         flow.step()

@@ -3,9 +3,10 @@
 import numpy as np
 import pyvista
 
+from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.windings import Windings
 from reflowshock.particles.surface.breakup import are_outside
-from reflowshock.particles.surface.level_set import Grid, windings_on
+from reflowshock.particles.surface.level_set import windings_on
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 SPACING = 0.12

@@ -1,4 +1,4 @@
-"""Flows by delta-SPH: cases, forecasts and plans; refused with key, value and range where they cannot be."""
+"""Cases, forecasts and plans of flows by delta-SPH, and the messages for invalid ones."""
 
 from pathlib import Path
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from reflowshock.particles.sph.flow import FlowResult
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.fluid.forecast import flow_tables, forecast_flow, time_step
-from reflowshock.workflow.fluid.report import droplet_curves
+from reflowshock.workflow.flows.droplet import droplet_curves
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 
@@ -19,80 +19,96 @@ FROZEN = CASES / "frozen_drop/case.toml"
 FREE, CAP, IMPACT = (CASES / name / "case.toml" for name in ("young_laplace", "static_caps", "drop_impact"))
 CARREAU = ["droplet.rheology.law=carreau", "droplet.rheology.exponent=0.5", "droplet.rheology.shear_rate=1e5 1/s"]
 BAD_VALUES = {
-    "no room": (DAM, "dam_break.width=3.3 m", ["dam_break.tank_length", '"3.22 m"', "> dam_break.width = 3.3 m"]),
-    "thin column": (DAM, "dam_break.width=1 mm", ["dam_break.width", "less than one particle", ">= 0.01 m"]),
-    "sensor in the air": (DAM, "dam_break.sensor_height=3 m", ["dam_break.sensor_height", "<= 2.4 m"]),
-    "coarse": (DAM, "dam_break.numerics.particles_across=4", ["particles_across = 4", ">= 8"]),
-    "slow sound": (DAM, "dam_break.numerics.sound_speed=2", ["sound_speed = 2", ">= 5"]),
-    "no kernel": (
+    "column as wide as the tank": (
+        DAM,
+        "dam_break.width=3.3 m",
+        ["dam_break.tank_length", '"3.22 m"', "> dam_break.width = 3.3 m"],
+    ),
+    "column thinner than a particle": (
+        DAM,
+        "dam_break.width=1 mm",
+        ["dam_break.width", "narrower than one particle", ">= 0.01 m"],
+    ),
+    "sensor above the wall": (DAM, "dam_break.sensor_height=3 m", ["dam_break.sensor_height", "<= 2.4 m"]),
+    "too few particles": (DAM, "dam_break.numerics.particles_across=4", ["particles_across = 4", ">= 8"]),
+    "low speed of sound": (DAM, "dam_break.numerics.sound_speed=2", ["sound_speed = 2", ">= 5"]),
+    "misspelt kernel": (
         DAM,
         "dam_break.numerics.kernel=wenland",
         ["one of cubic_spline, wendland", "did you mean wendland?"],
     ),
-    "a height in seconds": (DAM, "dam_break.height=1 s", ["dam_break.height", "expected a length"]),
+    "height in seconds": (DAM, "dam_break.height=1 s", ["dam_break.height", "expected a length"]),
     "negative speed": (CHANNEL, "poiseuille.speed=-1 m/s", ["poiseuille.speed", "> 0"]),
-    "turbulent": (
+    "turbulent flow": (
         CHANNEL,
         "poiseuille.speed=10 m/s",
         ["poiseuille.viscosity", "Reynolds number 1e+04", ">= 0.01 Pa*s"],
     ),
-    "without viscosity": (VORTICES, "taylor_green.effects.viscosity=off", ["effects.viscosity", "auto, on"]),
-    "a speed twice": (IMPACT, "droplet.weber=8", ["droplet.weber = 8", "the speed is given, too", "7.986"]),
-    "a viscosity twice": (IMPACT, "droplet.reynolds=8", ["droplet.reynolds = 8", "the viscosity is given, too"]),
-    "half a number": (CAP, "droplet.reynolds=8", ["says nothing without an impact", "droplet.speed or droplet.weber"]),
-    "two spacings": (FREE, "droplet.numerics.spacing=2 um", ["numerics.spacing", "particles_per_diameter"]),
-    "sound slower than the impact needs": (
+    "viscosity off": (VORTICES, "taylor_green.effects.viscosity=off", ["effects.viscosity", "auto, on"]),
+    "speed and Weber number": (
+        IMPACT,
+        "droplet.weber=8",
+        ["droplet.weber = 8", "conflicts with droplet.speed", "7.986"],
+    ),
+    "viscosity and Reynolds number": (IMPACT, "droplet.reynolds=8", ["droplet.reynolds = 8", "droplet.viscosity"]),
+    "Reynolds number at rest": (CAP, "droplet.reynolds=8", ["without an impact", "droplet.speed or droplet.weber"]),
+    "spacing given twice": (FREE, "droplet.numerics.spacing=2 um", ["numerics.spacing", "particles_per_diameter"]),
+    "speed of sound too low for the impact": (
         IMPACT,
         "droplet.numerics.sound_speed=5",
-        ["droplet.numerics.sound_speed = 5", "too slow for 5 m/s", "would change by 4 %", ">= 8, 40 m/s"],
+        ["droplet.numerics.sound_speed = 5", "too low for 5 m/s", "would change by 4 %", ">= 8, 40 m/s"],
     ),
-    "a cube on a wall": (CAP, "droplet.start=cube", ["droplet.start", "only a free drop", "sphere"]),
-    "an angle too flat": (CAP, "droplet.contact_angle=10 deg", ["droplet.contact_angle", "30"]),
-    "a length for a tension": (FREE, "droplet.surface_tension=1 m", ["droplet.surface_tension", "N/m"]),
-    "a diametre": (FREE, "droplet.diametre=1 um", ["droplet.diametre", "unknown key", "diameter"]),
-    "a drop of few particles": (FREE, "droplet.numerics.particles_per_diameter=4", ["particles_per_diameter", ">= 8"]),
-    "no pitch": (PRINTING, "printing.pitch=-1 um", ["printing.pitch", "> 0"]),
-    "drops on each other": (PRINTING, "printing.pitch=2 um", ["printing.pitch", "on each other", ">= 5.75 um"]),
-    "drops in each other": (PRINTING, "printing.delay=2 us", ["printing.delay", "in the one before", ">= 7.67 us"]),
-    "light on what freezes": (FROZEN, "printing.cure.dose=1 J/m^2", ["printing.cure", "drops freeze before", "off"]),
-    "a warm plate": (
+    "cube on a wall": (CAP, "droplet.start=cube", ["droplet.start", "only a free drop", "sphere"]),
+    "angle too small": (CAP, "droplet.contact_angle=10 deg", ["droplet.contact_angle", "30"]),
+    "surface tension in metres": (FREE, "droplet.surface_tension=1 m", ["droplet.surface_tension", "N/m"]),
+    "misspelt diameter": (FREE, "droplet.diametre=1 um", ["droplet.diametre", "unknown key", "diameter"]),
+    "drop of few particles": (FREE, "droplet.numerics.particles_per_diameter=4", ["particles_per_diameter", ">= 8"]),
+    "negative pitch": (PRINTING, "printing.pitch=-1 um", ["printing.pitch", "> 0"]),
+    "pitch too small": (PRINTING, "printing.pitch=2 um", ["printing.pitch", "pile up", ">= 5.75 um"]),
+    "delay too short": (PRINTING, "printing.delay=2 us", ["printing.delay", "the previous one", ">= 7.67 us"]),
+    "light and freezing": (FROZEN, "printing.cure.dose=1 J/m^2", ["printing.cure", "drops freeze before", "off"]),
+    "warm plate": (
         FROZEN,
         "printing.freezing.substrate_temperature=190 degC",
-        ["freezing.substrate_temperature", "190 degC", "freezes nothing", "< 183 degC"],
+        ["freezing.substrate_temperature", "190 degC", "too warm", "< 183 degC"],
     ),
-    "drops that land frozen": (
+    "frozen drops": (
         FROZEN,
         "printing.freezing.temperature=100 degC",
         ["freezing.temperature", ">= 183 degC"],
     ),
-    "a drop on a warm one": (
+    "delay shorter than cooling": (
         FROZEN,
         ["printing.layers=2", "printing.delay=200 us"],
-        ["printing.delay", "still warm", ">= 1377 us"],
+        ["printing.delay", "on a warm one", ">= 1377 us"],
     ),
-    "freezing of nothing known": (
+    "freezing without its table": (
         PRINTING,
         "printing.effects.freezing=on",
-        ["effects.freezing", "no [printing.freezing]"],
+        ["effects.freezing", "[printing.freezing]"],
     ),
-    "no order": (PRINTING, "printing.order=rastr", ["one of raster, serpentine, interleaved", "did you mean raster?"]),
-    "a carreau bound": (
+    "misspelt order": (
+        PRINTING,
+        "printing.order=rastr",
+        ["one of raster, serpentine, interleaved", "did you mean raster?"],
+    ),
+    "bound of the Carreau law": (
         IMPACT,
         CARREAU + ["droplet.rheology.bound=5"],
-        ["rheology.bound", "says nothing", "leave it out"],
+        ["rheology.bound", "has no meaning", "omit it"],
     ),
-    "no rate of shear": (IMPACT, CARREAU[:2], ["droplet.rheology.shear_rate"]),
-    "thicker at infinity": (
+    "missing shear rate": (IMPACT, CARREAU[:2], ["droplet.rheology.shear_rate"]),
+    "viscosity at infinity too large": (
         IMPACT,
         [*CARREAU, "droplet.rheology.viscosity_at_infinity=20 mPa*s"],
-        ["viscosity_at_infinity", "is not below that at rest", "< 14.9 mPa*s"],
+        ["viscosity_at_infinity", "is not below the viscosity at rest", "< 14.9 mPa*s"],
     ),
-    "an exponent of three": (IMPACT, [*CARREAU, "droplet.rheology.exponent=3"], ["rheology.exponent", "<= 2"]),
-    "a law that is none": (IMPACT, [*CARREAU, "droplet.rheology.law=careau"], ["did you mean carreau?"]),
-    "vortices that thin": (
+    "exponent too large": (IMPACT, [*CARREAU, "droplet.rheology.exponent=3"], ["rheology.exponent", "<= 2"]),
+    "misspelt law": (IMPACT, [*CARREAU, "droplet.rheology.law=careau"], ["did you mean carreau?"]),
+    "shear-thinning vortices": (
         VORTICES,
-        [one.replace("droplet", "taylor_green") for one in CARREAU],
-        ["taylor_green.rheology", "no exact solution is known"],
+        [setting.replace("droplet", "taylor_green") for setting in CARREAU],
+        ["taylor_green.rheology", "requires a constant viscosity"],
     ),
     "advancing below the contact angle": (
         CAP,
@@ -104,100 +120,105 @@ BAD_VALUES = {
 }
 
 
+def forecast(case):
+    return kind_of(case).forecast(case)
+
+
 @pytest.mark.parametrize(("path", "setting", "words"), BAD_VALUES.values(), ids=BAD_VALUES.keys())
-def test_what_cannot_be_is_refused_in_words(path, setting, words):
+def test_invalid_case_is_rejected_with_key_value_and_range(path, setting, words):
     with pytest.raises(CaseError) as caught:
         read_case(path, [setting] if isinstance(setting, str) else setting, True)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("given", "followed"),
+    ("keys", "duration"),
     [("weber = 32\nreynolds = 500", 6.0 * 2.0**-2.5), ('viscosity = "10 mPa*s"\ncontact_angle = "60 deg"', 4.0)],
 )
-def test_a_drop_is_followed_as_long_as_its_scene_asks_for(tmp_path, given, followed):
-    """Without a duration: an impact 6 D / U, a drop that comes to rest 4 sqrt(rho D^3 / gamma)."""
+def test_default_duration_of_a_drop(tmp_path, keys, duration):
+    """An impact lasts 6 D / U, a drop that comes to rest 4 sqrt(rho D^3 / gamma)."""
     path = tmp_path / "case.toml"
     liquid = 'diameter = "50 um"\ndensity = "1000 kg/m^3"\nsurface_tension = "0.072 N/m"'
-    path.write_text(f'case.name = "short"\n[droplet]\n{liquid}\n{given}\n')
+    path.write_text(f'case.name = "short"\n[droplet]\n{liquid}\n{keys}\n')
     capillary = (1000.0 * 50e-6**3 / 0.072) ** 0.5
-    assert read_case(path, [], True).droplet.until == pytest.approx(followed * capillary)
+    assert read_case(path, [], True).droplet.until == pytest.approx(duration * capillary)
 
 
-def test_a_spacing_that_a_drop_does_not_resolve_is_refused(tmp_path):
+def test_spacing_too_large_for_a_drop_is_rejected(tmp_path):
     text = FREE.read_text().replace("particles_per_diameter = 16", 'spacing = "20 um"').partition("[scales")[0]
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(CaseError, match=r"too large for this drop.*11.7 um"):
         read_case(tmp_path / "case.toml", [], True)
 
 
-@pytest.mark.parametrize(("degrees", "across", "would_do"), [(30, 10, 12), (45, 8, 9), (37, 10, 11)])
-def test_a_cap_of_too_few_particles_is_refused_with_the_number_that_would_do(degrees, across, would_do):
-    """The widths of these caps are 9, 14 and 3 % off."""
+@pytest.mark.parametrize(("degrees", "across", "enough"), [(30, 10, 12), (45, 8, 9), (37, 10, 11)])
+def test_cap_of_too_few_particles_is_rejected_with_a_sufficient_number(degrees, across, enough):
+    """The widths of these caps are wrong by 9, 14 and 3 %."""
     angle, number = f"droplet.contact_angle={degrees} deg", "droplet.numerics.particles_per_diameter="
-    with pytest.raises(CaseError, match=rf"too large for the cap of {degrees} deg.*, {would_do} a diameter"):
+    with pytest.raises(CaseError, match=rf"too large for the cap of {degrees} deg.*, {enough} per diameter"):
         read_case(CAP, [angle, f"{number}{across}"], True)
-    read_case(CAP, [angle, f"{number}{would_do}"], True)
+    read_case(CAP, [angle, f"{number}{enough}"], True)
     read_case(CAP, [angle, f"{number}{across}", "droplet.speed=3 m/s"], True)
 
 
 @pytest.mark.parametrize(
     "path", [DAM, CHANNEL, VORTICES, FREE, CAP, IMPACT], ids=["dam", "channel", "vortices", "free", "cap", "impact"]
 )
-def test_plans_tell_particles_steps_and_cost(path):
+def test_forecast_has_particles_steps_and_cost(path):
     case = read_case(path, [], True)
-    outlook = forecast_flow(case)
-    assert outlook.particles == case.scene.particles
-    assert outlook.steps * outlook.time_step >= case.scene.until
-    assert outlook.seconds["particles"] > 0.0
+    predicted = forecast(case)
+    assert predicted.particles == case.scene.particles
+    assert predicted.steps * predicted.time_step >= case.scene.until
+    assert predicted.seconds["particles"] > 0.0
     assert kind_of(case).size(case).memory > 0.0
     study = kind_of(case).study(case)
     assert {run.parameter for run in study.runs} == {"particle spacing", "smoothing length"}
 
 
-def test_plans_say_what_takes_a_day_and_what_a_gpu_would_take():
-    told = []
+def test_plan_shows_the_cost_of_both_devices_and_what_takes_a_day():
+    plans = []
     for device in ("cpu", "cuda"):
         case = read_case(DAM, ["dam_break.numerics.particles_across=1000", f"dam_break.numerics.device={device}"], True)
-        outlook = forecast_flow(case)
-        assert outlook.by_device["cuda"].seconds < 0.05 * outlook.by_device["cpu"].seconds
-        assert outlook.seconds["particles"] == outlook.by_device[device].seconds
+        predicted = forecast(case)
+        assert predicted.by_device["cuda"].seconds < 0.05 * predicted.by_device["cpu"].seconds
+        assert predicted.seconds["particles"] == predicted.by_device[device].seconds
         console = Console(width=200)
         with console.capture() as text:
-            console.print(*flow_tables(case, outlook))
-        told.append(text.get())
-    assert told[0] == told[1]
-    assert "on a GPU" in told[0] and "a GPU or a coarser spacing is needed" in told[0]
+            console.print(*kind_of(case).plan(case, predicted))
+        plans.append(text.get())
+    assert plans[0] == plans[1]
+    assert "on a GPU" in plans[0] and "try a GPU or a coarser spacing" in plans[0]
     small = read_case(IMPACT, [], True)
-    assert forecast_flow(small).by_device["cpu"].seconds < 3600.0
+    assert forecast(small).by_device["cpu"].seconds < 3600.0
 
 
-def test_viscosity_by_shear_costs_what_its_forecast_says():
+def test_shear_dependent_viscosity_raises_the_predicted_cost():
     case = read_case(IMPACT, CARREAU, True)
-    (effect,) = (one for one in kind_of(case).effects if one.name == "shear_dependent_viscosity")
-    with_, without = forecast_flow(case), forecast_flow(effect.other_way(case, True))
+    (effect,) = (effect for effect in kind_of(case).effects if effect.name == "shear_dependent_viscosity")
+    with_, without = forecast(case), forecast(effect.other_way(case, True))
     assert with_.effects[effect.name]["on"] and not without.effects[effect.name]["on"]
     assert 1.2 < with_.seconds["particles"] / without.seconds["particles"] < 1.4
     assert effect.other_way(case, False) is None
 
 
-def test_viscosity_limits_the_step_of_fine_flows():
+def test_viscosity_limits_the_time_step_of_fine_flows():
     scene = read_case(CHANNEL, ["poiseuille.numerics.particles_across=200"], True).scene
-    assert time_step(scene, True) < time_step(scene, False)
+    assert scene.expected_time_step(True) < scene.expected_time_step(False)
 
 
 @pytest.mark.parametrize(
     ("path", "settings", "widths", "motion", "energies"),
     [
-        (IMPACT, ["droplet.speed=20 m/s", "droplet.viscosity=2 mPa*s"], 2, "largest speed", ["both"]),
-        (IMPACT, [], 0, "largest speed", ["both"]),
+        (IMPACT, ["droplet.speed=20 m/s", "droplet.viscosity=2 mPa*s"], 2, "largest speed", ["total"]),
+        (IMPACT, [], 0, "largest speed", ["total"]),
         (FREE, [], 0, "mean pressure", []),
     ],
 )
-def test_charts_of_a_droplet_show_what_is_known_of_its_kind(path, settings, widths, motion, energies):
+def test_droplet_charts_show_the_references_of_its_motion(path, settings, widths, motion, energies):
     case = read_case(path, settings, True)
     names = ("time", "spread", "height", "mean_pressure", "largest_speed", "kinetic_energy", "surface_energy")
-    shape, moves, energy = droplet_curves(case, {name: np.ones(2) for name in names})
-    assert sum("correlations" in one.name for one in shape.series) == widths
-    assert moves.y.label.startswith(motion)
-    assert [one.name for one in energy.series] == ["kinetic", "surface and wall", *energies]
+    result = FlowResult([], np.zeros((0, 3)), {name: np.ones(2) for name in names}, {})
+    shape, speed, energy = droplet_curves(case.scene, result)
+    assert sum("correlations" in line.name for line in shape.series) == widths
+    assert speed.y.label.startswith(motion)
+    assert [line.name for line in energy.series] == ["kinetic", "surface and wall", *energies]

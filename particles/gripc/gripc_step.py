@@ -19,9 +19,9 @@ from reflowshock.arrays import Floats
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.ispg.collocation import Operators, collocate
-from reflowshock.particles.ispg.mls import SUPPORT
-from reflowshock.particles.ispg.projection import (
+from reflowshock.particles.gripc.collocation import Operators, collocate
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT
+from reflowshock.particles.gripc.projection import (
     Correction,
     Poisson,
     Velocities,

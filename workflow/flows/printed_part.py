@@ -1,4 +1,4 @@
-"""Section of the report on a printed part: height map, surface in 3D, table of layers; and the map as a picture."""
+"""Report of a printed part: height map as a picture, surface in 3D, table of layers."""
 
 import base64
 from pathlib import Path
@@ -10,7 +10,7 @@ from reflowshock.arrays import Floats
 from reflowshock.workflow.case.text import number
 from reflowshock.workflow.report.scene import Field, Group, Scene
 
-VIEW = (-0.9, -1.6, 1.1)
+VIEW = (-0.9, -1.6, 1.1)  # direction towards the viewer
 COLUMNS = {
     "layer": "layer", "height_um": "height [µm]", "roughness_sa_um": "Sa [µm]", "roughness_sz_um": "Sz [µm]",
     "volume_pl": "volume [pL]", "parts_so_far": "connected parts", "voids": "voids",
@@ -18,32 +18,44 @@ COLUMNS = {
 
 
 def draw_heights(path: Path, x: Floats, y: Floats, heights: Floats) -> None:
-    """Write a PNG of heights `(i, j)` over x `(i,)` and y `(j,)`, all in m."""
+    """Write the height map as PNG.
+
+    Args:
+        path: File to write.
+        x: Grid coordinates, shape (i,) [m].
+        y: Grid coordinates, shape (j,) [m].
+        heights: Height of the part at the grid nodes, shape (i, j) [m].
+    """
     from reflowshock.workflow.report.drawing import STYLE, pyplot
 
     with pyplot.rc_context(STYLE):
         figure, axes = pyplot.subplots(figsize=(5.2, 4.4), layout="constrained")
-        shown = axes.pcolormesh(1e6 * x, 1e6 * y, 1e6 * heights.T, cmap="viridis", shading="nearest")
+        image = axes.pcolormesh(1e6 * x, 1e6 * y, 1e6 * heights.T, cmap="viridis", shading="nearest")
         axes.set_aspect("equal")
         axes.set_xlabel("x [µm]")
         axes.set_ylabel("y [µm]")
-        figure.colorbar(shown, label="height [µm]")
+        figure.colorbar(image, label="height [µm]")
         figure.savefig(path, dpi=150, metadata={"Software": None})
         pyplot.close(figure)
 
 
 def add_part(products: Path, context: dict) -> None:
-    """Add what a run has printed, from its products."""
+    """Add height map, surface and table of layers to the context of the report.
+
+    Args:
+        products: Folder with the products of the stage ``particles``.
+        context: Context of the page's template, changed in place.
+    """
     context["pictures"]["heights"] = base64.b64encode((products / "height_map.png").read_bytes()).decode()
     context["scenes"]["part"] = part_scene(products / "part.stl")
     context["tables"]["part"] = layer_table(products / "layers.csv")
 
 
 def part_scene(stl: Path) -> Scene:
-    """Return the surface of the part, coloured by height."""
+    """Return the surface of the part, coloured by height; the STL file is in millimetres."""
     mesh = meshio.read(stl)
-    points, place = np.unique(1e-3 * mesh.points, axis=0, return_inverse=True)
-    faces = place.reshape(-1)[mesh.cells[0].data]
+    points, vertex = np.unique(1e-3 * mesh.points, axis=0, return_inverse=True)
+    faces = vertex.reshape(-1)[mesh.cells[0].data]
     height = 1e6 * points[:, 2]
     part = np.zeros(len(points), dtype=int)
     group = Group("part", points, faces, part, values={"height": height[None]})
@@ -51,7 +63,7 @@ def part_scene(stl: Path) -> Scene:
 
 
 def layer_table(file: Path) -> dict:
-    """Return the table of layers, each with all that is printed up to it."""
+    """Return the table of layers; each row describes the part after that layer."""
     head = file.read_text(encoding="utf-8").splitlines()[0].split(",")
     columns = [head.index(name) for name in COLUMNS]
     rows = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)[:, columns]

@@ -30,7 +30,7 @@ def has_friction(physics: Physics) -> bool:
     return bool(physics.frictions or physics.holds)
 
 
-def kept_share(gradient: Floats, frequency: float) -> float:
+def tangential_share(gradient: Floats, frequency: float) -> float:
     """Share of the part along the surface that is kept.
 
     Args:

@@ -15,7 +15,7 @@ from reflowshock.particles.discretisation.incompressibility import SolveFailed
 
 
 @dataclass(frozen=True, slots=True)
-class BandedRoot:
+class BandedCholesky:
     """Cholesky factors of a sparse matrix `(s, s)`, in an order in which they lie next to the diagonal.
 
     Points of a surface in the order of Cuthill and McKee have those around them within a strip across it. LAPACK
@@ -80,7 +80,7 @@ def _band(diagonal, factor, matrix, order):
 
 
 @dataclass(frozen=True, slots=True)
-class StiffMass:
+class EffectiveMass:
     """Masses and implicit surface tension of d velocities, m / dt + dt P^T K P, K of the first s.
 
     P takes out the rigid motions R, orthonormal by the masses: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
@@ -94,20 +94,20 @@ class StiffMass:
     """
 
     inertia: Floats
-    factors: BandedRoot
+    factors: BandedCholesky
     across: Floats
     moved: Floats
     core: Floats
 
     @classmethod
-    def of(cls, masses: Floats, stiffness: sparse.bsr_matrix, rigid: Floats, time_step: float) -> "StiffMass":
+    def of(cls, masses: Floats, stiffness: sparse.bsr_matrix, rigid: Floats, time_step: float) -> "EffectiveMass":
         """Factor masses `(d,)` [kg] and stiffness `(s, s)` [N/m] with rigid motions `(k, d)`, for a time step [s].
 
         Raises:
             SolveFailed: the stiffness outweighs the masses where it is negative.
         """
         inertia, size, count = masses / time_step, stiffness.shape[0], len(rigid)
-        factors = BandedRoot.of(inertia[:size], time_step, stiffness)
+        factors = BandedCholesky.of(inertia[:size], time_step, stiffness)
         pull = np.zeros_like(rigid)
         pull[:, :size] = (stiffness @ rigid[:, :size].T).T
         across = np.concatenate((masses * rigid, pull)).T

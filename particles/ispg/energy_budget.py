@@ -12,7 +12,7 @@ from reflowshock.particles.surface.contact_line import RubbingLine
 
 
 @dataclass(frozen=True, slots=True)
-class LostEnergy:
+class EnergyLosses:
     """Energies that a flow has lost [J].
 
     Attributes:
@@ -41,13 +41,13 @@ class LostEnergy:
         return float(sum(getattr(self, entry.name) for entry in fields(self)))
 
 
-def total_losses(losses: Sequence[LostEnergy]) -> LostEnergy:
+def total_losses(losses: Sequence[EnergyLosses]) -> EnergyLosses:
     """Losses of several flows, each by its kind."""
-    return LostEnergy(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(LostEnergy)))
+    return EnergyLosses(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(EnergyLosses)))
 
 
 @dataclass(frozen=True, slots=True)
-class StepAction:
+class StepSolution:
     """What acts in a step by its equations.
 
     Attributes:
@@ -99,7 +99,7 @@ class StepEnd:
 
 
 @dataclass(frozen=True, slots=True)
-class Ledger:
+class EnergyBudget:
     """Energies of a step.
 
     Attributes:
@@ -115,12 +115,12 @@ class Ledger:
     equations: GalerkinEquations
     predicted: Body
     given: dict[int, Floats]
-    acting: StepAction
+    acting: StepSolution
     end: StepEnd
 
     def booked(
-        self, losses: LostEnergy, before: tuple[Floats, float], rubbing: Sequence[RubbingLine], tension: float
-    ) -> tuple[LostEnergy, float]:
+        self, losses: EnergyLosses, before: tuple[Floats, float], rubbing: Sequence[RubbingLine], tension: float
+    ) -> tuple[EnergyLosses, float]:
         """Losses with those of the step, and the mean force that has moved plates [N], not a number where none was.
 
         What work, friction of contact lines and the change of the energy do not explain is lost to the time
@@ -145,7 +145,7 @@ class Ledger:
         """Velocity along which forces act, `(n, 3)` [m/s]: plates that turn take particles along arcs."""
         return self.acting.mean if self.end.plates else self.end.transport
 
-    def _with_motion(self, losses: LostEnergy, last: Floats) -> LostEnergy:
+    def _with_motion(self, losses: EnergyLosses, last: Floats) -> EnergyLosses:
         """Losses with those of friction, and what the change of momentum takes beyond that of the kinetic energy.
 
         This is one of the time integration.

@@ -19,7 +19,7 @@ from reflowshock.particles.discretisation.incompressibility import (
     SolveFailed,
     to_petsc,
 )
-from reflowshock.particles.ispg.collocation import Operators
+from reflowshock.particles.gripc.collocation import Operators
 
 # Shape functions of the linear basis average: fast oscillating coefficients hardly show in values or derivatives, so
 # that multigrid and incomplete factors stall (200 iterations leave a residual above 1e-3 at 1728 particles).

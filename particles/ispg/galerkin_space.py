@@ -16,13 +16,13 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
-from reflowshock.particles.core.neighbours import find_beside, find_neighbours
+from reflowshock.particles.core.neighbours import find_near, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
-from reflowshock.particles.ispg.collocation import Ghosts, mirror
-from reflowshock.particles.ispg.mls import DegenerateStencil
+from reflowshock.particles.ispg.ghosts import Ghosts, mirror
+from reflowshock.particles.ispg.moving_plates import FloatingModes
 from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, nodal_volumes, with_moments
-from reflowshock.particles.ispg.rigid_motions import Riders
+from reflowshock.particles.ispg.stencils import check_stencils
 
 # Reach of the search for neighbours in spacings, and that of particles with too few of them.
 REACH, WIDEST = 2.4, 4.4
@@ -33,7 +33,7 @@ AT_REST: Mapping[int, Floats] = MappingProxyType({})  # no plate moves
 
 
 @dataclass(frozen=True, slots=True)
-class Galerkin:
+class GalerkinSpace:
     """Shape functions at n particles and the volumes that stand for integrals.
 
     Attributes:
@@ -54,15 +54,15 @@ class Galerkin:
     ghosts: Ghosts
     order: NDArray[np.int64]
     drift: Floats
-    riders: Riders | None = None
+    riders: FloatingModes | None = None
 
     @classmethod
-    def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "Galerkin":
+    def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "GalerkinSpace":
         """Fit the shape functions at the particles of a body, on plates with a slip length [m] and some twists `(6,)`.
 
         Raises:
             DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
-            NoVolumes: the particles do not fill the body.
+            NoNodalVolumes: the particles do not fill the body.
         """
         count, spacing = len(body.points), body.cloud.spacing
         planes = symmetry_planes(body.cloud)
@@ -73,7 +73,7 @@ class Galerkin:
         squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
         lacking = np.flatnonzero(squares == 0.0)
         if len(lacking):
-            lists = kernels.with_rows(lists, lacking, find_beside(points[lacking], points, WIDEST * spacing))
+            lists = kernels.with_rows(lists, lacking, find_near(points[lacking], points, WIDEST * spacing))
             wider = kernels.supports(lacking, points, (*lists, WIDEST * spacing), spacing)
             squares[lacking], lengths[lacking] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
@@ -184,15 +184,3 @@ class Galerkin:
 def symmetry_planes(cloud: Cloud) -> list[Plate]:
     """The planes of symmetry as plates, which are mirrored like walls."""
     return [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in cloud.symmetry]
-
-
-def check_stencils(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
-    """Refuse particles `(n,)` whose stencils are not sound; the message names the first and its trouble.
-
-    Raises:
-        DegenerateStencil: there is one.
-    """
-    if not sound.all():
-        worst = int(np.argmin(sound))
-        place = ", ".join(f"{coordinate:.4g}" for coordinate in body.points[worst])
-        raise DegenerateStencil(f"particle {worst} at ({place}) m {trouble}")

@@ -20,7 +20,7 @@ NODES, WEIGHTS = 0.5 + 0.5 * NODES, 0.5 * WEIGHTS
 
 
 @dataclass(frozen=True, slots=True)
-class Arcs:
+class SegmentQuadrature:
     """Places on e segments, `(e, g)` at the nodes of the rule.
 
     Attributes:
@@ -56,7 +56,7 @@ class Arcs:
 
 
 @dataclass(frozen=True, slots=True)
-class Chain:
+class Polyline:
     """What the segments between s vertices stand for; vertices `(s, 3)` [m] lie in the plane y = 0.
 
     Attributes:
@@ -70,12 +70,12 @@ class Chain:
     is_closed: bool = False
 
     @classmethod
-    def meridian(cls) -> "Chain":
+    def meridian(cls) -> "Polyline":
         """Half a body of revolution about the z axis."""
         return cls(1, np.pi)
 
     @classmethod
-    def plane(cls, is_closed: bool, depth: float = 1.0) -> "Chain":
+    def plane(cls, is_closed: bool, depth: float = 1.0) -> "Polyline":
         """A piece of a depth along y [m]."""
         return cls(0, depth, is_closed)
 
@@ -90,7 +90,7 @@ class Chain:
         none = np.zeros((1, *first.shape[1:]))
         return np.concatenate((first, none)) + np.concatenate((none, second))
 
-    def arcs(self, line: Floats) -> Arcs:
+    def arcs(self, line: Floats) -> SegmentQuadrature:
         """Places on the segments: straight ones, and parabolas with their apex on the axis."""
         first, second = self.ends(line)
         share, slope = np.tile(NODES, (len(first), 1)), np.ones((len(first), len(NODES)))
@@ -101,7 +101,7 @@ class Chain:
                     share[end] = away**2 if end == 0 else 1.0 - away**2
                     slope[end] = 2.0 * away
         rise = second - first
-        return Arcs(
+        return SegmentQuadrature(
             x=first[:, :1] + NODES * rise[:, :1],
             z=first[:, 2:] + share * rise[:, 2:],
             x_share=NODES,

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.ispg.energy_budget import EnergyLosses
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
-from reflowshock.particles.ispg.ledger import LostEnergy
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.ispg.rigid_motions import held, wall_velocities, with_momenta
 from reflowshock.particles.ispg.step_kernels import projected
@@ -22,7 +22,7 @@ EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class GalerkinPast:
+class GalerkinState:
     """What the last step left.
 
     Attributes:
@@ -56,7 +56,7 @@ class GalerkinPast:
     momenta: Floats
     momenta_change: Floats
     history: OneLeg
-    losses: LostEnergy
+    losses: EnergyLosses
     plates: Mapping[int, Floats] = field(default_factory=dict)
 
     @property
@@ -70,15 +70,15 @@ class GalerkinPast:
         return {wall: moved[1] for wall, moved in self.plates.items()}
 
     @classmethod
-    def start(cls, body: Body, potential: float, losses: LostEnergy | None = None) -> "GalerkinPast":
+    def start(cls, body: Body, potential: float, losses: EnergyLosses | None = None) -> "GalerkinState":
         """A body that starts with its velocity, and an energy of the forces [J]."""
         slope, start = np.zeros((len(body.points), 3, 3)), OneLeg.start(len(body.points))
-        losses = losses or LostEnergy()
+        losses = losses or EnergyLosses()
         still, unknown = np.zeros(6), np.zeros(len(body.points))
         at_rest = (body.pressure, np.zeros((len(body.points), 3)), unknown, 1.0, still, still)
         return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
 
-    def carried_losses(self, kinetic: float, potential: float) -> LostEnergy:
+    def carried_losses(self, kinetic: float, potential: float) -> EnergyLosses:
         """Losses up to a step that starts with these energies [J], of new masses and of triangles that have moved."""
         transfer = 0.0 if self.kinetic is None else self.kinetic - kinetic
         evening = self.potential - potential
@@ -87,8 +87,8 @@ class GalerkinPast:
 
     def carried_on(
         self, body: Body, physics: Physics, projections: Floats, admitted: NDArray[np.bool_]
-    ) -> "GalerkinPast":
-        """The past of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it.
+    ) -> "GalerkinState":
+        """The state of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it.
 
         The body is put where its momentum took its centre, along axes that walls admit `(3,)`: evening out triangles
         gives volume to one side and takes it from another, and would let a drop wander over its wall.
@@ -101,8 +101,8 @@ class GalerkinPast:
         acceleration = projected(projections, self.acceleration)
         return replace(self, points=body.points, velocity=velocity, acceleration=acceleration, history=history)
 
-    def with_momenta(self, equations: GalerkinEquations, motions: Floats, kept: NDArray[np.bool_]) -> "GalerkinPast":
-        """The past with the momenta of the last steps along those of the rigid motions `(6, n, 3)` that are kept.
+    def with_momenta(self, equations: GalerkinEquations, motions: Floats, kept: NDArray[np.bool_]) -> "GalerkinState":
+        """The state with the momenta of the last steps along those of the rigid motions `(6, n, 3)` that are kept.
 
         Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
         Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
@@ -115,8 +115,8 @@ class GalerkinPast:
         change = with_momenta(*along, self.history.velocity_change, self.momenta_change[kept])
         return replace(self, velocity=velocity, history=replace(self.history, velocity_change=change))
 
-    def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinPast":
-        """The past of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
+    def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinState":
+        """The state of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
         history = self.history.stopped(physics.pinned(body), np.zeros_like(body.points))
         velocity, acceleration = (projected(projections, each) for each in (self.velocity, self.acceleration))
         return replace(self, velocity=velocity, acceleration=acceleration, history=history)
@@ -127,7 +127,7 @@ class Prediction:
     """Where the equations of a step hold.
 
     Attributes:
-        past: what the last step left, with the momenta along rigid motions that it had.
+        state: what the last step left, with the momenta along rigid motions that it had.
         base: start of the equivalent backward Euler step.
         given, guessed: mean twists of plates that are moved, and those predicted of plates that float, `(6,)`.
         guess: velocity of the prediction, `(n, 3)` [m/s].
@@ -136,7 +136,7 @@ class Prediction:
         motions: rigid ones there, `(6, n, 3)`.
     """
 
-    past: GalerkinPast
+    state: GalerkinState
     base: Base
     given: dict[int, Floats]
     guessed: dict[int, Floats]
@@ -152,7 +152,7 @@ def centre(body: Body) -> Floats:
     return first / volume
 
 
-def evening_passes(gradient: Floats, frequency: float, time_step: float) -> float:
+def smoothing_passes(gradient: Floats, frequency: float, time_step: float) -> float:
     """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
 
     Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a

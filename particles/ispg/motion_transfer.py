@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
-from reflowshock.particles.ispg.galerkin import AT_REST
+from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.galerkin_space import AT_REST
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.ledger import total_losses
-from reflowshock.particles.ispg.past import GalerkinPast, centre
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
+from reflowshock.particles.ispg.state import GalerkinState, centre
 from reflowshock.particles.physics.physics import Physics
 
 NEIGHBOURS = 8
@@ -27,7 +27,7 @@ NEAREST = 1e-3  # spacings
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class MovingBody:
     """A body, what acts on it, and the solver that moves it."""
 
     body: Body
@@ -35,31 +35,31 @@ class Moving:
     solver: IspgStep
 
     @property
-    def past(self) -> GalerkinPast:
+    def state(self) -> GalerkinState:
         """What its last step left; before the first, its velocity and what that makes."""
-        if self.solver.past is not None:
-            return self.solver.past
+        if self.solver.state is not None:
+            return self.solver.state
         equations, body = self.equations(), self.body
-        past = GalerkinPast.start(body, self.physics.energy(body))
+        state = GalerkinState.start(body, self.physics.energy(body))
         momenta = rigid_momenta(rigid_motions(body.points), equations.masses, body.velocity)
         gradient = equations.space.gradient(body.velocity)
-        return replace(past, gradient=gradient, momenta=momenta, kinetic=equations.kinetic(body.velocity))
+        return replace(state, gradient=gradient, momenta=momenta, kinetic=equations.kinetic(body.velocity))
 
     @property
     def first_energy(self) -> float:
         """Energy of the forces before its first step [J]."""
-        return self.physics.energy(self.body) if self.solver.past is None else self.solver.first_energy
+        return self.physics.energy(self.body) if self.solver.state is None else self.solver.first_energy
 
     def equations(self, twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
         """Its masses and shape functions where it is, on plates with some twists `(6,)`."""
-        past = self.solver.past or GalerkinPast.start(self.body, 0.0)
+        state = self.solver.state or GalerkinState.start(self.body, 0.0)
         body, projections = self.body, self.physics.projections(self.body)
         admitted = admitted_motions(body.points, projections)
-        step = PreparedIspgStep(self.solver, body, self.physics, past, 0.0, projections, admitted)
+        step = PreparedIspgStep(self.solver, body, self.physics, state, 0.0, projections, admitted)
         return step.equations(body, 1.0, twists)
 
 
-def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
+def transfer_motion(new: Sequence[MovingBody], old: Sequence[MovingBody]) -> None:
     """Give bodies, and their solvers, the motion and the ledger of those that they were made of.
 
     The first of the new ones gets the whole ledger: together they have that of the old ones.
@@ -68,20 +68,20 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
         new: not moved yet.
         old: what they were made of, as a whole.
     """
-    pasts, twists = [part.past for part in old], [_twists(part.body, old) for part in new]
+    states, twists = [part.state for part in old], [_twists(part.body, old) for part in new]
     equations = [part.equations(its) for part, its in zip(new, twists, strict=True)]
     velocities = [
-        here.given + part.physics.admit(part.body, carried(part.body.points, old, pasts))
+        here.given + part.physics.admit(part.body, carried(part.body.points, old, states))
         for part, here in zip(new, equations, strict=True)
     ]
-    momenta = sum((past.momenta for past in pasts), np.zeros(6))
+    momenta = sum((state.momenta for state in states), np.zeros(6))
     velocities = _with_momenta(new, equations, velocities, momenta)
-    energy, behind = 0.0, _behind(old, pasts)
+    energy, behind = 0.0, _behind(old, states)
     for part, here, velocity, its in zip(new, equations, velocities, twists, strict=True):
         part.body.velocity = velocity
         own, motions = part.physics.energy(part.body), rigid_motions(part.body.points)
-        part.solver.past = replace(
-            GalerkinPast.start(part.body, own),
+        part.solver.state = replace(
+            GalerkinState.start(part.body, own),
             gradient=here.space.gradient(velocity),
             kinetic=here.kinetic(velocity),
             momenta=rigid_momenta(motions, here.masses, velocity),
@@ -92,31 +92,31 @@ def take_over(new: Sequence[Moving], old: Sequence[Moving]) -> None:
         part.solver.first_energy = 0.0
         energy += own + here.kinetic(velocity)
     now = [part.physics.energy(part.body) for part in old]
-    evened = sum(past.potential - left for past, left in zip(pasts, now, strict=True))
-    before = sum(now) + sum(past.kinetic or 0.0 for past in pasts)
-    first, losses = new[0].solver, total_losses([past.losses for past in pasts])
+    evened = sum(state.potential - left for state, left in zip(states, now, strict=True))
+    before = sum(now) + sum(state.kinetic or 0.0 for state in states)
+    first, losses = new[0].solver, total_losses([state.losses for state in states])
     losses = replace(losses, evening=losses.evening + evened, rebuilding=losses.rebuilding + before - energy)
     first.first_energy = sum(part.first_energy for part in old)
-    first.past = replace(first.past, losses=losses) if first.past else None
+    first.state = replace(first.state, losses=losses) if first.state else None
 
 
-def _twists(body: Body, old: Sequence[Moving]) -> dict[int, Floats]:
+def _twists(body: Body, old: Sequence[MovingBody]) -> dict[int, Floats]:
     """Twists of the plates of a body, those on the same side of old ones."""
-    moved = {part.body.plates[wall].side: twist for part in old for wall, twist in part.past.twists.items()}
+    moved = {part.body.plates[wall].side: twist for part in old for wall, twist in part.state.twists.items()}
     return {wall: moved[plate.side] for wall, plate in enumerate(body.plates) if plate.side in moved}
 
 
-def _behind(old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:
+def _behind(old: Sequence[MovingBody], states: Sequence[GalerkinState]) -> Floats:
     """How far the centre of bodies is from where their momenta took it, `(3,)` [m]."""
     volumes = np.array([part.body.volume()[0] for part in old])
-    ways = np.array([past.centre - centre(part.body) for part, past in zip(old, pasts, strict=True)])
+    ways = np.array([state.centre - centre(part.body) for part, state in zip(old, states, strict=True)])
     return volumes @ ways / volumes.sum()
 
 
-def carried(points: Floats, old: Sequence[Moving], pasts: Sequence[GalerkinPast]) -> Floats:
+def carried(points: Floats, old: Sequence[MovingBody], states: Sequence[GalerkinState]) -> Floats:
     """Velocities at points `(n, 3)` [m/s]: of the old particles around, weighed by the inverse distance."""
     places, velocities, gradients = (
-        np.concatenate([getattr(past, name) for past in pasts]) for name in ("points", "velocity", "gradient")
+        np.concatenate([getattr(state, name) for state in states]) for name in ("points", "velocity", "gradient")
     )
     nearness = NEAREST * min(part.body.cloud.spacing for part in old)
     distance, nearest = cKDTree(places).query(points, NEIGHBOURS)
@@ -127,7 +127,7 @@ def carried(points: Floats, old: Sequence[Moving], pasts: Sequence[GalerkinPast]
 
 
 def _with_momenta(
-    new: Sequence[Moving], equations: Sequence[GalerkinEquations], velocities: Sequence[Floats], momenta: Floats
+    new: Sequence[MovingBody], equations: Sequence[GalerkinEquations], velocities: Sequence[Floats], momenta: Floats
 ) -> list[Floats]:
     """Velocities with the momenta `(6,)` in all, as far as walls and edges admit a motion of all bodies."""
     kept = np.logical_and.reduce(

@@ -1,0 +1,15 @@
+"""All kinds of flow. To add one, write its file next to `dam_break.py` and list its record here."""
+
+from reflowshock.workflow.flows.dam_break import DAM_BREAK
+from reflowshock.workflow.flows.droplet import DROPLET
+from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
+from reflowshock.workflow.flows.poiseuille import POISEUILLE
+from reflowshock.workflow.flows.printing import PRINTING
+from reflowshock.workflow.flows.taylor_green import TAYLOR_GREEN
+
+FLOWS = (DAM_BREAK, POISEUILLE, TAYLOR_GREEN, DROPLET, PRINTING)
+
+
+def flow_of(case: FlowCase) -> FlowKind:
+    """Return the kind of flow of a case."""
+    return next(flow for flow in FLOWS if flow.case is type(case))
