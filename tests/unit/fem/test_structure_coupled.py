@@ -70,7 +70,7 @@ def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
 def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
     layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
     request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
-    with pytest.raises(CouplingError, match=r"less than half of the longest.*name the fine layers in dynamics\.coupling\.fine"):
+    with pytest.raises(CouplingError, match=r"half of the longest.*name the fine layers in dynamics\.coupling\.fine"):
         divided_on_one_rank(request)
 
 
