@@ -90,7 +90,7 @@ class PackageDrop:
 
     def watch(self, model: Model[JointTables]) -> JointWatch:
         """Return the watch points of a model."""
-        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping.coefficients
+        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping
         turning = self.request.kinematics in TURNING
         return JointWatch(model.tables, model.body, yields, damping, turning)
 
