@@ -29,9 +29,9 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.kernels.motion import link_velocities
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.checkpoint_state import Rows, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import Rows, State
 
 
 class GravouilCombescure:

@@ -18,9 +18,9 @@ from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.checkpoint_state import Rows, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import Rows, State
 
 
 class HeldVelocity:

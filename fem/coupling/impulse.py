@@ -19,9 +19,9 @@ from reflowshock.fem.dynamics.participant import Restartable
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.checkpoint_state import Rows, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import Rows, State
 
 
 class Impulse:

@@ -20,7 +20,7 @@ from reflowshock.fem.kernels.motion import add_pushed, advance
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
-from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, Shares, State, Sum
 
 
 class ExplicitMotion(Motion):

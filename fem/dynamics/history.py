@@ -12,9 +12,9 @@ from reflowshock.data_file import columns, fields_of, rows
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.participant import Participant
+from reflowshock.fem.parallel.checkpoint_state import Log, Same, State
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.portable import Log, Same, State
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 
 class Watch(Protocol):
@@ -86,9 +86,9 @@ class History:
 
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)
-        HERE.wait_for("the sums of a sample, with all ranks")
+        ACTIVITY.wait_for("the sums of a sample, with all ranks")
         self._world.Allreduce(part, result, operation)
-        HERE.go_on()
+        ACTIVITY.go_on()
         return result
 
     def arrays(self, names: Collection[str] | None = None) -> dict[str, NDArray]:

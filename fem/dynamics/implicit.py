@@ -29,7 +29,7 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed
-from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.loads.load import Loaded
-from reflowshock.fem.parallel.portable import State
+from reflowshock.fem.parallel.checkpoint_state import State
 
 
 class Motion(Loaded):

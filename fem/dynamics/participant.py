@@ -16,7 +16,7 @@ from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.parallel.portable import State, Sum
+from reflowshock.fem.parallel.checkpoint_state import State, Sum
 
 
 class Participant(Protocol):

@@ -23,7 +23,7 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_constants
 from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.parallel.portable import Rows
+from reflowshock.fem.parallel.checkpoint_state import Rows
 
 if TYPE_CHECKING:
     from reflowshock.fem.forces.force_ufl import Law

@@ -36,7 +36,7 @@ from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradien
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
 from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
-from reflowshock.fem.parallel.portable import Rows
+from reflowshock.fem.parallel.checkpoint_state import Rows
 
 AnyBlocks = Blocks | OnePointBlocks | HexahedronBlocks
 HISTORY = {  # name in checkpoints -> array of blocks that have it

@@ -13,7 +13,7 @@ from reflowshock.fem import dolfinx_api
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
-from reflowshock.fem.parallel.portable import Rows, Same, State
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, State
 
 
 @dataclass(frozen=True, slots=True)

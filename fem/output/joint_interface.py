@@ -15,9 +15,9 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.mesh.joint_interface import JointInterfaceTable
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.checkpoint_state import Log, State
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.portable import Log, State
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
@@ -53,9 +53,9 @@ class JointInterfaceStress:
             motion, (rows, recovery) = participant.motion, self._shares[role]
             stress[rows] = von_mises(recovery.stress(motion.displacement - motion.base_displacement()))
             time = motion.time
-        HERE.wait_for("the stress at the interface of joints, with all ranks")
+        ACTIVITY.wait_for("the stress at the interface of joints, with all ranks")
         self._world.Allreduce(MPI.IN_PLACE, stress)
-        HERE.go_on()
+        ACTIVITY.go_on()
         if self._world.rank == 0:
             self._rows.append({"time": time, "stress": stress})
 

@@ -20,7 +20,7 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.output.cooling_report import Convergence, CooledPackage, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.problem.inputs import CoolingInput
 from reflowshock.fem.setup.models import Model
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics
@@ -41,7 +41,7 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
     start = time.perf_counter()
     package = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
     tables: JointTables = world.bcast(package.model.tables if package else None)
-    HERE.slow = "cools the model"
+    ACTIVITY.slow = "cools the model"
     pieces = distributed(world, package.model.mesh if package else None, tables, request)
     ones = np.ones(len(pieces.steps))
     body = make_body(world, pieces, tables, ones, ForceOptions())

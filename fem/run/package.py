@@ -29,7 +29,7 @@ from reflowshock.fem.output.structure_modes import ModeTable, write_modes
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.run.dynamics import place, run_dynamics
 from reflowshock.fem.setup.models import DividedModels, Model
@@ -119,7 +119,7 @@ class PackageDrop:
         """Return the natural modes of a single undivided model if the input requests them, otherwise None."""
         if not self.request.shock.modes:
             return None
-        with HERE.busy("finds natural modes"):
+        with ACTIVITY.busy("finds natural modes"):
             modes = agreed(comms.world, lambda: modes_of(self.request) if comms.world.rank == 0 else None)
         table: ModeTable = comms.world.bcast(modes)
         return table

@@ -21,9 +21,9 @@ from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.output.fields import Fields, FieldSample
 from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.checkpoint_state import State
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.portable import State
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the time step holds for undeformed elements; reduce numerics.step_fraction for strong compression"
@@ -96,7 +96,7 @@ def run_time_loop(
             participants, outputs, state, [window for window in sorted(field_windows) if window < first]
         )
     for window in range(first, plan.windows + 1):
-        HERE.window = window
+        ACTIVITY.window = window
         if window:
             run_window(participants, stopwatch)
         sampled = watch(participants, outputs, window)
@@ -110,7 +110,7 @@ def run_time_loop(
         if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
             reported = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
-    HERE.slow = "writes the results"
+    ACTIVITY.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
     return window, output_seconds
@@ -120,9 +120,9 @@ def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
     """Return whether the run ends early; collective, decided on rank 0, which has the samples."""
     if outputs.is_over is None:
         return False
-    HERE.wait_for("the decision of rank 0 whether the run is over")
+    ACTIVITY.wait_for("the decision of rank 0 whether the run is over")
     over = bool(world.bcast(outputs.is_over(outputs.history) if world.rank == 0 else None))
-    HERE.go_on()
+    ACTIVITY.go_on()
     return over
 
 
@@ -154,7 +154,7 @@ def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
         for role, participant in participants.items():
             participant.finish_window()
             stopwatch.lap(role)
-        HERE.slow = ""  # from here on all kernels are compiled
+        ACTIVITY.slow = ""  # from here on all kernels are compiled
     except InvertedElementError as error:
         raise InvertedElementError(f"time {time_of(participants):.6e} s: {error}; {FLATTENED}") from error
 
@@ -167,12 +167,12 @@ def time_of(participants: Participants) -> float:
 def write_fields(participants: Participants, outputs: Outputs, window: int) -> float:
     """Write the fields of all models of this rank, also for a restart; return the time spent [s]."""
     begin = time.perf_counter()
-    with HERE.busy("writes fields"):
+    with ACTIVITY.busy("writes fields"):
         for role, participant in participants.items():
             fields = outputs.fields[role]
             sample = sample_fields(participant, fields)
             fields.write(sample)
-            outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
+            outputs.checkpoints.store(f"{role}-{window}", {role: fields.state(sample)})
     return time.perf_counter() - begin
 
 
@@ -191,7 +191,7 @@ def state_of(participants: Participants, outputs: Outputs) -> State:
 
 def save(participants: Participants, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
-    with HERE.busy("writes a checkpoint"):
+    with ACTIVITY.busy("writes a checkpoint"):
         outputs.checkpoints.write(window, time_of(participants), state_of(participants, outputs))
 
 
@@ -210,7 +210,7 @@ def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], 
     }
     for window in field_windows:
         for role in participants:
-            stored = checkpoints.kept(f"{role}-{window}", {role: like[role]})
+            stored = checkpoints.stored(f"{role}-{window}", {role: like[role]})
             outputs.fields[role].write(FieldSample(**stored[role]))
     if checkpoints.moved and checkpoints.continued is not None:
         save(participants, outputs, checkpoints.continued)

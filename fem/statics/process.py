@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes
 from reflowshock.processes import ProcessPool
 
@@ -80,7 +80,7 @@ _structure: "ThermalStructure"  # set in the separate process by `_build`
 def _build(assembly: Assembly) -> tuple[NDArray[np.float64], NDArray[np.bool_], RigidModes]:
     """Build the structure and store it for `_solve`."""
     global _structure
-    environment = own_environment(os.environ)
+    environment = without_mpi_job(os.environ)
     os.environ.clear()
     os.environ.update(environment)
     from mpi4py import MPI  # starts MPI, outside the job of the parent

@@ -8,7 +8,7 @@ from reflowshock.cases.hard.trials.coupled import Coupled
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.errors import EnergyError
-from reflowshock.fem.parallel.portable import values
+from reflowshock.fem.parallel.checkpoint_state import values
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 WITH_LEVELS = "held_velocity, levels auto"

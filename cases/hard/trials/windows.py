@@ -16,8 +16,8 @@ from reflowshock.fem.materials.library import FR4, SAC405
 from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.parallel.checkpoint_state import values
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import values
 from reflowshock.fem.problem.shock import Coupling
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from reflowshock.fem.coupling.planner import KEPT, kept
 from reflowshock.fem.parallel.checkpoint import Checkpoints
-from reflowshock.fem.parallel.portable import Log, Rows, Same, Shares, Sum
+from reflowshock.fem.parallel.checkpoint_state import Log, Rows, Same, Shares, Sum
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import structure_input
@@ -40,7 +40,7 @@ def written(folder) -> Checkpoints:
     files = checkpoints(folder)
     files.read(state(0))
     for window in (3, 5):
-        files.keep(f"macro-{window}", {"macro": {"time": Same(window)}})
+        files.store(f"macro-{window}", {"macro": {"time": Same(window)}})
         files.write(window, 0.5 * window, state(window))
     return files
 
@@ -62,7 +62,7 @@ def test_a_state_comes_back_as_it_was(tmp_path):
     assert found["history"]["balance"] == {"limit": 0.01}
     assert (found["macro"]["displacement"] == 5.0).all()
     assert found["macro"]["work"] == 0.5
-    assert files.kept("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
+    assert files.stored("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
 
 
 @pytest.mark.parametrize("pattern", ["*/state-0000-1", "*/macro-5-0000"])
