@@ -34,7 +34,7 @@ from reflowshock.fem.parallel.checkpoint_files import (
 )
 from reflowshock.fem.parallel.checkpoint_state import ENTRIES, State
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
-from reflowshock.sources import digest_of_sources
+from reflowshock.sources import MATERIALS, digest_of_sources
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
@@ -212,4 +212,4 @@ def remove_others(run_folder: Path) -> None:
 def _code() -> bytes:
     """Return a digest of this package's source and of the libraries, since other code may change the results."""
     libraries = " ".join(version(name) for name in LIBRARIES)
-    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1], MATERIALS)

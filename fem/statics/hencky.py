@@ -13,8 +13,8 @@ from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks
 from reflowshock.fem.kernels.hencky import ElementState, Shape, hexahedra, hourglass_share, one_point
-from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.plasticity import plastic_constants
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class HenckyElements:
 
     Attributes:
         elements: Elements with their elasticity.
-        laws: Plastic constants of each material, rows of ``kernels.plasticity.plastic_constants``, shape (nm, 6).
+        laws: Plastic constants of each material, rows of ``materials.plasticity.plastic_constants``, shape (nm, 6).
         expansion: Free thermal strain of each material along x, y, z, shape (nm, 3).
     """
 

@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any
 
 from reflowshock.data_file import NotData, read_data, read_header, write_data
-from reflowshock.sources import digest_of_sources
+from reflowshock.sources import MATERIALS, digest_of_sources
 
 logger = logging.getLogger(__name__)
 
@@ -75,4 +75,4 @@ class Checkpoint:
 def _code() -> bytes:
     """Digest of this package's source and of the libraries: other code would read or continue a state differently."""
     libraries = " ".join(version(name) for name in LIBRARIES)
-    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1], MATERIALS)
