@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from reflowshock.fem.coupling.planner import KEPT, kept
+from reflowshock.fem.coupling.planner import COST_FILE, stored_costs
 from reflowshock.fem.parallel.checkpoint import Checkpoints
 from reflowshock.fem.parallel.checkpoint_state import Log, Rows, Same, Shares, Sum
 from reflowshock.fem.run import time_loop
@@ -116,6 +116,6 @@ def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeyp
 
 @pytest.mark.parametrize("content", [b"", b"[1, 2]", b'{"fixed": [1.0]', b'{"fixed": 1, "element": [], "latency": 0}'])
 def test_a_broken_measurement_of_speeds_is_taken_again(tmp_path, capsys, content):
-    (tmp_path / KEPT).write_bytes(content)
-    assert kept(MPI.COMM_WORLD, tmp_path, np.array([0], np.int8)) is None
+    (tmp_path / COST_FILE).write_bytes(content)
+    assert stored_costs(MPI.COMM_WORLD, tmp_path, np.array([0], np.int8)) is None
     assert "measured again" in warnings(capsys.readouterr().out)[0]
