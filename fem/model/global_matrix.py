@@ -33,7 +33,7 @@ class Equations:
 
     @classmethod
     def of(cls, comm: MPI.Comm, body: Body) -> "Equations":
-        """Number the free components of a model; collective.
+        """Assign equation numbers to the free components of a model; collective.
 
         Raises:
             ValueError: No component is free; on every rank.
