@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from reflowshock.effect import Decision
-from reflowshock.fem.estimates.drop_effects import Deflection, SolderPlasticity, called_for
+from reflowshock.fem.estimates.drop_effect import Deflection
+from reflowshock.fem.estimates.drop_effects import SolderPlasticity, called_for
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
 if TYPE_CHECKING:
