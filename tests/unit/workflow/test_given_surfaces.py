@@ -152,8 +152,6 @@ def test_given_reflowed_and_bridged_surfaces_are_written_and_meshed(run):
     assert enclosed_volume(given) == pytest.approx(measures["A4"]["volume"])
     coarse = needs_coarse_joints(run.case.shock.coupling)
     qualities = mesh_real_joints(run.case, run.folder, run.folder / "solder_mesh", coarse=coarse)
-        run.case, run.folder, run.folder / "solder_mesh", coarse=needs_coarse_joints(run.case.shock.coupling)
-    )
     assert set(qualities[""]) == {"A4", "B4"} and set(qualities["bridged_"]) == {"A3+B3"}
     assert (run.folder / "solder_mesh/free_form_A3+B3.msh").exists()
     found = findings.of_solder_mesh(qualities, {})
