@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.flows import Poiseuille, TaylorGreen
+from reflowshock.particles.flows.channel import Poiseuille, channel_points, exact_speeds, plate_points
+from reflowshock.particles.flows.result import FlowResult
+from reflowshock.particles.flows.vortices import TaylorGreen, box_points
 from reflowshock.particles.reference import viscous_flows as exact
 from reflowshock.particles.sph import flow
-from reflowshock.particles.sph.flow import FlowResult
 from reflowshock.particles.sph.simulation import Simulation
 
 Progress = Callable[[float], None]
@@ -44,23 +44,10 @@ def solve_poiseuille(
     return flow.result_of(run, history, metrics)
 
 
-def exact_speeds(height: Floats, time: float, scene: Poiseuille) -> Floats:
-    """Return exact speeds between plates [m/s] at heights `(n,)` [m], a time [s]; of a rheology, the steady ones."""
-    if scene.rheology is None:
-        return exact.starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
-    law = scene.rheology
-    return exact.steady_channel(
-        height, scene.width, scene.rate_at_wall, lambda rate: law.viscosity(rate, scene.viscosity)
-    )
-
-
 def channel(scene: Poiseuille) -> Simulation:
     """Set up liquid at rest between two plates."""
-    across, layers = scene.numerics.particles_across, flow.wall_layers(scene)
     law = flow.law_of(scene, (scene.columns * scene.spacing, 0.0, 0.0), (scene.force, 0.0, 0.0), has_surface=False)
-    columns, beside = np.arange(scene.columns), np.arange(layers)
-    liquid = flow.lattice(columns, np.arange(across), scene.spacing)
-    walls = flow.lattice(columns, np.concatenate((-1 - beside, across + beside)), scene.spacing)
+    liquid, walls = channel_points(scene), plate_points(scene, flow.wall_layers(scene))
     fields = flow.liquid_and_walls(liquid, walls, np.zeros(liquid.shape[1]), law)
     return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
@@ -94,9 +81,8 @@ def solve_taylor_green(
 
 def vortices(scene: TaylorGreen) -> Simulation:
     """Set up the vortices in a periodic box."""
-    places = np.arange(scene.numerics.particles_across)
     law = flow.law_of(scene, (scene.side, 0.0, scene.side), (0.0, 0.0, 0.0), has_surface=False)
-    liquid = flow.lattice(places, places, scene.spacing)
+    liquid = box_points(scene)
     u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)
     fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
     fields.u[:], fields.w[:] = scene.speed * u, scene.speed * w
