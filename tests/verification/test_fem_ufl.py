@@ -154,6 +154,7 @@ def test_free_vibration_keeps_its_energy():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.4)
 
 
+@pytest.mark.long
 def test_free_vibration_loses_what_a_viscous_law_takes():
     balance, taken = energy_errors(own_material.potting(1e-7), 0.2)
     assert balance < 1e-10

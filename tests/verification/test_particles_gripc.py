@@ -55,6 +55,7 @@ def test_the_pressure_equation_converges_with_the_quadratic_basis():
     assert errors[-1] < 2e-3
 
 
+@pytest.mark.long
 def test_the_pressure_equation_does_not_converge_as_printed():
     """Linear basis, eqs 21 and 22: the error stays at some percent (PHYSICS 1)."""
     order, errors = poisson_order("linear")

@@ -145,7 +145,10 @@ def test_a_whole_package_is_held_level_by_four_corners(tmp_path):
         assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
 
 
-@pytest.mark.parametrize(("side", "thickness"), [(8.0, 0.4), (6.0, 0.775), (4.0, 0.4)])
+@pytest.mark.parametrize(
+    ("side", "thickness"),
+    [(8.0, 0.4), pytest.param(6.0, 0.775, marks=pytest.mark.long), pytest.param(4.0, 0.4, marks=pytest.mark.long)],
+)
 def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path, side, thickness):
     parts = package(
         rows=10,

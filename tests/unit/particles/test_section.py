@@ -1,6 +1,7 @@
 """Bodies in section: chains against exact sums and differences, conservation, swings and drops at rest."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -162,7 +163,7 @@ def swung(polyline, rings, steps_per_period, periods):
     return omega / found - 1.0, decay / (0.025 if polyline.power else 0.02), flow
 
 
-@pytest.mark.parametrize("polyline", [MERIDIAN, RING], ids=["meridian", "plane"])
+@pytest.mark.parametrize("polyline", [MERIDIAN, pytest.param(RING, marks=pytest.mark.long)], ids=["meridian", "plane"])
 def test_a_free_drop_swings_in_time(polyline):
     """Rayleigh's period, in a plane omega^2 = n (n^2 - 1) gamma / (rho R^3); decay by viscosity and some smoothing."""
     period, decay, _ = swung(polyline, 8, 100, 1.2)
@@ -170,7 +171,7 @@ def test_a_free_drop_swings_in_time(polyline):
     assert 0.9 < decay < 1.25
 
 
-@pytest.mark.parametrize("polyline", [MERIDIAN, RING], ids=["meridian", "plane"])
+@pytest.mark.parametrize("polyline", [MERIDIAN, pytest.param(RING, marks=pytest.mark.long)], ids=["meridian", "plane"])
 def test_long_steps_damp_a_swing(polyline):
     """By little more than viscosity; with tension in a prediction alone it grew."""
     _, decay, flow = swung(polyline, 8, 16, 2)
@@ -197,6 +198,7 @@ def test_a_thrown_drop_keeps_its_momenta_and_energy():
     assert now == pytest.approx(energy, rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_plane_drop_becomes_a_circular_segment():
     angle = 2.0 * np.pi / 3.0
     drop = Section.filled(block(PLANE, 1.0, 1.0, 8), PLANE)
@@ -225,34 +227,35 @@ def solder_of(drop, **effects):
     )
 
 
-@pytest.fixture(scope="module")
-def drops():
-    """At rest, of 8 and 15 particles along the edge of the cube."""
-    found = []
-    for count in (8, 15):
-        drop = Drop(volume=1e-9, contact_angle=np.radians(148.0), particles_per_edge=count, section="axisymmetric")
-        found.append(drop_to_rest(drop, solder_of(drop)))
-    return found
+@cache
+def axisymmetric_drop(count):
+    """A drop at rest on a wall of 148 degrees, with `count` particles along the edge of the initial cube."""
+    drop = Drop(volume=1e-9, contact_angle=np.radians(148.0), particles_per_edge=count, section="axisymmetric")
+    return drop_to_rest(drop, solder_of(drop))
 
 
-def test_a_drop_on_a_wall_comes_to_its_exact_shape(drops):
+@pytest.mark.long
+def test_a_drop_on_a_wall_comes_to_its_exact_shape():
+    drops = [axisymmetric_drop(count) for count in (8, 15)]
     errors = [drop.shape.metrics["shape_error"][0] for drop in drops]
     assert np.log(errors[0] / errors[1]) / np.log(2.0) > 1.5
     for name, limit in (("height_error", 2e-3), ("max_width_error", 1e-3)):
         assert abs(drops[1].shape.metrics[name][0]) < limit
 
 
-def test_a_drop_loses_neither_volume_nor_particles_nor_energy(drops):
-    for drop in drops:
-        metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
-        assert metrics["at_rest"] == 1.0
-        assert metrics["particles_lost"] == 0.0
-        assert abs(metrics["volume_drift"]) < 1e-12
-        assert abs(metrics["energy_imbalance"]) < 1e-4
+@pytest.mark.parametrize("count", [8, pytest.param(15, marks=pytest.mark.long)])
+def test_a_drop_loses_neither_volume_nor_particles_nor_energy(count):
+    metrics = {name: value for name, (value, _) in axisymmetric_drop(count).shape.metrics.items()}
+    assert metrics["at_rest"] == 1.0
+    assert metrics["particles_lost"] == 0.0
+    assert abs(metrics["volume_drift"]) < 1e-12
+    assert abs(metrics["energy_imbalance"]) < 1e-4
 
 
-def test_products_show_the_whole_body(drops):
-    shape, exact = drops[1].shape, drops[1].reference
+@pytest.mark.long
+def test_products_show_the_whole_body():
+    drop = axisymmetric_drop(15)
+    shape, exact = drop.shape, drop.reference
     assert len(shape.surface_points) == shape.triangles.max() + 1
     assert np.ptp(shape.points[:, 1]) == pytest.approx(exact.max_width, rel=2e-3)
     assert (shape.points[len(shape.surface_points) :, 1] == 0.0).all()
