@@ -14,9 +14,9 @@ from reflowshock.quantity import Quantity
 
 
 class Poiseuille(PlaneFlow):
-    """Liquid at rest between two plates is set in motion by a force along them; along them it is periodic.
+    """Liquid between two plates, periodic along them and at rest at the start, that a body force sets in motion.
 
-    The speed is that of the middle at the end of all time; the duration is in w^2 / nu, in which the flow develops.
+    The speed is the steady speed in the middle; the duration is in w^2 / nu, in which the flow develops.
     """
 
     width: Annotated[float, Quantity("mm")] = Field(gt=0)
@@ -43,7 +43,7 @@ class Poiseuille(PlaneFlow):
 
     @property
     def rate_at_wall(self) -> float:
-        """Of shear, where it flows steadily and its viscosity depends on that [1/s]."""
+        """Rate of shear at the plates in steady flow with a rheology [1/s]."""
         assert self.rheology is not None
         return rate_at_wall(self.rheology, self.viscosity, self.speed, self.width)
 
@@ -59,7 +59,7 @@ class Poiseuille(PlaneFlow):
 
     @property
     def until(self) -> float:
-        """How long it flows [s]."""
+        """Duration of the flow [s]."""
         return self.duration * self.density * self.width**2 / self.viscosity
 
 
@@ -80,7 +80,7 @@ def plate_points(scene: Poiseuille, layers: int) -> Floats:
 
 
 def exact_speeds(height: Floats, time: float, scene: Poiseuille) -> Floats:
-    """Return exact speeds between plates [m/s] at heights `(n,)` [m], a time [s]; of a rheology, the steady ones."""
+    """Return the exact speeds [m/s] at heights, shape (n,) [m], and a time [s]; with a rheology, of steady flow."""
     if scene.rheology is None:
         return exact.starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
     law = scene.rheology

@@ -12,7 +12,7 @@ from reflowshock.particles.flows.lattice import lattice
 from reflowshock.particles.flows.result import Metrics
 from reflowshock.quantity import Quantity
 
-# Over rho g H: the sensor's pressure by which it is reached.
+# Pressure at the sensor, in rho g H, above which the wave has reached it.
 REACHED = 0.05
 # In sqrt(H / g): the plateau behind the impact, and when the wave that falls back strikes.
 PLATEAU, SECOND = (3.5, 5.0), (5.2, 7.0)
@@ -21,10 +21,10 @@ WINDOW = 0.1
 
 
 class DamBreak(PlaneFlow):
-    """A column of liquid in the corner of a tank is let go; a sensor in the opposite wall measures pressure.
+    """Column of liquid in the corner of a tank that is released; a sensor in the opposite wall measures pressure.
 
-    Walls are smooth: liquid slides along them. Pressures are told over rho g H, times in sqrt(H / g), H being the
-    column's height.
+    Walls are smooth: liquid slides along them. Pressures are reported in rho g H, times in sqrt(H / g), with the
+    height H of the column.
     """
 
     has_free_surface = True
@@ -63,7 +63,7 @@ class DamBreak(PlaneFlow):
 
     @property
     def until(self) -> float:
-        """How long it flows [s]."""
+        """Duration of the flow [s]."""
         return self.duration
 
 
@@ -87,35 +87,35 @@ def tank_points(scene: DamBreak, layers: int) -> Floats:
 
 
 def tank_columns(scene: DamBreak) -> int:
-    """Length of the tank in spacings."""
+    """Return the length of the tank in spacings."""
     return round(scene.tank_length / scene.spacing)
 
 
 def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
-    """When the wave strikes, what it presses with, and when it strikes again; nan where the run ended before."""
+    """Return arrivals and pressure of the wave and the rise of energy; nan for what lies after the end of the run."""
     time = history["time"] / scene.unit_of_time
     pressure = history["sensor_pressure"] / (scene.density * scene.gravity * scene.height)
     reached = pressure > REACHED
     plateau = (time >= PLATEAU[0]) & (time <= PLATEAU[1])
     total = history["kinetic_energy"] + history["potential_energy"] + history["elastic_energy"]
-    nothing = float("nan")
+    unknown = float("nan")
     return {
-        "impact_onset": (float(time[np.argmax(reached)]) if reached.any() else nothing, "sqrt(H/g)"),
-        "plateau_mean": (float(pressure[plateau].mean()) if time[-1] >= PLATEAU[1] else nothing, "rho g H"),
+        "impact_onset": (float(time[np.argmax(reached)]) if reached.any() else unknown, "sqrt(H/g)"),
+        "plateau_mean": (float(pressure[plateau].mean()) if time[-1] >= PLATEAU[1] else unknown, "rho g H"),
         "second_rise": (second_rise(time, pressure), "sqrt(H/g)"),
         "energy_rise": (float((np.maximum.accumulate(total[::-1])[::-1] - total).max() / total[0]), ""),
     }  # fmt: skip
 
 
 def second_rise(time: Floats, pressure: Floats) -> float:
-    """Return when the pressure rises again: midway from the plateau to the largest mean of a window after it.
+    """Return the time of the second rise: midway from the plateau to the largest window mean after it.
 
     Args:
-        time: `(n,)` in sqrt(H / g).
-        pressure: `(n,)` over rho g H.
+        time: Times, shape (n,) [sqrt(H / g)].
+        pressure: Pressure at the sensor, shape (n,) [rho g H].
 
     Returns:
-        nan where the history ends before.
+        Time in sqrt(H / g); nan where the history ends before.
     """
     if time[-1] < SECOND[1]:
         return float("nan")

@@ -24,29 +24,29 @@ def impact_texts(scene: Droplet, history: Mapping[str, Floats]) -> dict[str, str
 
 
 def _film_text(scene: Droplet) -> str:
-    """Tell how thick the film is that an impact leaves, and with how many particles it has two."""
+    """Return a text on the thickness of the film of an impact and the particles that resolve it."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
     return f"{film:.2g} D thick; {2.0 / film:.0f} particles a diameter put two across it"
 
 
 def _expected_texts(scene: Droplet) -> dict[str, str]:
-    """Tell how wide such drops spread, measured ones and computed ones; nothing where that is not known."""
+    """Return a text on the spread of measured and of computed drops; empty where no correlation holds."""
     numbers = scene.weber_number, scene.reynolds_number, scene.advancing
     if not (between := of_measured(*numbers)):
         return {}
     measured = f"{between[0]:.2f} to {between[1]:.2f} D by correlations of measured drops"
-    return {"spread_expected": f"{measured}, {wildeman(*numbers):.2f} D by that of computed ones"}
+    return {"spread_expected": f"{measured}, {wildeman(*numbers):.2f} D by a correlation of computed drops"}
 
 
 def drop_height(scene: Droplet, points: Floats) -> float:
-    """Height of a surface `(m, 3)` above the wall, or of a free one in itself [m]."""
+    """Return the height of a surface, shape (m, 3), above the wall, or of a free drop from end to end [m]."""
     return float(points[:, 2].max() if scene.has_wall else np.ptp(points[:, 2]))
 
 
 def base_width(points: Floats, spacing: float) -> float:
-    """Width on the wall of a drop [m]: the square of its radius, a parabola in height for a cap, continued to the wall.
+    """Return the width of a drop on the wall [m]: its squared radius, a parabola in height for a cap, at the wall.
 
-    nan where there is too little of a profile.
+    The width is nan where too few points of the profile are available.
     """
     height = points[:, 2]
     read = (height > FOOT * spacing) & (height < SHOULDER * height.max())
@@ -58,15 +58,15 @@ def base_width(points: Floats, spacing: float) -> float:
 
 
 def outcome(history: Mapping[str, Floats]) -> str:
-    """Tell in words what became of a drop that struck a wall, from its history."""
+    """Return the outcome of an impact in words, from its history."""
     wets, in_parts = history["foot"] > 0.0, history["parts"][-1] > 1.0
     if not wets.any():
         return "does not touch the wall"
     if wets[-1]:
-        told = "a part rebounds" if in_parts else "stays on the wall"
+        text = "a part rebounds" if in_parts else "stays on the wall"
     else:
-        told = "rebounds in parts" if in_parts else "rebounds"
-    return f"{told}, sheds satellites" if history["shed"][-1] else told
+        text = "rebounds in parts" if in_parts else "rebounds"
+    return f"{text}, sheds satellites" if history["shed"][-1] else text
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
@@ -78,17 +78,17 @@ def rest_metrics(scene: Droplet) -> tuple[str, ...]:
 
 
 def droplet_metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
-    """What the drop became: means over the last tenth of the time, in which it is to be at rest.
+    """Return the metrics of a droplet: means over the last tenth of the time, in which it should be at rest.
 
-    `surface_volume_drift` is the largest change of what the surface encloses, with the spray, at any time sampled: when
-    triangles are evened out, every few steps, it is set to the volume of the particles. `parts_shed` counts events, in
-    each of which one part or several were given up.
+    ``surface_volume_drift`` is the largest change of the enclosed volume, with the spray, at any sample: mesh
+    smoothing, every few steps, resets it to the volume of the particles. ``parts_shed`` counts events in which one or
+    more parts detach.
     """
     late = history["time"] >= 0.9 * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
     fastest = float(history["largest_speed"][late].max())
     change = history["surface_volume"] / history["surface_volume"][0] - 1.0
-    found: Metrics = {
+    metrics: Metrics = {
         "capillary_number": (fastest * scene.liquid_viscosity / scene.surface_tension, ""),
         "surface_volume_drift": (float(change[np.abs(change).argmax()]), ""),
         "spray_share": (float(history["spray"].max()), ""),
@@ -96,24 +96,24 @@ def droplet_metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
         "ohnesorge": (scene.ohnesorge, ""),
     }
     if not scene.has_wall:
-        found["mean_pressure"] = (mean["mean_pressure"], "Pa")
-        found["pressure_error"] = (mean["mean_pressure"] / scene.laplace_pressure - 1.0, "")
-        found["roundness"] = (mean["roundness"], "")
-        return found
+        metrics["mean_pressure"] = (mean["mean_pressure"], "Pa")
+        metrics["pressure_error"] = (mean["mean_pressure"] / scene.laplace_pressure - 1.0, "")
+        metrics["roundness"] = (mean["roundness"], "")
+        return metrics
     base, height = cap(scene.angle)
-    found["base_over_diameter"], found["height_over_diameter"] = (mean["base"], ""), (mean["height"], "")
+    metrics["base_over_diameter"], metrics["height_over_diameter"] = (mean["base"], ""), (mean["height"], "")
     if rest_metrics(scene):
-        found["base_error"] = (mean["base"] / base - 1.0, "")
-        found["height_error"] = (mean["height"] / height - 1.0, "")
+        metrics["base_error"] = (mean["base"] / base - 1.0, "")
+        metrics["height_error"] = (mean["height"] / height - 1.0, "")
     if scene.impact_speed:
         widest = int(np.argmax(history["spread"]))
-        found["weber"], found["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
-        found["spread_max"] = (float(history["spread"][widest]), "")
-        found["time_of_spread_max"] = (float(history["time"][widest]), "s")
+        metrics["weber"], metrics["reynolds"] = (scene.weber_number, ""), (scene.reynolds_number, "")
+        metrics["spread_max"] = (float(history["spread"][widest]), "")
+        metrics["time_of_spread_max"] = (float(history["time"][widest]), "s")
         if history["foot"][widest] > 0.0:
             film = scene.volume / (0.25 * pi * (history["foot"][widest] * scene.diameter) ** 2)
-            found["film_over_spacing"] = (float(film / scene.spacing), "")
+            metrics["film_over_spacing"] = (float(film / scene.spacing), "")
         wets = np.flatnonzero(history["foot"] > 0.0)
         if len(wets) and wets[-1] + 1 < len(history["time"]):
-            found["contact_time"] = (float(history["time"][wets[-1] + 1] - history["time"][wets[0]]), "s")
-    return found
+            metrics["contact_time"] = (float(history["time"][wets[-1] + 1] - history["time"][wets[0]]), "s")
+    return metrics

@@ -13,7 +13,12 @@ from reflowshock.particles.surface.level_set import LevelSet, extract_surface, r
 
 
 def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indices], float]:
-    """Points `(3, n)` of a cubic lattice, surface about them, and the spacing at which they have the volume [m]."""
+    """Return the particles of a droplet, shape (3, n) [m], its surface, and the spacing of its volume [m].
+
+    Args:
+        scene: Droplet.
+        edge: Edge of the triangles in spacings.
+    """
     radius, side = 0.5 * scene.diameter, scene.volume ** (1.0 / 3.0)
     across = int(np.ceil(2.0 * scene.diameter / scene.spacing)) + 1
     places = np.arange(-across, across) + 0.5
@@ -40,7 +45,7 @@ def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indi
 
 
 def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
-    """Triangles of about an edge [m] on a sphere, of the volume of the sphere: points on a spiral, and their hull."""
+    """Return a triangulated sphere: the hull of points on a spiral, scaled to the volume of the sphere."""
     count = int(4.0 * pi * radius**2 / (0.5 * sqrt(3.0) * edge**2))
     turn, height = pi * (1.0 + sqrt(5.0)) * (np.arange(count) + 0.5), 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     across = np.sqrt(1.0 - height**2)
@@ -54,7 +59,7 @@ def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
 
 
 def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
-    """Triangles of about an edge [m] on a cube of a width [m], whose edges they round."""
+    """Return a triangulated cube with rounded edges."""
     grid = Grid.around(width * np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), edge)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     level = LevelSet(grid, np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z)) - 0.5 * width)
@@ -62,13 +67,13 @@ def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
 
 
 def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indices]:
-    """The upper half of a sphere, its edge on the wall."""
+    """Return the upper half of a triangulated sphere, its edge on the wall."""
     radius = float(np.linalg.norm(points, axis=1).mean())
     low = np.abs(points[:, 2]) < 0.4 * edge
     points[low, 2] = 0.0
     points[low] *= radius / np.linalg.norm(points[low], axis=1)[:, None]
-    kept = triangles[(points[triangles, 2] >= 0.0).all(axis=1)]
-    used, numbers = np.unique(kept, return_inverse=True)
+    upper = triangles[(points[triangles, 2] >= 0.0).all(axis=1)]
+    used, numbers = np.unique(upper, return_inverse=True)
     points, triangles = points[used], numbers.reshape(-1, 3).astype(np.int32)
     for ring in boundary_loops(triangles):  # of some triangles all corners are too high to be on it by now
         points[ring, 2] = 0.0

@@ -13,7 +13,7 @@ from reflowshock.quantity import Quantity
 
 
 class FlowSwitches(Parameters):
-    """What acts besides pressure: decided from the Reynolds number (auto), or by the user."""
+    """Switches of effects besides pressure: decided from the Reynolds number (auto), or by the user."""
 
     viscosity: Switch = "auto"
 
@@ -38,7 +38,7 @@ class FlowScene(Parameters):
     @property
     @abstractmethod
     def length(self) -> float:
-        """What the particles across stand along [m]."""
+        """Length that the particles across divide [m]."""
 
     @property
     @abstractmethod
@@ -53,12 +53,12 @@ class FlowScene(Parameters):
     @property
     @abstractmethod
     def until(self) -> float:
-        """How long it flows [s]."""
+        """Duration of the flow [s]."""
 
     @property
     @abstractmethod
     def spacing(self) -> float:
-        """Of the particles at the start [m]."""
+        """Spacing of the particles at the start [m]."""
 
     @property
     def unit_scene(self) -> "FlowScene":
@@ -86,12 +86,12 @@ class FlowScene(Parameters):
 
     @property
     def liquid_viscosity(self) -> float:
-        """Of the liquid, however the case says it [Pa s]; where it depends on the rate of shear, that in its law."""
+        """Viscosity of the liquid [Pa s]; with a rheology, the viscosity in its law."""
         return self.viscosity
 
     @property
     def largest_viscosity(self) -> float:
-        """At rest or at the rate of shear of the largest speed over a spacing [Pa s]."""
+        """Largest viscosity from rest up to the rate of shear of the largest speed over a spacing [Pa s]."""
         if self.rheology is None:
             return self.liquid_viscosity
         return self.rheology.largest(self.liquid_viscosity, self.fastest / self.spacing)
@@ -105,7 +105,7 @@ class FlowScene(Parameters):
 
 
 class PlaneFlow(FlowScene):
-    """A flow in a plane, that particles stand across."""
+    """Flow in a plane, with a number of particles across it."""
 
     dimension = 2
 
@@ -113,5 +113,5 @@ class PlaneFlow(FlowScene):
 
     @property
     def spacing(self) -> float:
-        """Of the particles at the start [m]."""
+        """Spacing of the particles at the start [m]."""
         return self.length / self.numerics.particles_across

@@ -9,7 +9,14 @@ Metrics = dict[str, tuple[float, str]]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Particles of the liquid at a time [s]: `(n, 3)` points [m] and velocities [m/s], `(n,)` pressures [Pa]."""
+    """State of the liquid at a time.
+
+    Attributes:
+        time: Time [s].
+        points: Points of the particles, shape (n, 3) [m].
+        velocity: Velocities, shape (n, 3) [m/s].
+        pressure: Pressures, shape (n,) [Pa].
+    """
 
     time: float
     points: Floats
@@ -19,14 +26,14 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class FlowResult:
-    """How a liquid flowed.
+    """Result of a flow.
 
     Attributes:
-        pictures: in time; the last is the end.
-        walls: `(m, 3)` particles of walls [m].
-        history: arrays of equal length, the first is time [s].
-        metrics: name to value and unit.
-        words: name to what is told in words.
+        pictures: States in the order of time; the last is the end.
+        walls: Wall particles, shape (m, 3) [m].
+        history: Name -> column, all of one length; the first column is time [s].
+        metrics: Name -> value and unit.
+        words: Name -> text.
     """
 
     pictures: list[Picture]

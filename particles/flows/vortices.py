@@ -12,7 +12,7 @@ from reflowshock.quantity import Quantity
 
 
 class TaylorGreen(PlaneFlow):
-    """Four vortices in a periodic box, which viscosity slows down.
+    """Four vortices in a periodic box that decay by viscosity.
 
     The duration is in side / speed, the speed the largest one at the start.
     """
@@ -38,7 +38,7 @@ class TaylorGreen(PlaneFlow):
 
     @property
     def until(self) -> float:
-        """How long it flows [s]."""
+        """Duration of the flow [s]."""
         return self.duration * self.side / self.speed
 
 

@@ -1,4 +1,4 @@
-"""A dam break: liquid in the corner of a tank is let go and hits the opposite wall (Buchner 2002)."""
+"""Dam break computed by delta-SPH (Buchner 2002)."""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,17 +13,17 @@ from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import shape
 
 COLUMNS = ("time", "sensor_pressure", "front", "kinetic_energy", "potential_energy", "elastic_energy")
-# Of the kernel's shape: with less liquid about it a sensor is dry.
+# Kernel sum below which the sensor is dry.
 DRY = 0.1
 
 
 def solve_dam_break(
     scene: DamBreak, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let the dam break.
+    """Compute a dam break.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     simulation = dam(scene)
     run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
@@ -42,7 +42,7 @@ def dam(scene: DamBreak) -> Simulation:
 
 
 def _sample(scene: DamBreak, simulation: Simulation) -> tuple[float, ...]:
-    """One row of the history."""
+    """Return one row of the history."""
     liquid, fields = slice(simulation.fluids), simulation.fields
     x, z, mass = fields.x[liquid], fields.z[liquid], fields.mass[liquid]
     potential = scene.gravity * float(mass @ z)
@@ -51,7 +51,7 @@ def _sample(scene: DamBreak, simulation: Simulation) -> tuple[float, ...]:
 
 
 def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
-    """Pressure at the sensor [Pa]: mean of the liquid beside it, weighted by the kernel; 0 where it is dry."""
+    """Return the pressure at the sensor [Pa]: kernel-weighted mean of the liquid next to it; 0 if the sensor is dry."""
     law, fields, liquid = simulation.law, simulation.fields, slice(simulation.fluids)
     x, z = fields.x[liquid], fields.z[liquid]
     distance = np.hypot(x - tank_columns(scene) * scene.spacing, z - scene.sensor_height)
@@ -62,7 +62,7 @@ def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
 
 
 def particles_lost(scene: DamBreak, simulation: Simulation) -> int:
-    """Particles that are beyond the middle of a wall's first layer."""
+    """Return the number of particles beyond the middle of the first layer of a wall."""
     liquid, half = slice(simulation.fluids), 0.5 * scene.spacing
     x, z = simulation.fields.x[liquid], simulation.fields.z[liquid]
     return int(((x < -half) | (x > tank_columns(scene) * scene.spacing + half) | (z < -half)).sum())

@@ -26,16 +26,16 @@ COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
     "surface_energy", "surface_volume", "foot", "parts", "spray", "shed",
 )  # fmt: skip
-# Share of the radius within which the pressure of a free drop is averaged: the surface is far.
+# Share of the radius within which the pressure of a free drop is averaged, far from the surface.
 CORE = 0.5
-# Newton steps until the surface encloses the volume.
+# Newton steps that give the surface the volume of the drop.
 ENCLOSURES = 3
 
 
 def solve_droplet(
     scene: Droplet, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let a droplet move.
+    """Compute the motion of a droplet.
 
     Raises: as `follow`.
     """
@@ -48,11 +48,11 @@ def follow(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FlowResult:
-    """Let the liquid of a simulation move as a droplet does, whatever state it begins in.
+    """Compute the motion of a droplet from the state of a simulation.
 
     Raises:
         FloatingPointError: a position is not finite.
-        SurfaceLost: the liquid has left its surface, or that is none any more.
+        SurfaceLost: The liquid has left its surface, or the surface has vanished.
     """
     try:
         run = flow.run_flow(simulation, scene.until, partial(_sample, scene), progress, checkpoint)
@@ -68,7 +68,7 @@ def follow(
 
 
 def droplet(scene: Droplet) -> Simulation:
-    """Set up the particles and the surface about them, whose tension is in balance with the pressure of a sphere."""
+    """Set up the particles and their surface, whose tension balances the pressure of a sphere."""
     points, triangles, spacing = start_shape(scene, EDGE)
     law, tension = liquid_of(scene, spacing)
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
@@ -80,7 +80,7 @@ def droplet(scene: Droplet) -> Simulation:
 
 
 def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
-    """What acts between particles of a droplet that are a spacing apart [m], and its surface tension [N/m]."""
+    """Return the law of a droplet for a particle spacing [m], and its surface tension [N/m]."""
     effects = decide_flow(scene)
     weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
@@ -90,7 +90,7 @@ def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
 
 
 def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
-    """One row of the history; lengths in diameters."""
+    """Return one row of the history, lengths in diameters."""
     fields, surface = simulation.fields, simulation.surface
     assert surface is not None
     points = np.array(fields[:3])

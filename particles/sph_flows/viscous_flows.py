@@ -1,4 +1,4 @@
-"""Flows with exact solutions: liquid between plates that a force sets in motion, vortices that die out."""
+"""Viscous flows with exact solutions, by delta-SPH: the start of channel flow, and decaying vortices."""
 
 from collections.abc import Callable
 
@@ -18,10 +18,10 @@ Progress = Callable[[float], None]
 def solve_poiseuille(
     scene: Poiseuille, progress: Progress | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let a force set liquid between plates in motion; compare its speeds with the exact ones.
+    """Compute the start of channel flow and its error against the exact speeds.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     simulation = channel(scene)
 
@@ -39,7 +39,7 @@ def solve_poiseuille(
         "largest_error_at_end": (float(history["largest_error"][-1]), ""),
         "reynolds": (scene.reynolds_number, ""),
     }
-    if scene.rheology is None:  # else the steady flow alone is known
+    if scene.rheology is None:  # with a rheology only the steady flow is known
         metrics["profile_error"] = float(history["profile_error"].max()), ""
     return flow.result_of(run, history, metrics)
 
@@ -55,10 +55,10 @@ def channel(scene: Poiseuille) -> Simulation:
 def solve_taylor_green(
     scene: TaylorGreen, progress: Progress | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let vortices die out; compare their speeds with the exact ones.
+    """Compute decaying vortices and their error against the exact speeds.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     simulation = vortices(scene)
     rate = exact.taylor_green_decay(scene.side, scene.viscosity / scene.density)
