@@ -61,8 +61,8 @@ class PackageForecast:
     load_steps: int = 0
 
 
-def forecast(case: PackageCase) -> PackageForecast:
-    """Predict sizes, time steps and cost of a run."""
+def forecast_package(case: PackageCase) -> PackageForecast:
+    """Predict sizes and cost of the reflow of a package."""
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
@@ -81,8 +81,7 @@ def forecast(case: PackageCase) -> PackageForecast:
         shock=None,
         seconds={"reflow": SECONDS_OF_STAGE + sum(reflow_seconds(case.solder, one) for one in distinct) / workers},
     )
-    of_reflow = of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
-    return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
+    return of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
 
 
 def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
@@ -98,7 +97,9 @@ def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> 
     )
 
 
-def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
+def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
+    """Predict sizes, time steps and cost of reflow and shock."""
+    of_reflow = forecast_package(case)
     share = expected_duration(case) / longest_duration(case)
     of_shock, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
@@ -154,10 +155,19 @@ def with_critical_step(quality: dict, materials: Materials) -> dict:
 
 
 def package_size(case: PackageCase) -> Size:
-    """Predict what the stages of a case take on one core: the forecast is that of this machine's cores."""
+    """Predict time and memory of the stages of a package on one core."""
+    return _size(forecast_package(case))
+
+
+def board_drop_size(case: BoardDropCase) -> Size:
+    """Predict time and memory of the stages of a board drop on one core."""
+    return _size(forecast_board_drop(case))
+
+
+def _size(outlook: PackageForecast) -> Size:
+    """Return the size of a forecast, whose reflow is that on all cores of this machine."""
     from reflowshock.fem.estimates.solver_cost import cooling_cost
 
-    outlook = forecast(case)
     joints = max(1, outlook.distinct)
     elements = sum(part.elements for part in outlook.parts.values())
     memory = BYTES_OF_ELEMENT * elements + BYTES_OF_PARTICLE * outlook.particles[1]

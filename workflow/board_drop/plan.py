@@ -17,11 +17,15 @@ SETTLES = "ends when the joints' first peak has passed and half a swing of the b
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
-    """Yield sizes and, where the board is dropped, the shock; then what the costs assume."""
-    yield _sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}"
-    if not isinstance(case, BoardDropCase) or outlook.shock is None:
-        yield styled("\n[dim]{}", REFLOW_SPEED)
-        return
+    """Yield the joints of a package and the assumed speed of the reflow."""
+    yield f"\n{_joints(case, outlook)}"
+    yield styled("\n[dim]{}", REFLOW_SPEED)
+
+
+def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator[RenderableType]:
+    """Yield sizes, the shock and the assumed speeds of a board drop."""
+    assert outlook.shock is not None
+    yield _sizes(case, outlook)
     yield _shock(case, outlook.shock)
     rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
     yield styled("\n[dim]Costs assume {}", rate)
