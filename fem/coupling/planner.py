@@ -190,7 +190,7 @@ def plan_from(
     else:
         [(role, model)] = models.items()
         alone = shared((role,), size)
-        found = [Alternative(alone, model_seconds(model, (speeds.sum(), size > 1), measured.latency))]
+        found = [Alternative(alone, model_seconds(model, speeds.sum(), size > 1, measured.latency))]
     chosen = found[0]
     cells = {
         role: partition(load.mesh, level_work(load, family[role], cost), speeds[list(chosen.placement.ranks[role])])

@@ -17,14 +17,8 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.mesh.tie import tie_joints
 from reflowshock.fem.problem.fittings import AXES
-from reflowshock.fem.problem.structure import (
-    AtPoint,
-    InputG,
-    OnAreas,
-    OnNodes,
-    PrescribedMotion,
-    StructureProblem,
-)
+from reflowshock.fem.problem.load_kinds import AtPoint, OnAreas, OnNodes, PrescribedMotion
+from reflowshock.fem.problem.structure import StructureProblem
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
@@ -160,7 +154,7 @@ def check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integ
 
 def shaken_supports(problem: StructureProblem) -> list[str]:
     """Return the supports that a large mass moves: those that hold all components, where an input-G asks for it."""
-    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in problem.loads.values())
+    by_mass = any(load.is_large_mass for load in problem.loads.values())
     return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]
 
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Pulse
 from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.fittings import WatchPoint
-from reflowshock.fem.problem.structure import InputG, StructureProblem
+from reflowshock.fem.problem.load_kinds import InputG
+from reflowshock.fem.problem.structure import StructureProblem
 
 TABLE = (0.0, 0.0, -1.0)  # direction in which the table of a drop is accelerated: the package faces down
 RATE = 10.0  # samples in a period of the filter's corner that are needed

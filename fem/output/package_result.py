@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.estimates.drop_effects import DropRun, told
+from reflowshock.fem.estimates.drop_effect import DropRun
+from reflowshock.fem.estimates.drop_effects import reported_effects
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.output.acceleration import drop_accelerations, peaks_of
@@ -221,5 +222,7 @@ def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float)
             "why": f"{pulse.source}, {METHODS[shock.method]}; package facing down: the board is pushed along +z"
             " of the table's frame",
         },
-        **told(DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)),
+        **reported_effects(
+            DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)
+        ),
     }

@@ -17,7 +17,7 @@ from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.structure import PrescribedMotion
+from reflowshock.fem.problem.load_kinds import PrescribedMotion
 from reflowshock.fem.setup.structure_models import StructureModel
 
 SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure

@@ -13,7 +13,7 @@ from reflowshock.fem.dynamics.history import Signal
 from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
-from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
+from reflowshock.fem.loads.structure_loads import LoadedModel, damping_loads, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.structure_modes import ModeTable, find_modes
@@ -70,7 +70,7 @@ class StructureDynamics:
 
     def loads(self, comm: MPI.Comm, model: StructureModel, steps: Steps) -> list[Load]:
         """Return the loads and the damping of a model."""
-        loads = structure_loads(comm, model.body, model.tables, self.request, self.pulses)
+        loads = structure_loads(LoadedModel(comm, model.body, model.tables, self.request), self.pulses)
         return loads + damping_loads(self.request.dynamics.damping, model.body)
 
     def watch(self, model: StructureModel) -> PointWatch:

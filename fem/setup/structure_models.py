@@ -39,7 +39,8 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.structure import LayerCoupling, PrescribedMotion, fine_layers
+from reflowshock.fem.problem.load_kinds import PrescribedMotion
+from reflowshock.fem.problem.structure import LayerCoupling, fine_layers
 from reflowshock.fem.setup.models import Divided, Model, assembled, distributed, divided_on_root, treatment_of
 
 StructureModel = Model[StructureTables]

@@ -103,7 +103,7 @@ def test_free_vibration_decays_as_its_ratio_says(terms):
     omega, shape = 2 * np.pi * modes.frequency[along], modes.shape[along]
     given = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
     ratio, period = sum(terms), 2 * np.pi / omega
-    damping = RayleighDamping.build(body, given.coefficients)
+    damping = RayleighDamping.build(body, *given.coefficients)
     motion = ImplicitMotion(MPI.COMM_SELF, body, [damping], period / 400)
     motion.displacement[:] = shape
     motion.restart()

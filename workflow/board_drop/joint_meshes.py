@@ -1,4 +1,4 @@
-"""Surfaces and meshes of all joints of an array: real ones, bridged ones, and identical ones to compare with."""
+"""Surfaces and meshes of all joints of an array: real, bridged and identical joints."""
 
 import itertools
 import logging
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
-    """Write the surface of each joint, in its own orientation, and of bridged ones in common; return their measures.
+    """Write the closed surface of each joint, one for a bridged pair; return the measures of the surfaces.
 
     Raises:
-        ReflowError: joints are open: they have no surface between their pads.
+        ReflowError: A joint is open.
     """
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import measure, write_surface
@@ -50,14 +50,14 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     for name, shape in bodies.items():
         closed = _closed(shape)
         write_surface(folder / f"{name}.vtu", closed)
-        own = measure(closed)
-        measures[name] = {**own, "volume_error": own["volume"] / shape.metrics["volume"][0] - 1.0}
+        size = measure(closed)
+        measures[name] = {**size, "volume_error": size["volume"] / shape.metrics["volume"][0] - 1.0}
     for name, path in package.surfaces.items():
         closed = load_surface(Path(path), package.surface_unit, sites[name])
         write_surface(folder / f"{name}.vtu", closed)
-        own = measure(closed)
-        change = own["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
-        measures[name] = {**own, "given": path, "volume_change": change}
+        size = measure(closed)
+        change = size["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
+        measures[name] = {**size, "given": path, "volume_change": change}
     return measures
 
 
@@ -147,7 +147,7 @@ def mesh_array(
 
 
 def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: Path) -> dict[str, dict]:
-    """Write meshes, the tetrahedra of those that are free-form, and their quality; return this by joint."""
+    """Write joint meshes, tetrahedra of free-form joints and quality; return the quality by joint."""
     from reflowshock.meshing.core.quadratic_tetrahedra import write_tetrahedra
     from reflowshock.meshing.joint.joints_file import write_joints
     from reflowshock.meshing.joint.solder_mesh import joint_quality
@@ -164,32 +164,32 @@ def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: 
 
 @dataclass(frozen=True, slots=True)
 class MirroredSide:
-    """The underside of a quarter of a package, and its images behind x = 0 and y = 0."""
+    """Underside of a quarter package and its mirror images at x = 0 and y = 0."""
 
     quarter: "PackageSide"
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height (k,) over the board's top face at points (k,), (k,) [m]."""
+        """Return the height over the top face of the board at points x, y, all of shape (k,) [m]."""
         return self.quarter.height(np.abs(x), np.abs(y))
 
 
 def mesh_bridges(
     surfaces: "Mapping[str, ClosedSurface]", sites: "Mapping[str, PadSite]", case: PackageCase, side: "PackageSide"
 ) -> "list[JointMesh]":
-    """Mesh the joints that are one body, for other codes: no shock is run with them.
+    """Mesh bridged joints, for use in other codes; the shock does not support them.
 
     Args:
-        surfaces: by name; those of bridged joints have both names.
-        sites: of all joints, by name.
-        case: package, symmetry.
-        side: the package's underside.
+        surfaces: Closed surfaces by name; a bridged pair has both names.
+        sites: Pad sites of all joints by name.
+        case: Case with package and symmetry.
+        side: Underside of the package.
     """
     from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_bridge
 
     quarter = case.board.symmetry == "quarter"
     meshes = []
     for name in (name for name in surfaces if BETWEEN in name):
-        first, second = (sites[own] for own in name.split(BETWEEN))
+        first, second = (sites[joint] for joint in name.split(BETWEEN))
         pair = (first, _nearest_image(first, second)) if quarter else (first, second)
         try:
             meshes.append(mesh_bridge(surfaces[name], pair, case.package, MirroredSide(side) if quarter else side))
@@ -199,7 +199,7 @@ def mesh_bridges(
 
 
 def _nearest_image(first: "PadSite", second: "PadSite") -> "PadSite":
-    """Return the second site or that of its images which is nearest to the first one."""
+    """Return the second site or its mirror image, whichever is nearest to the first site."""
     images = [second]
     for along_x, along_y in itertools.product((1.0, -1.0), repeat=2):
         if (along_x, along_y) != (1.0, 1.0):

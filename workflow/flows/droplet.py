@@ -133,8 +133,8 @@ def _solve(scene: Droplet, _folder: Path, progress: Callable[[float], None], che
 def _limits(scene: Droplet) -> dict[str, float]:
     from reflowshock.particles.flows.droplet_metrics import rest_metrics
 
-    known = rest_metrics(scene)
-    return LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
+    exact_metrics = rest_metrics(scene)
+    return LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in exact_metrics}
 
 
 def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":

@@ -13,7 +13,7 @@ from types import TracebackType
 
 from reflowshock.fem.parallel.own_job import own_environment
 from reflowshock.fem.parallel.status_board import ERROR
-from reflowshock.workflow.process.last_word import words_of
+from reflowshock.workflow.process.error_exit import describe_text
 
 PATIENCE = 60.0  # [s] that a process may be stopped
 TICK = 1.0  # [s] between two looks
@@ -204,7 +204,7 @@ def without_traceback(text: str, log: Path) -> str:
         return text
     last = after.strip().splitlines()[-1]
     what, semicolon, checkpoint = last.partition("; last checkpoint")
-    return f"{before.strip()} {words_of(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
+    return f"{before.strip()} {describe_text(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
 
 
 def ending(code: int) -> str:

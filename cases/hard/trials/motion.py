@@ -57,7 +57,7 @@ def flight(given: Flight) -> dict[str, float]:
     body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(given.kinematics, step))
     loads: list[Load] = []
     if given.mass_damping or stiffness:
-        loads.append(RayleighDamping.build(body, (given.mass_damping / step, stiffness)))
+        loads.append(RayleighDamping.build(body, given.mass_damping / step, stiffness))
     motion = explicit_motion(body, loads, step)
     random_start(motion, given.seed)
     found = watched(motion, given, EnergyBalance(limit=BALANCE, trivial=0.0, step=step, critical=critical))

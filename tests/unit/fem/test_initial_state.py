@@ -51,7 +51,7 @@ def test_nothing_moves_without_a_shock(formulation, kinematics):
 
 
 def launched(body: Body, step: float) -> ExplicitMotion:
-    motion = motion_of(body, step, [RayleighDamping.build(body, (0.0, 0.01 * step))])
+    motion = motion_of(body, step, [RayleighDamping.build(body, 0.0, 0.01 * step)])
     motion.launch(np.array([0.0, 0.1, 1.0]))
     return motion
 

@@ -105,6 +105,6 @@ def test_inverted_elements_are_told_alike():
 
 def test_what_acts_between_steps_is_no_matter_of_one_call():
     body = body_of(*SETTINGS["small"][:2])
-    assert StepsAtOnce.of(body, [RayleighDamping.build(body, (1.0, 0.0))]) is None
+    assert StepsAtOnce.of(body, [RayleighDamping.build(body, 1.0, 0.0)]) is None
     assert StepsAtOnce.of(replace(body, terms=[*body.terms, SimpleNamespace(history={})]), []) is None
     assert StepsAtOnce.of(replace(body, terms=[*body.terms, body.terms[0]]), []) is None

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from reflowshock.fem.errors import AgreedError, EnergyError
 from reflowshock.fem.loads.follower_pressure import FollowerPressure
 from reflowshock.fem.loads.load import NodalForces
-from reflowshock.fem.loads.structure_loads import structure_loads
+from reflowshock.fem.loads.structure_loads import LoadedModel, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.run.program import main
@@ -174,7 +174,7 @@ def test_pressure_follows_the_surface_where_it_may_turn(tmp_path, kinematics, ki
     loads = {"push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"}}
     request = structure_input(tmp_path, loads=loads, dynamics={"duration": 1e-5, "kinematics": kinematics})
     model, _ = build_structure(MPI.COMM_SELF, request, [])
-    (load,) = structure_loads(MPI.COMM_SELF, model.body, model.tables, request, pulses_of(request.loads))
+    (load,) = structure_loads(LoadedModel(MPI.COMM_SELF, model.body, model.tables, request), pulses_of(request.loads))
     assert isinstance(load, kind)
 
 

@@ -101,7 +101,7 @@ def test_what_cannot_be_fitted_to_the_board_is_said(setting):
     ("setting", "message"),
     [
         ('shock.coupling.scheme="local_steps"', "springs take no local steps"),
-        ('shock.method="large_mass"', "moves holes that nothing else holds"),
+        ('shock.method="large_mass"', "needs mounting holes without supports"),
     ],
 )
 def test_what_does_not_go_with_elastic_screws_is_said(setting, message):
