@@ -6,13 +6,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
-from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
-from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.flows.result import FlowResult, Metrics, Picture
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Particles, Simulation
@@ -25,36 +25,6 @@ SAMPLES = 2000
 
 Sample = Callable[[Simulation], tuple[float, ...]]
 Vector = tuple[float, float, float]
-Metrics = dict[str, tuple[float, str]]
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """Particles of the liquid at a time [s]: `(n, 3)` points [m] and velocities [m/s], `(n,)` pressures [Pa]."""
-
-    time: float
-    points: Floats
-    velocity: Floats
-    pressure: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class FlowResult:
-    """How a liquid flowed.
-
-    Attributes:
-        pictures: in time; the last is the end.
-        walls: `(m, 3)` particles of walls [m].
-        history: arrays of equal length, the first is time [s].
-        metrics: name to value and unit.
-        words: name to what is told in words.
-    """
-
-    pictures: list[Picture]
-    walls: Floats
-    history: dict[str, Floats]
-    metrics: Metrics
-    words: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -147,7 +117,7 @@ def _flow_until(
             progress(min(1.0, simulation.time / until))
 
 
-def device_of(scene: SphFlow) -> Callable[[Fields, int, Law], Particles]:
+def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     """Return what the particles of a flow are on; a GPU is looked for only where one is asked for.
 
     Raises:
@@ -160,7 +130,7 @@ def device_of(scene: SphFlow) -> Callable[[Fields, int, Law], Particles]:
     return CudaParticles
 
 
-def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
+def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
     """Return what acts between two particles of a flow in the plane of x and z.
 
     Args:
@@ -199,7 +169,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
     )
 
 
-def shear_law(scene: SphFlow) -> dict[str, Any]:
+def shear_law(scene: FlowScene) -> dict[str, Any]:
     """Return what a law says of a viscosity that depends on the rate of shear."""
     given = scene.rheology
     if given is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
@@ -222,15 +192,9 @@ def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
     )  # fmt: skip
 
 
-def wall_layers(scene: SphFlow) -> int:
+def wall_layers(scene: FlowScene) -> int:
     """Layers of particles that fill the support of liquid beside a wall."""
     return int(np.ceil(SUPPORT * scene.numerics.smoothing_length))
-
-
-def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: float) -> Floats:
-    """Return the points `(3, n)` of a lattice in the plane of x and z [m]; columns and rows are counted in spacings."""
-    x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")
-    return spacing * np.stack((x.ravel(), np.zeros(x.size), z.ravel()))
 
 
 def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:

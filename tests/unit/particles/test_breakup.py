@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import surface_care
 from reflowshock.particles.sph.liquid_surface import GAPS, LiquidSurface
 from reflowshock.particles.sph.surface_care import FEWEST, SurfaceLost, beside
 from reflowshock.particles.sph.surface_loops import find_weights
+from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface.breakup import are_outside, largest_part, small_parts, unpinched
 from reflowshock.particles.surface.closing import parts_of
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops

@@ -5,14 +5,15 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
-from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.scenes.droplet import base_width, droplet, outcome, solve_droplet, width
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics, cap
+from reflowshock.particles.flows.droplet_metrics import base_width, outcome
+from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import SurfaceLost, cosines_of, is_folded, outward_along, sliding
+from reflowshock.particles.sph_flows.droplet import droplet, solve_droplet, width
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
 COARSE = DropletNumerics(particles_per_diameter=8)

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.grid import Grid
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import EDGE
+from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface.closing import Meeting, closed_level, narrowest_gap, part_of_vertex, parts_of
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet, liquid_of
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_care import evened_out, on_wall, strays, without_dry_spots
 from reflowshock.particles.sph.surface_loops import find_weights
 from reflowshock.particles.sph.thin_films import hold_films
+from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
 from reflowshock.particles.surface.closing import narrowest_gap
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
 from reflowshock.particles.surface.surface_quality import vertex_normals
