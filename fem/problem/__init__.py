@@ -1,1 +1,1 @@
-"""What a case says of a shock, a structure or a reflow's heat, and what it may not. No numerical library."""
+"""Parameters of shocks, structures and reflow temperatures in a case, and their checks; start with `shock.py`."""

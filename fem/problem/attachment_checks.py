@@ -1,4 +1,4 @@
-"""Supports, lumped masses, watch points, gauges and the filter that do not fit a body, and places outside of it."""
+"""Checks of supports, lumped masses, watch points, strain gauges and the filter against the body they belong to."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -12,45 +12,45 @@ SAMPLES = 10  # in a period of the filter's corner
 
 
 def attachment_problems(problem: StructureProblem) -> Iterator[Problem]:
-    """Find what cannot be fitted to a structure."""
+    """Yield the problems of a structure's supports, lumped masses, watch points and gauges."""
     yield from fitting_problems(problem.fittings, problem.structure)
     yield from _elastic(problem)
 
 
-def fitting_problems(given: Fittings, body: Structure) -> Iterator[Problem]:
-    """Find supports, lumped masses, watch points and gauges that cannot be."""
-    for name, support in given.supports.items():
+def fitting_problems(fittings: Fittings, body: Structure) -> Iterator[Problem]:
+    """Yield the problems of supports, lumped masses, watch points and gauges on a body."""
+    for name, support in fittings.supports.items():
         yield from unknown_name(f"supports.{name}.on", support.on, body.facet_sets, "facet set")
         yield from _support(f"supports.{name}", support)
-    for name, mass in given.masses.items():
+    for name, mass in fittings.masses.items():
         yield from _mass(f"masses.{name}", mass, body)
-    for name, point in given.watch.items():
+    for name, point in fittings.watch.items():
         yield from inside(f"watch.{name}.at", point.at, body)
         yield from _direction(f"watch.{name}.direction", point.direction)
-    for name, gauge in given.gauges.items():
+    for name, gauge in fittings.gauges.items():
         yield from _gauge(f"gauges.{name}", gauge, body)
-        if name in given.watch:
+        if name in fittings.watch:
             yield Problem(f"gauges.{name}", "has the name of a watch point, whose strain is a metric, too", name)
 
 
 def filter_problems(table: str, low_pass: LowPass, duration: float, samples: int) -> Iterator[Problem]:
-    """Find a filter that is not said, or whose corner is too high for so many samples over a duration [s]."""
+    """Yield a filter without its corner, or with a corner too high for the number of samples over a duration [s]."""
     if low_pass.kind == "butterworth" and low_pass.corner is None:
         yield Problem(f"{table}.filter.corner", "is missing: the -3 dB of a Butterworth filter", None, "> 0 Hz")
     elif low_pass.kind == "cfc" and low_pass.corner is not None:
-        message = "is that of a Butterworth filter, a CFC filter has a channel_class"
+        message = "applies to a Butterworth filter; a CFC filter has a channel_class"
         yield Problem(f"{table}.filter.corner", message, f"{low_pass.corner:g} Hz", "kind = butterworth")
     else:
         needed = math.ceil(SAMPLES * low_pass.frequency * duration * (1.0 - 1e-9))
         if samples < needed:
-            message = f"are too few for the filter, {low_pass.label}: it needs {SAMPLES} in a period of its corner"
+            message = f"are too few for the filter, {low_pass.label}: it needs {SAMPLES} per period of its corner"
             yield Problem(f"{table}.numerics.history_samples", message, samples, f">= {needed}")
 
 
 def _support(key: str, support: Support) -> Iterator[Problem]:
     sprung = [axis for axis, stiffness in zip(AXES, support.stiffness, strict=True) if stiffness]
     if not support.hold and not sprung:
-        yield Problem(f"{key}.hold", "holds nothing", "[]", "any of x, y, z, or a bedding")
+        yield Problem(f"{key}.hold", "fixes no component", "[]", "any of x, y, z, or a bedding")
     for axis in sprung:
         if axis in support.hold:
             message = f"is held by {key}.hold, so that its springs never move"
@@ -63,12 +63,12 @@ def _direction(key: str, direction: tuple[float, ...] | None) -> Iterator[Proble
 
 
 def _gauge(key: str, gauge: StrainGauge, body: Structure) -> Iterator[Problem]:
-    """Yield a gauge whose middle or ends, or their images beyond planes of symmetry, are not on the face."""
+    """Yield a gauge whose centre or ends, or their mirror images, lie off the face."""
     low, high = body.corners
     height = high[2] if gauge.face == "upper" else low[2]
-    found = [*_direction(f"{key}.direction", gauge.direction), *inside(f"{key}.at", (*gauge.at, height), body)]
-    yield from found
-    if found:
+    misplaced = [*_direction(f"{key}.direction", gauge.direction), *inside(f"{key}.at", (*gauge.at, height), body)]
+    yield from misplaced
+    if misplaced:
         return
     reach = 0.5 * gauge.length / math.hypot(*gauge.direction)
     for side in (reach, -reach):
@@ -79,7 +79,7 @@ def _gauge(key: str, gauge: StrainGauge, body: Structure) -> Iterator[Problem]:
 
 
 def _elastic(problem: StructureProblem) -> Iterator[Problem]:
-    """Yield what does not go with elastic supports and lumped masses."""
+    """Yield the loads and couplings that elastic supports and lumped masses exclude."""
     key = next((f"supports.{name}.bedding" for name, support in problem.supports.items() if support.bedding), None)
     for name, load in problem.loads.items():
         if key and load.is_large_mass:
@@ -87,7 +87,7 @@ def _elastic(problem: StructureProblem) -> Iterator[Problem]:
             yield Problem(f"loads.{name}.method", message, "large_mass", "direct")
     attached = key or next((f"masses.{name}" for name in problem.masses), None)
     if attached and problem.dynamics.coupling is not None:
-        yield Problem(attached, "is for one model, dynamics.coupling makes two", None, "no dynamics.coupling")
+        yield Problem(attached, "requires a single model, but dynamics.coupling makes two", None, "no dynamics.coupling")
 
 
 def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
@@ -110,25 +110,25 @@ def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
             yield Problem(f"{key}.footprint", message, _metres(mass.footprint), f"at {axis} = 0, or on one side of it")
 
 
-def inside(key: str, place: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
-    """Yield a place [m] outside the box."""
+def inside(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+    """Yield a problem if a point [m] lies outside the meshed box."""
     low, high = structure.corners
-    nearest = [min(max(x, a), b) for x, a, b in zip(place, low, high, strict=True)]
-    distance = math.dist(place, nearest)
+    nearest = [min(max(x, a), b) for x, a, b in zip(point, low, high, strict=True)]
+    distance = math.dist(point, nearest)
     if distance > structure.margin:
-        message = f"lies {distance:.3g} m outside the meshed body; the nearest point of it is {_metres(nearest)}"
-        yield Problem(key, message, _metres(place), f"{_metres(low)} to {_metres(high)}")
+        message = f"lies {distance:.3g} m outside the meshed body; its nearest point is {_metres(nearest)}"
+        yield Problem(key, message, _metres(point), f"{_metres(low)} to {_metres(high)}")
 
 
-def in_hole(key: str, place: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
-    """Yield a place [m] inside a mounting hole."""
+def in_hole(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+    """Yield a problem if a point [m] lies inside a mounting hole."""
     holes = structure.holes
     if holes is None:
         return
-    radius = min(math.dist(place[:2], axis) for axis in holes.places)
+    radius = min(math.dist(point[:2], axis) for axis in holes.places)
     if radius < 0.5 * holes.diameter - structure.margin:
         allowed = f">= {0.5 * holes.diameter:.6g} m from the axis of the hole"
-        yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(place), allowed)
+        yield Problem(key, f"lies in a mounting hole, {radius:.3g} m from its axis", _metres(point), allowed)
 
 
 def _metres(point: Iterable[float]) -> str:

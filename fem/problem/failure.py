@@ -1,4 +1,4 @@
-"""What joints bear: limits of their measures, each with its source, and a user's own law of life."""
+"""Failure criteria of joints: limits of stress and plastic work, each with its source, and a law of drop life."""
 
 from typing import Annotated, Literal
 
@@ -12,24 +12,24 @@ Measure = Literal["peel_stress", "layer_von_mises", "layer_plastic_work"]
 
 
 class StressLimit(Parameters):
-    """The largest stress that a joint bears, and where that number is from: a test, a data sheet, a paper."""
+    """Stress at which a joint fails, and the source of the number: a test, a data sheet, a paper."""
 
     limit: Annotated[float, Quantity("MPa")] = Field(gt=0)
     source: Source
 
 
 class WorkLimit(Parameters):
-    """The largest plastic work density that a joint bears, and where that number is from."""
+    """Plastic work density at which a joint fails, and the source of the number."""
 
     limit: Annotated[float, Quantity("kJ/m^3")] = Field(gt=0)
     source: Source
 
 
 class Life(Parameters):
-    """The user's own law of life: N = C s^-m drops, calibrated on tests.
+    """Law of drop life from the user's tests: N = C s^-m drops.
 
-    s is the number of the ``measure`` of the critical joint, in MPa or kJ/m^3, C the ``constant``, m the ``exponent``.
-    Lives scatter between N / ``scatter`` and N times ``scatter``.
+    s is the ``measure`` of the critical joint in MPa or kJ/m^3, C the ``constant``, m the ``exponent``. Measured lives
+    scatter between N / ``scatter`` and N times ``scatter``.
     """
 
     measure: Measure
@@ -39,16 +39,16 @@ class Life(Parameters):
     source: Source
 
     def drops(self, measure: float) -> tuple[float, float, float]:
-        """Return N, and the least and the most drops of its scatter, for a measure in MPa or kJ/m^3."""
+        """Return the number of drops N and its lower and upper bound, for a measure in MPa or kJ/m^3."""
         middle = self.constant * measure**-self.exponent
         return middle, middle / self.scatter, middle * self.scatter
 
 
 class Failure(Parameters):
-    """Limits by which the joints are judged, of peaks over time at the worse pad; without one there is no verdict.
+    """Limits of the peaks over time at the worse pad of a joint; without a limit the joints are not judged.
 
     ``peel_stress`` is the mean over a pad, ``layer_von_mises`` and ``layer_plastic_work`` are means over the solder
-    layer at a pad. No limit has a default: what joints bear depends on solder, finish, rate and process.
+    layer at a pad. No limit has a default, because strength depends on solder, finish, rate and process.
     """
 
     peel_stress: StressLimit | None = None
@@ -58,10 +58,10 @@ class Failure(Parameters):
 
     @property
     def limits(self) -> dict[str, StressLimit | WorkLimit]:
-        """Return the limits that are given, by measure."""
-        known: dict[str, StressLimit | WorkLimit | None] = {
+        """Limits present in the case, by measure."""
+        limits: dict[str, StressLimit | WorkLimit | None] = {
             "peel_stress": self.peel_stress,
             "layer_von_mises": self.layer_von_mises,
             "layer_plastic_work": self.layer_plastic_work,
         }
-        return {name: limit for name, limit in known.items() if limit is not None}
+        return {name: limit for name, limit in limits.items() if limit is not None}

@@ -1,4 +1,4 @@
-"""The low-pass filter of accelerations, named with its corner wherever they are told."""
+"""Low-pass filter of accelerations (SAE J211-1 channel classes, Butterworth), labelled with its corner in reports."""
 
 from typing import Annotated, Literal
 
@@ -12,10 +12,10 @@ CFC_DESIGN = 2.0775  # SAE J211-1: -3 dB of one pass [Hz] over the channel frequ
 
 
 class LowPass(Parameters):
-    """A filter that runs forwards and backwards, so that it moves no peak.
+    """Zero-phase filter: it runs forwards and backwards, so that peaks are not delayed.
 
-    ``cfc`` is a channel frequency class of SAE J211-1 (1000, 600, 180, 60): second order each way. ``butterworth`` has
-    ``order`` each way and -3 dB of both together at ``corner``.
+    ``cfc`` is a channel frequency class of SAE J211-1 (1000, 600, 180, 60), of second order each way. ``butterworth``
+    has ``order`` each way and -3 dB of both passes together at ``corner``.
     """
 
     kind: Literal["cfc", "butterworth"] = "cfc"
@@ -25,18 +25,18 @@ class LowPass(Parameters):
 
     @property
     def passes(self) -> tuple[int, float]:
-        """Return the order of one pass, and the frequency [Hz] of its -3 dB."""
+        """Order of one pass, and its -3 dB frequency [Hz]."""
         if self.kind == "cfc" or self.corner is None:
             return 2, CFC_DESIGN * self.channel_class
         return self.order, self.corner / (2.0**0.5 - 1.0) ** (0.5 / self.order)
 
     @property
     def frequency(self) -> float:
-        """Return the frequency [Hz] at which both passes together have -3 dB."""
+        """Frequency [Hz] at which both passes together have -3 dB."""
         return CFC_DESIGN * TWO_PASSES * self.channel_class if self.corner is None else self.corner
 
     @property
     def label(self) -> str:
-        """Return its name with its corner."""
+        """Name and corner of the filter, for reports."""
         name = f"CFC {self.channel_class:g}" if self.kind == "cfc" else f"Butterworth of order 2 x {self.order}"
         return f"{name}, -3 dB at {self.frequency:.4g} Hz"

@@ -1,4 +1,4 @@
-"""What is fitted to a board or a structure: supports, lumped masses, watch points, strain gauges. SI floats."""
+"""Fittings of a board or a structure: supports, lumped masses, watch points, strain gauges. SI floats."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -18,9 +18,9 @@ PositiveLength = Annotated[float, Field(gt=0)]
 
 
 class Bedding(Parameters):
-    """Stiffness per area of an elastic support, by component; zero leaves a component free.
+    """Stiffness per area k of an elastic support, by component; zero leaves a component free.
 
-    Over an area A with the second moment I it is a total stiffness of k A and a rotational one of k I.
+    Over an area A with the second moment I the support has the stiffness k A and the rotational stiffness k I.
     """
 
     x: Annotated[float, Quantity("N/m^3")] = Field(0.0, ge=0)
@@ -29,7 +29,7 @@ class Bedding(Parameters):
 
 
 class Support(Parameters):
-    """What holds a facet set in the frame of the drop table: components at zero, others on a bedding of springs."""
+    """Support of a facet set in the frame of the drop table: fixed components, others on a bedding of springs."""
 
     on: str
     hold: tuple[Axis, ...] = ()
@@ -37,15 +37,15 @@ class Support(Parameters):
 
     @property
     def stiffness(self) -> tuple[float, float, float]:
-        """Return the stiffness per area [N/m^3] along x, y, z."""
+        """Stiffness per area [N/m^3] along x, y, z."""
         springs = self.bedding or Bedding()
         return springs.x, springs.y, springs.z
 
 
 class PointMass(Parameters):
-    """A component that is heavy and not stiff: at a place, or spread evenly over ``footprint`` along x and y.
+    """Lumped mass of a heavy component without stiffness: at a point, or uniform over ``footprint`` along x and y.
 
-    With a plane of symmetry its mirror image is there as well; of one on that plane each half bears half.
+    With a plane of symmetry its mirror image is added; each half carries half of a mass on that plane.
     """
 
     mass: Annotated[float, Quantity("g")] = Field(gt=0)
@@ -53,27 +53,28 @@ class PointMass(Parameters):
     footprint: Annotated[tuple[PositiveLength, PositiveLength], Quantity("mm")] | None = None
 
     def meshed_places(self, symmetry: Sequence[str], margin: float) -> list[tuple[Place, float]]:
-        """Return where it bears on the mesh, and its part there.
+        """Return the meshed points [m] that carry the mass, each with its fraction of the mass.
 
-        The footprint is a grid of equal masses; those beyond a plane of symmetry are on the part that is not meshed.
+        The footprint is a grid of equal masses; masses beyond a plane of symmetry lie on the part that is not meshed.
 
         Args:
             symmetry: Axes whose planes through the origin are planes of symmetry.
-            margin: Distance [m] below which the place is on such a plane.
+            margin: Distance [m] below which a point lies on such a plane.
         """
         planes = [AXES.index(axis) for axis in dict.fromkeys(symmetry)]
         if self.footprint is None:
             return [(self.at, 0.5 ** sum(abs(self.at[k]) <= margin for k in planes))]
         offsets = [(k + 0.5) / SAMPLED - 0.5 for k in range(SAMPLED)]
         (x, y, z), (length, width) = self.at, self.footprint
-        places = [(x + a * length, y + b * width, z) for a in offsets for b in offsets]
-        return [(place, 1.0 / len(places)) for place in places if all(place[k] > 0.0 for k in planes)]
+        grid = [(x + a * length, y + b * width, z) for a in offsets for b in offsets]
+        return [(point, 1.0 / len(grid)) for point in grid if all(point[k] > 0.0 for k in planes)]
 
 
 class WatchPoint(Parameters):
     """A point whose displacement, velocity, strain and stress are recorded.
 
-    ``direction`` is that of its accelerometer; without it, that of the input-G, else the axis of its largest motion.
+    ``direction`` is the axis of its accelerometer; the default is the direction of the input-G, or without input-G the
+    axis of largest motion.
     """
 
     at: Annotated[Place, Quantity("mm")]
@@ -81,9 +82,9 @@ class WatchPoint(Parameters):
 
 
 class StrainGauge(Parameters):
-    """A strain gauge on the upper or lower face: how much farther its ends are apart, over their distance.
+    """A strain gauge on the upper or lower face: change of the distance of its ends over their initial distance.
 
-    ``at`` is its middle in x, y. It is as long as an element of the face where that is longer than ``length``.
+    ``at`` is its centre in x, y. The gauge has ``length``, or the length of an element of the face if that is longer.
     """
 
     at: Annotated[tuple[float, float], Quantity("mm")]
@@ -95,8 +96,8 @@ class StrainGauge(Parameters):
 class Fittings(Parameters):
     """Supports, lumped masses, watch points and strain gauges by name.
 
-    On the board of a drop z = 0 is its upper face, which has the package, and the only facet set is ``mounting_holes``,
-    whose walls are held where there are no ``supports``.
+    On the board of a drop z = 0 is its upper face, on which the package sits, and the only facet set is
+    ``mounting_holes``. Without ``supports`` the walls of the holes are fixed.
     """
 
     supports: dict[str, Support] = Field(default_factory=dict)
@@ -106,11 +107,11 @@ class Fittings(Parameters):
 
 
 class Neighbour(Parameters):
-    """A further package on the board of a drop, coarse: it loads and stiffens the board, and its joints are not judged.
+    """A further, coarse package on the board: it loads and stiffens the board, and its joints are not judged.
 
     ``at`` is its centre in x, y. Each of its ``rows`` x ``columns`` joints is a square post of side ``post`` and height
-    ``standoff``. ``substrate`` and ``die`` are length, width and thickness. Materials are those of the same roles. With
-    a plane of symmetry its mirror image is there as well.
+    ``standoff``. ``substrate`` and ``die`` are length, width and thickness. Its roles have the materials of the main
+    package. With a plane of symmetry its mirror image is added.
     """
 
     at: Annotated[tuple[float, float], Quantity("mm")]
@@ -124,6 +125,6 @@ class Neighbour(Parameters):
 
 
 class BoardFittings(Fittings):
-    """What the board of a drop has besides, further packages among them."""
+    """Fittings of the board of a drop, with further packages."""
 
     packages: dict[str, Neighbour] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""The input file of a run: which models, meshes, materials and loads, and where the results go."""
+"""Input file of a run: models, meshes, materials, loads, and the folder of the results."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,7 +19,7 @@ UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results 
 class PackageInput(Parameters):
     """A package on a board; SI floats.
 
-    ``meshes`` have all joints fine, ``coarse_joints`` has those that are not.
+    ``meshes`` have fine meshes of all joints, ``coarse_joints`` the coarse meshes of joints that are not fine.
     """
 
     meshes: tuple[Path, ...] = Field(min_length=1)
@@ -30,32 +30,32 @@ class PackageInput(Parameters):
 
     @property
     def watchdog_seconds(self) -> float:
-        """Return how long one wait of a rank may last [s]."""
+        """Longest time that a rank may wait for another [s]."""
         return self.shock.numerics.watchdog_seconds
 
     @property
     def mesh_files(self) -> tuple[Path, ...]:
-        """Return all files of meshes."""
+        """All mesh files."""
         return (*self.meshes, self.coarse_joints) if self.coarse_joints else self.meshes
 
     @property
     def one_way(self) -> bool:
-        """Whether a coarse model of all drives a finer one of some joints."""
+        """Whether a coarse model of the whole package drives a finer model of some joints."""
         return False
 
 
 class CoolingInput(PackageInput):
-    """Cooling of the whole model from where it is free of stress, ``change`` of temperature [K]."""
+    """Cooling of the whole model from its stress-free state by the temperature ``change`` [K]."""
 
     mode: Literal["cooling"]
     change: float
 
 
 class RunInput(PackageInput, BoardFittings):
-    """A package on a board, dropped.
+    """Drop of a package on a board.
 
-    ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of the state in which it begins. A run
-    ends at ``end`` [s], or before the end of its shock when ``output.settled`` says so, if it ``settles``.
+    ``checkpoints`` is a folder from which a run continues, ``cooling`` the file of its initial state. A run ends at
+    ``end`` [s]; if ``settles`` is true, it ends as soon as ``output.settled`` finds that no higher peak follows.
     """
 
     mode: Literal["two_scale", "dns"]
@@ -66,58 +66,58 @@ class RunInput(PackageInput, BoardFittings):
 
     @property
     def numerics(self) -> ShockNumerics:
-        """Return how the motion is computed."""
+        """Numerical parameters of the motion."""
         return self.shock.numerics
 
     @property
     def part_materials(self) -> Materials:
-        """Return the material of each role that a part can have."""
+        """Material of each role of a part."""
         return self.materials
 
     @property
     def formulation(self) -> str:
-        """Return the formulation of hexahedra."""
+        """Formulation of hexahedra."""
         return self.shock.numerics.formulation
 
     @property
     def kinematics(self) -> Kinematics:
-        """Return whether rotations and strains are small."""
+        """Kinematics of the elements: small, corotational or finite."""
         return self.shock.numerics.decided_kinematics
 
     @property
     def coupled(self) -> bool:
-        """Return whether the run has two models."""
+        """Whether the run has two models."""
         return self.mode == "two_scale"
 
     def ranks(self, started: int) -> Ranks:
-        """Return which of so many ranks work on which model."""
+        """Return how the started MPI ranks are divided between the models."""
         return self.shock.ranks
 
     @property
     def computed(self) -> str:
-        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        """JSON text of all parameters that the results depend on, without output paths and ranks."""
         shock: Any = {"ranks": True, "numerics": UNRELATED}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "cooling": True, "shock": shock})
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Return all files that results depend on."""
+        """All files that the results depend on."""
         tables = (Path(self.shock.table),) if self.shock.table else ()
         return (*self.mesh_files, *tables, *((self.cooling,) if self.cooling else ()))
 
     @property
     def one_way(self) -> bool:
-        """Whether a coarse model of all drives a finer one of some joints."""
+        """Whether a coarse model of the whole package drives a finer model of some joints."""
         return self.mode == "two_scale" and self.shock.coupling.direction == "one_way"
 
     @property
     def initial_velocity(self) -> tuple[float, float, float]:
-        """Return the velocity of all that is free at time zero [m/s]: none."""
+        """Initial velocity of the free nodes [m/s], zero."""
         return 0.0, 0.0, 0.0
 
     @property
     def hht_alpha(self) -> float:
-        """Return the alpha of the HHT method."""
+        """Parameter alpha of the HHT method."""
         return 0.0
 
     @property
@@ -127,9 +127,9 @@ class RunInput(PackageInput, BoardFittings):
 
 
 class StructureInput(StructureProblem):
-    """A structure and one of its solvers; SI floats. ``checkpoints`` is a folder from which a run continues.
+    """A structure and one of its solvers; SI floats.
 
-    The solver ``dns`` is the explicit one without coupling.
+    ``checkpoints`` is a folder from which a run continues. The solver ``dns`` is the explicit solver without coupling.
     """
 
     mode: Literal["structure"]
@@ -140,49 +140,49 @@ class StructureInput(StructureProblem):
 
     @property
     def watchdog_seconds(self) -> float:
-        """Return how long one wait of a rank may last [s]."""
+        """Longest time that a rank may wait for another [s]."""
         return self.dynamics.numerics.watchdog_seconds
 
     @property
     def computed(self) -> str:
-        """Return all that results depend on: not where they go, nor which ranks compute them."""
+        """JSON text of all parameters that the results depend on, without output paths and ranks."""
         ranks = {"placement", "macro_ranks"}
         dynamics: Any = {"ranks": True, "numerics": UNRELATED, "coupling": ranks}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "dynamics": dynamics})
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Return all files that results depend on."""
+        """All files that the results depend on."""
         return (self.mesh, *(Path(load.table) for load in self.loads.values() if load.table is not None))
 
     @property
     def numerics(self) -> DynamicsNumerics:
-        """Return how the motion is computed."""
+        """Numerical parameters of the motion."""
         return self.dynamics.numerics
 
     @property
     def part_materials(self) -> dict[str, Material]:
-        """Return the material of each part: of each layer."""
+        """Material of each layer."""
         return self.layer_materials
 
     @property
     def formulation(self) -> str:
-        """Return the formulation of hexahedra."""
+        """Formulation of hexahedra."""
         return self.structure.formulation
 
     @property
     def kinematics(self) -> Kinematics:
-        """Return whether rotations and strains are small."""
+        """Kinematics of the elements: small, corotational or finite."""
         return self.dynamics.kinematics
 
     @property
     def initial_velocity(self) -> tuple[float, float, float]:
-        """Return the velocity of all that is free at time zero [m/s]."""
+        """Initial velocity of the free nodes [m/s]."""
         return self.dynamics.initial_velocity
 
     @property
     def hht_alpha(self) -> float:
-        """Return the alpha of the HHT method."""
+        """Parameter alpha of the HHT method."""
         return self.dynamics.numerics.hht_alpha
 
     @property
@@ -192,22 +192,22 @@ class StructureInput(StructureProblem):
 
     @property
     def coupled(self) -> bool:
-        """Return whether the run has two models."""
+        """Whether the run has two models."""
         return self.solver == "explicit" and self.dynamics.coupling is not None
 
     def ranks(self, started: int) -> Ranks:
-        """Return which of so many ranks work on which model."""
+        """Return how the started MPI ranks are divided between the models."""
         coupling = self.dynamics.coupling or LayerCoupling()
         return Ranks(total=started, placement=coupling.placement, macro=coupling.macro_ranks)
 
     @property
     def finds_modes(self) -> bool:
-        """Return whether this run is the one of the problem's solvers that finds the natural modes."""
+        """Whether this run computes the natural modes; only the first solver with a single model does."""
         alone = [solver for solver in self.dynamics.solvers if solver != "explicit" or not self.dynamics.coupling]
         return self.dynamics.modes > 0 and self.solver in alone[:1]
 
 
-# What ``python -m fem INPUT.json`` reads.
+# Type of the file that ``python -m fem INPUT.json`` reads.
 INPUT: TypeAdapter[RunInput | CoolingInput | StructureInput] = TypeAdapter(
     Annotated[RunInput | CoolingInput | StructureInput, Field(discriminator="mode")]
 )

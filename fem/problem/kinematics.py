@@ -24,7 +24,7 @@ def finite_rotation(table: str, kinematics: Kinematics, neglected_strain: float 
     turns, why = kinematics != "small", f"{table}.kinematics = {kinematics}"
     if kinematics != "finite" and neglected_strain is not None:
         strain = f"{float(f'{1e6 * neglected_strain:.3g}'):g} µm/m"
-        why += f"; it leaves out strains of up to {strain} (half the squared "
+        why += f"; it neglects strains of up to {strain} (half the squared "
         why += "strain)" if turns else "displacement gradient)"
         if neglected_strain > NEGLIGIBLE_STRAIN:
             why += f": not negligible, compare with a run of {table}.kinematics = finite"

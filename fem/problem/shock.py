@@ -1,6 +1,6 @@
 """Parameters of the drop shock: pulse, coupling, ranks.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use.
 """
 
 import math
@@ -23,11 +23,11 @@ ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 
 
 class Ranks(Parameters):
-    """MPI ranks of a run, and which of them work on which model.
+    """MPI ranks of a run, and their division between the models.
 
-    ``disjoint`` gives each model ranks of its own, which work at the same time: the macro model ``macro`` of them.
-    ``shared`` gives both models to all ranks, which take turns. ``auto`` takes what is predicted to be fastest, from
-    speeds that are measured when the run begins.
+    With ``disjoint`` each model has its own ranks and both models advance at the same time; ``macro`` is the number of
+    ranks of the macro model. With ``shared`` all ranks compute both models in turn. ``auto`` takes the placement
+    predicted to be fastest from speeds measured at the start of the run.
     """
 
     total: int = Field(2, ge=1, le=MOST_RANKS)
@@ -38,14 +38,14 @@ class Ranks(Parameters):
     @classmethod
     def _ranks_for_each(cls, value: str, info: ValidationInfo) -> str:
         if value == "disjoint" and info.data.get("total", 2) < 2:
-            raise PydanticCustomError("inadmissible", "needs a rank for each model", {"allowed": "auto, shared"})
+            raise PydanticCustomError("inadmissible", "needs at least one rank for each model", {"allowed": "auto, shared"})
         return value
 
     @field_validator("macro")
     @classmethod
     def _rank_for_meso(cls, value: int | None, info: ValidationInfo) -> int | None:
         if value is not None and info.data.get("placement", "disjoint") != "disjoint":
-            raise PydanticCustomError("inadmissible", "is for placement = disjoint", {"allowed": "none"})
+            raise PydanticCustomError("inadmissible", "applies only to placement = disjoint", {"allowed": "none"})
         if value is not None and value >= info.data.get("total", math.inf):
             allowed = f"< {info.data['total']}, shock.ranks.total"
             raise PydanticCustomError("inadmissible", "leaves no rank for the meso model", {"allowed": allowed})
@@ -53,14 +53,14 @@ class Ranks(Parameters):
 
 
 class Coupling(Parameters):
-    """How two models are coupled; ``auto`` takes local steps where all that is fine is linear, else held velocity.
+    """Coupling of two models; ``auto`` takes local steps if the fine model is linear, else held velocity.
 
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
-    velocity and keeps momentum exactly; its models wait for each other. ``one_way`` drives the meso model by the macro
-    model, which takes nothing back. ``levels`` are those of the meso model's steps below the window; with held velocity
-    there are three at most, and one under damping, springs, stress of cooling or a large mass on nodes of the meso
-    model. ``buffer_layers`` of board elements lie between joints and an interface of held velocity; ``path_levels`` has
-    those between levels.
+    velocity and conserves momentum exactly, but its models wait for each other. With ``one_way`` the macro model drives
+    the meso model without feedback. ``levels`` is the number of step levels of the meso model below the window; held
+    velocity allows at most three, and only one with damping, springs, cooling stress or a large mass on nodes of the
+    meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface of held
+    velocity; ``path_levels`` defines the buffers between levels.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
@@ -73,19 +73,20 @@ class Coupling(Parameters):
     def _of_local_steps(cls, value: int | str, info: ValidationInfo) -> int | str:
         scheme = info.data.get("scheme", "auto")
         if value != "auto" and scheme not in ("auto", "local_steps", "held_velocity"):
-            raise PydanticCustomError("inadmissible", f"does not go with scheme = {scheme}", {"allowed": "auto"})
+            raise PydanticCustomError("inadmissible", f"cannot be combined with scheme = {scheme}", {"allowed": "auto"})
         return value
 
     @property
     def most_levels(self) -> int:
-        """Return how many levels below the window may be tried."""
+        """Largest number of step levels below the window."""
         return MOST_LEVELS if self.levels == "auto" else self.levels
 
 
 class JointCoupling(Coupling):
-    """The coupling of a package on a board; joints that are not fine have the coarse mesh.
+    """Coupling of a package on a board; joints that are not fine have the coarse mesh.
 
-    ``fine_joints`` are all, those named, or as many as ``critical_joints`` of the most stressed ones of a coarse run.
+    ``fine_joints`` is ``all``, a list of names, or ``critical``: the ``critical_joints`` most stressed joints of a
+    coarse run.
     """
 
     fine_joints: Literal["all", "critical"] | tuple[str, ...] = "all"
@@ -110,16 +111,16 @@ class Damping(Parameters):
 
 
 class ShockNumerics(Parameters):
-    """How the shock is computed; implicit steps are for elastic materials, at most from sample to sample.
+    """Numerical parameters of the shock.
 
-    ``kinematics`` and ``formulation`` of hexahedra as for a structure. Elastic hexahedra are the same in both
-    formulations; those that yield are two to four times cheaper with one point, a few per cent stronger in bending.
-    Kinematics that are ``auto`` are corotational where the board's deflection calls for it. Solder whose material can
-    yield does so if ``plasticity`` is on, and if it is ``auto`` where half its yield stress is expected.
-    ``mass_scaled`` are roles, such as copper, whose density is raised to the step of the others, at most to
-    ``mass_scaled_step``; ``column`` stands for board and substrate in the columns of fine joints. The added mass is a
-    metric with a limit.
-    ``dns_duration`` ends the DNS before the shock does: the modes are compared over the time that both have.
+    ``kinematics`` and ``formulation`` have the meaning they have for a structure. Elastic hexahedra are the same in
+    both formulations; plastic hexahedra are two to four times cheaper with ``one_point`` and a few per cent too strong
+    in bending. ``kinematics = auto`` is corotational if the predicted deflection of the board requires it.
+    ``plasticity = auto`` is on if the predicted stress exceeds half the yield stress of the solder. ``mass_scaled``
+    lists roles, such as copper, whose density is raised until they reach the critical step of the other roles, at most
+    ``mass_scaled_step``; ``column`` means board and substrate in the columns of fine joints. The added mass is a metric
+    with a limit. ``dns_duration`` ends the DNS before the end of the shock; the modes are compared over the time they
+    have in common. Implicit steps require elastic materials and are at most the interval between samples.
     """
 
     modes: tuple[Literal["two_scale", "dns"], ...] = ("two_scale", "dns")
@@ -144,31 +145,35 @@ class ShockNumerics(Parameters):
         if value in TURNING and info.data.get("dns_solver") == "implicit":
             allowed = "small, or dns_solver = explicit"
             raise PydanticCustomError(
-                "inadmissible", "is not for implicit steps, which are linear", {"allowed": allowed}
+                "inadmissible", "cannot be combined with implicit steps, which are linear", {"allowed": allowed}
             )
         return value
 
     @property
     def decided_kinematics(self) -> Kinematics:
-        """Return the kinematics of a run, which only a case decides that are ``auto``; ValueError until it has."""
+        """Kinematics of a run.
+
+        Raises:
+            ValueError: ``kinematics`` is still ``auto``; the case replaces it before a run.
+        """
         if self.kinematics == "auto":
-            raise ValueError("shock.numerics.kinematics = auto is decided by the case, before a run")
+            raise ValueError("shock.numerics.kinematics = auto: the case must decide it before a run")
         return self.kinematics
 
 
 class Shock(Parameters):
     """Input-G at the mounting holes, package facing down (JESD22-B111; H 4.4).
 
-    The pulse is that of a JEDEC service condition, or a half sine of ``peak_acceleration`` and ``pulse_duration``, or a
-    table of times and accelerations (CSV; ``table_column`` is the title of one of several columns). ``method`` gives it
-    to the board as body acceleration, its holes held, or to a large mass at the holes. Gravity is left out by ``auto``
-    where it is less than a thousandth of the peak. The stress at the joints' upper interface is kept at
+    The pulse is defined by a JEDEC service condition, by a half sine of ``peak_acceleration`` and ``pulse_duration``,
+    or by a table of times and accelerations (CSV; ``table_column`` is the title of one of several columns). ``method``
+    applies it as body acceleration of the board with fixed holes, or to a large mass at the holes. ``gravity = auto``
+    neglects gravity below a thousandth of the peak. The stress at the upper interface of the joints is written at
     ``picture_times``. ``joint_layer`` is the thickness of the solder at either pad over which stress and plastic work
-    are averaged. ``identical_joints`` repeats the shock under a flat package on truncated spheres of the solder's
-    volume: what the joints' own shapes change is the difference. A ``duration`` that is ``auto`` ends when the joints'
-    first peak has passed and half a swing of the board brought no higher one, at the latest a period of the board after
-    the pulse. ``filter`` is that of accelerations and strain rates. ``modes`` is how many natural frequencies of the
-    board are wanted, the lowest ones; of a quarter those that are symmetric.
+    are averaged. ``identical_joints`` repeats the shock with a flat package on truncated spheres of the same solder
+    volume; the difference is the effect of the joint shapes. ``duration = auto`` ends the shock when the joints have
+    passed their first peak and half a period of the board brought no higher one, at the latest one period of the board
+    after the pulse. ``filter`` is applied to accelerations and strain rates. ``modes`` is the number of natural
+    frequencies of the board, from the lowest; a quarter model has only the symmetric modes.
     """
 
     service_condition: ServiceCondition | None = None
@@ -192,7 +197,11 @@ class Shock(Parameters):
 
     @property
     def decided_duration(self) -> float:
-        """Return the duration of a run [s], the longest where it is ``auto``, which a case decides; else ValueError."""
+        """Duration of a run [s], the longest possible if it is ``auto``.
+
+        Raises:
+            ValueError: ``duration`` is still ``auto``; the case replaces it before a run.
+        """
         if self.duration == "auto":
-            raise ValueError("shock.duration = auto is decided by the case, before a run")
+            raise ValueError("shock.duration = auto: the case must decide it before a run")
         return self.duration

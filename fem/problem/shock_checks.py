@@ -1,4 +1,4 @@
-"""Parameters of a drop shock that are each allowed but do not fit together. Loads neither numba nor DOLFINx."""
+"""Checks of the parameters of a drop shock that contradict each other. Imports neither numba nor DOLFINx."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from reflowshock.problem import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:
-    """Find what cannot work before anything is meshed or computed."""
+    """Return the contradictions of a drop shock, found before anything is meshed or computed."""
     return [
         *_pulse(shock),
         *_beyond_the_end(shock),
@@ -23,28 +23,30 @@ def problems(shock: Shock) -> list[Problem]:
 
 def _pulse(shock: Shock) -> Iterator[Problem]:
     sine = {"shock.peak_acceleration": shock.peak_acceleration, "shock.pulse_duration": shock.pulse_duration}
-    ways = {"shock.service_condition": shock.service_condition, "shock.table": shock.table} | sine
-    given = [key for key, value in ways.items() if value is not None]
-    if not given:
+    definitions = {"shock.service_condition": shock.service_condition, "shock.table": shock.table} | sine
+    keys = [key for key, value in definitions.items() if value is not None]
+    if not keys:
         yield Problem(
             "shock.peak_acceleration",
             "is missing",
             None,
             "peak_acceleration and pulse_duration, service_condition, table",
         )
-    elif set(given) <= set(sine):
-        for key in set(sine) - set(given):
+    elif set(keys) <= set(sine):
+        for key in set(sine) - set(keys):
             yield Problem(key, "is missing", None, "> 0; a half sine has peak_acceleration and pulse_duration")
-    elif len(given) > 1:
-        extra = given[1]
-        yield Problem(extra, f"does not go with {given[0]}, which says what the pulse is", ways[extra], "one of them")
+    elif len(keys) > 1:
+        extra = keys[1]
+        message = f"cannot be combined with {keys[0]}, which already defines the pulse"
+        yield Problem(extra, message, definitions[extra], "one of them")
 
 
 def _damping(damping: Damping) -> Iterator[Problem]:
     ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
-        yield Problem("shock.damping.frequency", f"is missing: at which {' and '.join(used)} is meant", None, "> 0 Hz")
+        message = f"is missing: the frequency of {' and '.join(used)}"
+        yield Problem("shock.damping.frequency", message, None, "> 0 Hz")
 
 
 def _filter(shock: Shock) -> Iterator[Problem]:
@@ -54,43 +56,43 @@ def _filter(shock: Shock) -> Iterator[Problem]:
 
 
 def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
-    """Find times after the end of the shock, where that is given."""
+    """Yield times after the end of the shock, if the duration is a number."""
     if shock.duration == "auto":
         return
     ends = {"shock.numerics.dns_duration": shock.numerics.dns_duration, "shock.picture_times": shock.picture_times}
-    for key, given in ends.items():
-        latest = max(given, default=0.0) if isinstance(given, tuple) else given or 0.0
+    for key, times in ends.items():
+        latest = max(times, default=0.0) if isinstance(times, tuple) else times or 0.0
         if latest > shock.duration:
-            yield Problem(key, "is after the end of the shock", given, "<= shock.duration")
+            yield Problem(key, "is after the end of the shock", times, "<= shock.duration")
 
 
 def _large_mass(shock: Shock) -> Iterator[Problem]:
     if shock.method == "large_mass" and shock.damping.coefficients[0]:
         yield Problem(
             "shock.method",
-            "does not go with mass-proportional damping, which would brake the moving table",
+            "cannot be combined with mass-proportional damping, which would slow the moving table",
             shock.method,
             "direct, or stiffness-proportional damping",
         )
 
 
 def _finite(shock: Shock) -> Iterator[Problem]:
-    """Find what is linear: stiffness-proportional damping, which would brake what turns, and implicit steps."""
+    """Yield linear methods under finite rotations: stiffness-proportional damping and implicit steps."""
     if shock.numerics.kinematics in TURNING and shock.damping.coefficients[1]:
         yield Problem(
             "shock.numerics.kinematics",
-            "does not go with stiffness-proportional damping, whose stiffness does not turn",
+            "cannot be combined with stiffness-proportional damping, whose stiffness does not rotate",
             shock.numerics.kinematics,
             "small, or mass-proportional damping",
         )
     if shock.numerics.kinematics in TURNING and shock.numerics.dns_solver == "implicit":
-        what = "is not for implicit steps, which are linear"
-        yield Problem("shock.numerics.kinematics", what, shock.numerics.kinematics, "small, or dns_solver = explicit")
+        message = "cannot be combined with implicit steps, which are linear"
+        allowed = "small, or dns_solver = explicit"
+        yield Problem("shock.numerics.kinematics", message, shock.numerics.kinematics, allowed)
 
 
 def _coupling(coupling: JointCoupling) -> Iterator[Problem]:
-    """Refuse schemes that need an answer, or to be the whole model, where nothing is answered."""
+    """Yield schemes that need feedback between the models, if the coupling is one-way."""
     if coupling.direction == "one_way" and coupling.scheme not in ("auto", "held_velocity"):
-        yield Problem(
-            "shock.coupling.scheme", "does not go with direction = one_way", coupling.scheme, "auto, held_velocity"
-        )
+        message = "cannot be combined with direction = one_way"
+        yield Problem("shock.coupling.scheme", message, coupling.scheme, "auto, held_velocity")

@@ -1,7 +1,7 @@
 """Parameters of a structure: a box of layers, its supports and loads, and the computation of its motion.
 
-All values are SI floats; ``Quantity`` names the unit that case files and messages use, for a tuple that of each item.
-Named tables are dictionaries, so that a single value of a single table can be overridden.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use (for a tuple, the unit of its
+items). Named tables are dictionaries, so that a single value of a single table can be overridden.
 """
 
 import math
@@ -64,8 +64,8 @@ class Structure(Parameters):
     """Box of layers, centred on x = y = 0, with z = 0 at its bottom.
 
     With a plane of symmetry in x only x >= 0 is meshed; ``x_min`` is then that plane, and the displacement normal to it
-    is zero. ``length`` and ``width`` are those of the whole body, ``cells`` those of the meshed part. ``refine``
-    multiplies all numbers of elements, along and across the layers; products are rounded and at least one.
+    is zero. ``length`` and ``width`` refer to the whole body, ``cells`` to the meshed part. ``refine`` multiplies all
+    numbers of elements, along and across the layers; products are rounded and at least one.
     """
 
     length: Annotated[float, Quantity("mm")] = Field(gt=0)
@@ -212,11 +212,11 @@ class StructureProblem(Parameters):
 
     @property
     def known_materials(self) -> dict[str, Material]:
-        """Materials by name: those of the problem, then those of the library."""
+        """Materials by name; materials of the problem take precedence over the library."""
         return self.materials | {name: material for name, material in LIBRARY.items() if name not in self.materials}
 
     @property
     def layer_materials(self) -> dict[str, Material]:
         """Material of each layer; an unknown name raises ``KeyError``."""
-        known = self.known_materials
-        return {name: known[layer.material] for name, layer in self.structure.layers.items()}
+        materials = self.known_materials
+        return {name: materials[layer.material] for name, layer in self.structure.layers.items()}

@@ -1,4 +1,4 @@
-"""Parameters of a structure that are each allowed but do not fit together. Loads neither numba nor DOLFINx."""
+"""Checks of the parameters of a structure that contradict each other. Imports neither numba nor DOLFINx."""
 
 import math
 from collections.abc import Iterator
@@ -21,11 +21,11 @@ COUPLING = "dynamics.coupling"
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
-    """Find what cannot work before anything is meshed or computed."""
+    """Return the contradictions of a structure problem, found before anything is meshed or computed."""
     return [
         *_structure(problem),
         *attachment_problems(problem),
-        *(found for name, load in problem.loads.items() for found in _load(f"loads.{name}", load, problem)),
+        *(error for name, load in problem.loads.items() for error in _load(f"loads.{name}", load, problem)),
         *_large_mass(problem),
         *_symmetry(problem),
         *_dynamics(problem),
@@ -34,14 +34,14 @@ def problems(problem: StructureProblem) -> list[Problem]:
 
 
 def check(problem: StructureProblem) -> None:
-    """Refuse a problem that cannot work.
+    """Raise an error if the parameters of a structure contradict each other.
 
     Raises:
-        ValueError: With all problems, one a line.
+        ValueError: The message lists all contradictions, one per line.
     """
-    found = problems(problem)
-    if found:
-        raise ValueError("\n".join(str(problem) for problem in found))
+    errors = problems(problem)
+    if errors:
+        raise ValueError("\n".join(str(error) for error in errors))
 
 
 def _structure(problem: StructureProblem) -> Iterator[Problem]:
@@ -53,7 +53,7 @@ def _structure(problem: StructureProblem) -> Iterator[Problem]:
             f"structure.layers.{name}.material", layer.material, problem.known_materials, "material"
         )
     if structure.element != "hexahedron" and structure.formulation == "one_point":
-        message = f"is a choice for hexahedra, the element is {structure.element}"
+        message = f"applies to hexahedra, but the element is {structure.element}"
         yield Problem("structure.formulation", message, structure.formulation, "incompatible_modes (the default)")
 
 
@@ -66,43 +66,42 @@ def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[
     if isinstance(load, OnBody | AtPoint) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", "has no length", list(load.direction), "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):
-        yield Problem(
-            f"{key}.method", "needs a support that the table shakes, there is none", "direct", "a [supports.NAME]"
-        )
+        message = "needs a support that moves with the table, but the case has no supports"
+        yield Problem(f"{key}.method", message, "direct", "a [supports.NAME]")
     if isinstance(load, PrescribedMotion):
         yield from _conflicts(key, load, problem)
     yield from _pulse(key, load)
 
 
 def _large_mass(problem: StructureProblem) -> Iterator[Problem]:
-    """A large mass moves the supports that hold all components; nothing else may refer to a place in space."""
+    """Yield contradictions to a large mass, which moves all supports that fix x, y and z."""
     shaking = [name for name, load in problem.loads.items() if load.is_large_mass]
     if not shaking:
         return
     key = f"loads.{shaking[0]}.method"
     if not any(set(support.hold) == set(AXES) for support in problem.supports.values()):
-        yield Problem(key, "needs a support that it can shake: one that holds x, y, z", "large_mass", "direct")
+        yield Problem(key, "needs a support that it can move: one that holds x, y, z", "large_mass", "direct")
     moved = {"initial_velocity": any(problem.dynamics.initial_velocity)}
     moved |= {"mass-proportional damping": bool(problem.dynamics.damping.coefficients[0])}
     moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in problem.loads.items()}
-    for what in [name for name, is_there in moved.items() if is_there]:
-        message = f"does not go with {what}, whose velocities would be those in space, not those seen from the supports"
+    for cause in [name for name, is_present in moved.items() if is_present]:
+        message = f"cannot be combined with {cause}: its velocities would be absolute, not relative to the supports"
         yield Problem(key, message, "large_mass", "direct")
     for name in shaking[1:]:
-        yield Problem(f"loads.{name}.method", f"is already that of loads.{shaking[0]}", "large_mass", "direct")
+        yield Problem(f"loads.{name}.method", f"is already the method of loads.{shaking[0]}", "large_mass", "direct")
     for name in shaking:
         yield from _left_behind(name, problem)
     yield from _not_shaken(key, problem)
 
 
 def _not_shaken(key: str, problem: StructureProblem) -> Iterator[Problem]:
-    """Yield what holds in space some nodes of a support that a large mass moves."""
+    """Yield supports that fix in space some nodes of a support that a large mass moves."""
     shaken = [name for name, support in problem.supports.items() if set(support.hold) == set(AXES)]
     for name in shaken:
         support = problem.supports[name]
-        for what, on, _ in _held_sets(problem):
-            if what.removeprefix("supports.") not in shaken and _meet(on, support.on):
-                message = f"cannot move supports.{name}: {what} holds nodes of it in space {_where(on, support.on)}"
+        for holder, on, _ in _held_sets(problem):
+            if holder.removeprefix("supports.") not in shaken and _meet(on, support.on):
+                message = f"cannot move supports.{name}: {holder} fixes nodes of it in space {_where(on, support.on)}"
                 yield Problem(key, message, "large_mass", "direct")
 
 
@@ -117,7 +116,7 @@ def _left_behind(shaking: str, problem: StructureProblem) -> Iterator[Problem]:
 
 
 def _symmetry(problem: StructureProblem) -> Iterator[Problem]:
-    """What both halves of a body do must be mirror images."""
+    """Yield loads and velocities that are not symmetric about a plane of symmetry."""
     pushes = {f"loads.{name}.direction": load for name, load in problem.loads.items()}
     vectors = {key: load.direction for key, load in pushes.items() if isinstance(load, OnBody)}
     vectors["dynamics.initial_velocity"] = problem.dynamics.initial_velocity
@@ -139,15 +138,15 @@ def _across(axis: str, key: str, vector: tuple[float, float, float]) -> Iterator
 
 
 def _is_held(problem: StructureProblem) -> bool:
-    """Return whether something of the body keeps its place."""
+    """Return whether a support or a prescribed motion acts on the body."""
     return bool(problem.supports) or any(isinstance(load, PrescribedMotion) for load in problem.loads.values())
 
 
 def _conflicts(key: str, load: PrescribedMotion, problem: StructureProblem) -> Iterator[Problem]:
-    """Yield what else decides on the component that a load moves."""
-    for what, on, components in _held_sets(problem):
+    """Yield supports and loads that prescribe the component that a load moves."""
+    for holder, on, components in _held_sets(problem):
         if _meet(on, load.on) and load.component in components:
-            yield Problem(f"{key}.component", f"is held by {what} {_where(on, load.on)}", load.component)
+            yield Problem(f"{key}.component", f"is held by {holder} {_where(on, load.on)}", load.component)
     for name, other in problem.loads.items():
         if f"loads.{name}" == key:  # of two that clash, the later one is named
             return
@@ -156,7 +155,7 @@ def _conflicts(key: str, load: PrescribedMotion, problem: StructureProblem) -> I
 
 
 def _held_sets(problem: StructureProblem) -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """Yield supports and planes of symmetry: what holds, on which facet set, which components."""
+    """Yield name, facet set and fixed components of each support and plane of symmetry."""
     for name, support in problem.supports.items():
         yield f"supports.{name}", support.on, support.hold
     for axis in problem.structure.symmetry:
@@ -164,7 +163,7 @@ def _held_sets(problem: StructureProblem) -> Iterator[tuple[str, str, tuple[str,
 
 
 def _meet(first: str, second: str) -> bool:
-    """Return whether two facet sets have nodes in common: all but opposite faces, and side faces and holes."""
+    """Return whether two facet sets share nodes: all pairs do except opposite faces, and holes and side faces."""
     if first != second and "mounting_holes" in (first, second):
         return any(name.startswith("z") for name in (first, second))
     return first == second or first[0] != second[0]
@@ -195,10 +194,10 @@ def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:
 
 
 def _nonlinear_damping(problem: StructureProblem) -> Iterator[Problem]:
-    """Stiffness-proportional damping takes the elastic stiffness, which must not turn."""
+    """Yield stiffness-proportional damping under finite rotations, where the elastic stiffness would have to rotate."""
     key = "dynamics.damping.stiffness_" + ("ratio" if problem.dynamics.damping.stiffness_ratio else "coefficient")
     if problem.dynamics.kinematics != "small":
-        message = f"needs a constant stiffness, dynamics.kinematics = {problem.dynamics.kinematics} has none"
+        message = f"needs a constant stiffness, but dynamics.kinematics = {problem.dynamics.kinematics}"
         yield Problem(key, message, None, "mass_ratio")
 
 
@@ -210,11 +209,11 @@ def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
         yield Problem("dynamics.kinematics", message, dynamics.kinematics, "small, or solver = explicit")
     if "implicit" in dynamics.solvers:
         yield from (
-            Problem(key, f"yields, the solver {dynamics.solver} is linear", material, "dynamics.solver = explicit")
+            Problem(key, f"yields, but the solver {dynamics.solver} is linear", material, "dynamics.solver = explicit")
             for key, material in _yielding(problem)
         )
     if (damping.mass_ratio or damping.stiffness_ratio) and damping.frequency is None:
-        yield Problem("dynamics.damping.frequency", "is missing: at which the ratios hold", None, "> 0 Hz")
+        yield Problem("dynamics.damping.frequency", "is missing: the frequency of the damping ratios", None, "> 0 Hz")
     if damping.stiffness_ratio or damping.stiffness_coefficient:
         yield from _nonlinear_damping(problem)
     for name in dynamics.numerics.mass_scaled:
@@ -223,9 +222,8 @@ def _dynamics(problem: StructureProblem) -> Iterator[Problem]:
         yield from filter_problems("dynamics", dynamics.filter, dynamics.duration, dynamics.numerics.history_samples)
     yield from _numerics(problem)
     if not problem.loads and not any(dynamics.initial_velocity):
-        yield Problem(
-            "loads", "nothing moves the structure", None, "a table such as loads.drop, or an initial_velocity"
-        )
+        allowed = "a table such as loads.drop, or an initial_velocity"
+        yield Problem("loads", "nothing moves the structure", None, allowed)
 
 
 def _numerics(problem: StructureProblem) -> Iterator[Problem]:
@@ -233,22 +231,22 @@ def _numerics(problem: StructureProblem) -> Iterator[Problem]:
     longest = min([dynamics.duration, *(load.duration / 2 for load in problem.loads.values() if load.duration)])
     step = numerics.implicit_step
     if step is not None and step > longest:
-        message = "is too long to see the motion: above the duration, or half a pulse"
+        message = "is too long to resolve the motion: longer than the duration, or than half a pulse"
         yield Problem("dynamics.numerics.implicit_step", message, f"{step:g} s", f"<= {longest:g} s")
     if numerics.mass_scaled and "implicit" in dynamics.solvers:
-        message = f"serves explicit steps, the solver is {dynamics.solver}"
+        message = f"applies to explicit steps, but the solver is {dynamics.solver}"
         yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled), "none")
     if problem.structure.layers and set(numerics.mass_scaled) >= set(problem.structure.layers):
-        message = "leaves no layer to take the step from"
+        message = "leaves no layer that defines the time step"
         yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled))
 
 
 def coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
-    """Find what does not go with two models; nothing where there is one."""
+    """Yield parameters that two coupled models do not support; nothing if there is a single model."""
     coupling = problem.dynamics.coupling
     if coupling is None:
         if problem.dynamics.solver == "dns":
-            message = "is one model instead of two that are coupled"
+            message = "replaces two coupled models, but the case has no coupling"
             yield Problem("dynamics.solver", message, "dns", f"explicit, implicit, both, or a table {COUPLING}")
         return
     yield from _fine(coupling, problem)
@@ -264,51 +262,50 @@ def _fine(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Proble
     if layers and set(coupling.fine) >= set(layers):
         yield Problem(f"{COUPLING}.fine", "leaves no layer to the macro model", list(coupling.fine), "fewer layers")
     if problem.structure.element != "hexahedron":
-        yield Problem(COUPLING, f"couples hexahedra, the element is {problem.structure.element}", None, "hexahedron")
+        yield Problem(COUPLING, f"couples hexahedra, but the element is {problem.structure.element}", None, "hexahedron")
 
 
 def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
     if coupling.direction == "one_way":
-        message = "needs a coarse mesh of the fine part, too, which only a package has"
+        message = "needs a coarse mesh of the fine part, which only a package has"
         yield Problem(f"{COUPLING}.direction", message, "one_way", "two_way")
     materials = {name: problem.known_materials.get(layer.material) for name, layer in problem.structure.layers.items()}
     plastic = [name for name, material in materials.items() if material and material.plasticity is not None]
     if coupling.scheme == "local_steps" and (plastic or problem.dynamics.kinematics != "small"):
         kinematics = f"dynamics.kinematics = {problem.dynamics.kinematics}"
         why = f"layers that yield: {', '.join(plastic)}" if plastic else kinematics
-        message = f"needs elastic layers at small strains, there are {why}"
+        message = f"needs elastic layers and small strains, but the case has {why}"
         yield Problem(f"{COUPLING}.scheme", message, "local_steps", "held_velocity, impulse, gravouil_combescure, auto")
 
 
 def _ranks(coupling: LayerCoupling, ranks: int) -> Iterator[Problem]:
     if coupling.placement == "disjoint" and ranks < 2:
-        yield Problem(
-            f"{COUPLING}.placement", "needs a rank for each model", "disjoint", "auto, shared; dynamics.ranks >= 2"
-        )
+        message = "needs at least one rank for each model"
+        yield Problem(f"{COUPLING}.placement", message, "disjoint", "auto, shared; dynamics.ranks >= 2")
     if coupling.macro_ranks is not None and coupling.placement != "disjoint":
-        yield Problem(f"{COUPLING}.macro_ranks", "is for placement = disjoint", coupling.macro_ranks, "none")
+        yield Problem(f"{COUPLING}.macro_ranks", "applies only to placement = disjoint", coupling.macro_ranks, "none")
     elif coupling.macro_ranks is not None and coupling.macro_ranks >= ranks:
         message = "leaves no rank for the meso model"
         yield Problem(f"{COUPLING}.macro_ranks", message, coupling.macro_ranks, f"< {ranks}, dynamics.ranks")
 
 
 def _one_model(problem: StructureProblem) -> Iterator[Problem]:
-    """Yield what only one model can do."""
+    """Yield parameters that require a single model."""
     dynamics = problem.dynamics
     if dynamics.solver == "implicit":
-        yield Problem("dynamics.solver", "couples nothing", "implicit", "explicit or both, or no dynamics.coupling")
+        yield Problem("dynamics.solver", "does not support coupling", "implicit", "explicit or both, or no dynamics.coupling")
     if (
         dynamics.modes
         and dynamics.solver not in ("both", "dns")
         and not (dynamics.coupling and dynamics.coupling.compare)
     ):
-        yield Problem("dynamics.modes", "are those of one model", dynamics.modes, f"0, or {COUPLING}.compare = true")
+        yield Problem("dynamics.modes", "require a single model", dynamics.modes, f"0, or {COUPLING}.compare = true")
     if dynamics.numerics.explicit_step is not None:
-        message = "is the step of one model, two have a window and smaller steps"
+        message = "is the step of a single model; two models have a window and smaller steps"
         yield Problem("dynamics.numerics.explicit_step", message, f"{dynamics.numerics.explicit_step:g} s", "none")
     if dynamics.numerics.critical_step != "element":
-        message = "is for one model: windows rest on the steps of elements"
+        message = "requires a single model: windows are derived from the steps of elements"
         yield Problem("dynamics.numerics.critical_step", message, dynamics.numerics.critical_step, "element")
     for name, load in problem.loads.items():
         if load.is_large_mass:
-            yield Problem(f"loads.{name}.method", "moves one model", "large_mass", "direct")
+            yield Problem(f"loads.{name}.method", "supports only a single model", "large_mass", "direct")

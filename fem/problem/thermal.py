@@ -1,6 +1,6 @@
-"""Parameters of the reflow's temperatures: the process, what holds the package, which effects are called for.
+"""Parameters of the reflow temperatures: temperature profile, support of the package, effects.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,11 +19,11 @@ KELVIN = 273.15
 
 
 class ThermalEffects(Parameters):
-    """Which effects act between solder and structure.
+    """Effects between solder and structure.
 
-    ``flexible``: board and package bend (off: rigid plates). ``solder_force``: the solder's force bends them in turn
-    (off: one way). ``auto`` decides from what either would change of the gaps. ``residual_stress``: what cooling from
-    solidification leaves in the joints is where the shock begins.
+    ``flexible``: board and package bend (off: rigid plates). ``solder_force``: the force of the solder bends them (off:
+    one-way coupling). ``auto`` decides from the predicted change of the gaps. ``residual_stress``: the shock begins
+    with the stress that cooling from solidification leaves in the joints.
     """
 
     flexible: Switch = "auto"
@@ -32,14 +32,14 @@ class ThermalEffects(Parameters):
 
 
 class Thermal(Parameters):
-    """The reflow's course of temperatures; without it nothing warms up and the plates are rigid.
+    """Temperature profile of the reflow; without it nothing is heated and the plates are rigid.
 
-    At ``reference`` all parts are flat and free of stress. In ``steps`` load steps they are heated to ``peak``; the
-    solder is liquid from ``melting`` on (H 4.3: from the start, ``melting = reference``). On cooling its shape freezes
-    at ``solidification``, and all go down to ``final``. The package floats on the solder, or the die's corner is moved
-    by ``corner_displacement`` upwards, in proportion to the temperature. ``tolerance`` limits the force that is out of
-    balance between solder and structure, relative to the solder's. Temperatures of Sn-Ag-Cu: liquid from 217 degC on,
-    peaks of 235 to 250 degC (J-STD-020).
+    At ``reference`` all parts are flat and free of stress. They are heated to ``peak`` in ``steps`` load steps; the
+    solder is liquid above ``melting`` (H 4.3: from the start, ``melting = reference``). On cooling its shape freezes at
+    ``solidification``, and all parts cool to ``final``. The package floats on the solder, or the corner of the die is
+    moved upwards by ``corner_displacement`` in proportion to the temperature. ``tolerance`` limits the residual force
+    between solder and structure, relative to the force of the solder. Sn-Ag-Cu melts at 217 degC; peaks are 235 to
+    250 degC (J-STD-020).
     """
 
     reference: Temperature = Field(25.0 + KELVIN, gt=0)
@@ -78,14 +78,14 @@ class Thermal(Parameters):
     def _moves_the_package(cls, value: float | None, info: ValidationInfo) -> float | None:
         package = info.data.get("package")
         if package == "floating" and value is not None:
-            raise PydanticCustomError("inadmissible", "does not go with package = floating", {"allowed": "moved"})
+            raise PydanticCustomError("inadmissible", "cannot be combined with package = floating", {"allowed": "moved"})
         if package == "moved" and value is None:
-            message = "is missing: how far package = moved moves the die's corner"
+            message = "is missing: the displacement of the die's corner with package = moved"
             raise PydanticCustomError("inadmissible", message, {"allowed": 'any length, e.g. "-0.1 mm"'})
         return value
 
     def corner(self, temperature: float) -> float:
-        """Return the displacement of the die's corner [m] at a temperature [K], in proportion to it on both ways."""
+        """Return the displacement of the die's corner [m], linear in the temperature [K] on heating and cooling."""
         if self.corner_displacement is None:
             return 0.0
         if self.peak == self.reference:
@@ -99,7 +99,17 @@ class Thermal(Parameters):
 
 
 def in_range(value: float, info: ValidationInfo, low: str | None, high: str | None) -> float:
-    """Return a temperature that lies between two others, given by name, where those are valid themselves."""
+    """Return a temperature [K] if it lies between two other fields.
+
+    Args:
+        value: Temperature [K] to check.
+        info: Fields that are already validated.
+        low: Name of the field with the lower bound, or None.
+        high: Name of the field with the upper bound, or None.
+
+    Raises:
+        PydanticCustomError: The temperature is out of range.
+    """
     bounds = [(sign, name, info.data[name]) for sign, name in ((">=", low), ("<=", high)) if name in info.data]
     if all(value >= bound if sign == ">=" else value <= bound for sign, _, bound in bounds):
         return value
@@ -108,26 +118,26 @@ def in_range(value: float, info: ValidationInfo, low: str | None, high: str | No
 
 
 def problems(thermal: Thermal, materials: Mapping[str, Material], warpage: float) -> list[Problem]:
-    """Find what cannot work before anything is meshed or computed.
+    """Return the contradictions of the reflow temperatures, found before anything is meshed or computed.
 
     Args:
-        thermal: The course of temperatures.
-        materials: Role -> its material.
-        warpage: Prescribed lift of the package's corner [m].
+        thermal: Temperature profile and effects.
+        materials: Material of each role.
+        warpage: Prescribed lift of the corner of the package [m].
     """
     return [*_expansion(thermal, materials), *_warpage(thermal, warpage)]
 
 
 def _expansion(thermal: Thermal, materials: Mapping[str, Material]) -> Iterator[Problem]:
-    """Find materials that do not say how they expand; that of liquid solder does not matter."""
+    """Yield materials without thermal expansion; the expansion of liquid solder is not used."""
     for role, material in materials.items():
         if role == "solder" and thermal.effects.residual_stress == "off":
             continue
         for name in material.unknown_expansion:
-            yield Problem(f"materials.{role}.{name}", "is missing, which [thermal] needs", None, "e.g. 16 ppm/K")
+            yield Problem(f"materials.{role}.{name}", "is missing, but [thermal] needs it", None, "e.g. 16 ppm/K")
 
 
 def _warpage(thermal: Thermal, warpage: float) -> Iterator[Problem]:
     if warpage and thermal.effects.flexible != "off":
-        message = "does not go with [thermal], which computes the warpage"
+        message = "cannot be combined with [thermal], which computes the warpage"
         yield Problem("warpage.corner", message, warpage, "0 mm, or thermal.effects.flexible = off")
