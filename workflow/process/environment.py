@@ -15,7 +15,7 @@ from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 
 UTF8 = "PYTHONUTF8"
@@ -99,7 +99,7 @@ def complete(environment: MutableMapping[str, str]) -> None:
     Raises:
         EnvironmentProblem: nowhere can a temporary file be written.
     """
-    own = own_environment(environment)
+    own = without_mpi_job(environment)
     for name in set(environment) - set(own):
         del environment[name]
     environment[UTF8] = "1"

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.parallel.status_board import ERROR
 from reflowshock.workflow.process.error_exit import describe_text
 
@@ -159,7 +159,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
     # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
-    environment = own_environment(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
+    environment = without_mpi_job(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],

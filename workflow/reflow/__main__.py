@@ -7,12 +7,12 @@ import os
 import sys
 from pathlib import Path
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 from reflowshock.workflow.reflow.rank import find, main
 
 if __name__ == "__main__":
-    own = own_environment(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
+    own = without_mpi_job(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
     os.environ.clear()
     os.environ.update(own | {"NUMBA_NUM_THREADS": "1"})
     choose_kernel_folder()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, ranked
-from reflowshock.fem.output.settled import is_settled, judged
+from reflowshock.fem.output.settled import is_settled, settling_measures
 
 Arrays = Mapping[str, NDArray]
 
@@ -51,7 +51,7 @@ def unsettled(history: Arrays, longest: float) -> str:
 def late_peak(history: Arrays) -> str:
     """Return a warning if the peel or elastic von Mises stress peaks at the end of the run; else empty."""
     names = {PEEL: "peel", VON_MISES: "von Mises"}
-    largest = {names[measure]: measure.worse(history).max(axis=1) for measure in judged(history)}
+    largest = {names[measure]: measure.worse(history).max(axis=1) for measure in settling_measures(history)}
     late = [name for name, stress in largest.items() if np.argmax(stress) >= len(stress) - max(2, len(stress) // 50)]
     if not late:
         return ""
