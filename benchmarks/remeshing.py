@@ -14,17 +14,17 @@ NAME = "remeshing"
 WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviation", "tries")
 
 
-def summary(kind: str, found: list[dict]) -> dict:
+def summary(kind: str, outcomes: list[dict]) -> dict:
     """The worst of one kind."""
-    meshed = [one for one in found if one["method"] != "refused"]
+    meshed = [outcome for outcome in outcomes if outcome["method"] != "refused"]
     return {
         "kind": kind,
-        "count": len(found),
-        **{way: sum(one["method"] == way for one in found) for way in ("swept", "free-form", "refused")},
-        **{name: max((one[name] for one in meshed), default=None) for name in WORST},
-        "scaled_jacobian": min((one["scaled_jacobian"] for one in meshed), default=None),
-        "smallest_length": min((one["smallest_length"] for one in meshed), default=None),
-        "seconds": sum(one["seconds"] for one in found) / len(found),
+        "count": len(outcomes),
+        **{way: sum(outcome["method"] == way for outcome in outcomes) for way in ("swept", "free-form", "refused")},
+        **{name: max((outcome[name] for outcome in meshed), default=None) for name in WORST},
+        "scaled_jacobian": min((outcome["scaled_jacobian"] for outcome in meshed), default=None),
+        "smallest_length": min((outcome["smallest_length"] for outcome in meshed), default=None),
+        "seconds": sum(outcome["seconds"] for outcome in outcomes) / len(outcomes),
     }
 
 
