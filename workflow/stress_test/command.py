@@ -24,7 +24,7 @@ RANDOM_COUNT = 200
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the user asks for.
+    """Request of the user.
 
     Attributes:
         files: of cases; none means all that the program has.
