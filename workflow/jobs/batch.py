@@ -23,7 +23,7 @@ LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said w
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What points are computed with.
+    """Resources for computing points.
 
     Attributes:
         cores: number of cores that may be used.
@@ -56,7 +56,7 @@ def machine_of(executor: Local | Slurm, *, one_run: bool = False) -> Machine:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A product that has to be made.
+    """Product to be made.
 
     Attributes:
         stage: whose product it is.
@@ -110,7 +110,7 @@ def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
 
 
 def show_products(store: Store, point: Point) -> list[str]:
-    """Show in a point's run folder what is there, intact, and made from what is there; return files put back."""
+    """Link all intact, current products into the run folder of a point; return the restored files."""
     states = examine(store, point)
     return show(store, point, [name for name, one in states.items() if not (one.stale or one.because_of)])
 
@@ -122,17 +122,17 @@ def run_points(
     machine: Machine,
     lock: int,
 ) -> dict[str, str]:
-    """Make what is missing or damaged of points; what is there and intact is never computed again.
+    """Make all missing or damaged products of points; intact products are never computed again.
 
     Should this process be killed, all that is complete stays, and checkpoints of stages that were at work. A product
     that a damaged one was read for is made again if that comes out otherwise than it was.
 
     Args:
-        store: where products are.
-        points: what is wanted.
-        until: the last stage.
-        machine: what they are computed with.
-        lock: what ``locked`` yields for the store's folder.
+        store: Store of the products.
+        points: Points to complete.
+        until: Last stage to run.
+        machine: Cores and executor.
+        lock: File descriptor that ``locked`` yields for the folder of the store.
 
     Returns:
         Key of each point that is not complete -> why.
@@ -159,13 +159,13 @@ def run_points(
 
 
 def why(store: Store, point: Point, until: str) -> str:
-    """Say why a point is not complete: its first stage that is not there, and what it said; nothing where it is."""
+    """Return the first missing stage of an incomplete point and its message; empty if the point is complete."""
     failure = failure_of(store, point, until)
     return f"stage {failure[0]}: {failure[1]}" if failure else ""
 
 
 def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None:
-    """Return the first stage of a point that is not there, and why; None where all are."""
+    """Return the first missing stage of a point and the reason, or None if all stages exist."""
     states = examine(store, point)
     stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
     if not stale:
@@ -174,12 +174,12 @@ def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None
 
 
 def log_of(store: Store, point: Point, stage: str) -> Path:
-    """Return the file that takes what a job says beside the terminal, as the Snakefile names it."""
+    """Return the log file of a job, as named in the Snakefile."""
     return store.home / BATCH / "logs" / f"{job_name(point, stage)}.txt"
 
 
 def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
-    """Say what is known of a stage that said nothing when it ended."""
+    """Describe the end of a stage that left no message."""
     name, said, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
     if by_cluster := failures_of(said).get(name):
         return f"{by_cluster}; see {said}"
@@ -194,7 +194,7 @@ def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
 
 
 def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:
-    """Run Snakemake once for some jobs; what jobs of a cluster say is shown as it comes."""
+    """Run Snakemake once for some jobs; output of cluster jobs is shown as it arrives."""
     discard(store.home / BATCH)
     (store.home / BATCH / "logs").mkdir(parents=True)
     for job in jobs:

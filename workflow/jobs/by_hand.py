@@ -16,7 +16,7 @@ _held = ExitStack()  # the lock of the run folder, until Snakemake ends: its job
 
 
 def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
-    """Read a case and write the jobs that make what is missing of its run.
+    """Read a case and write the jobs for the missing products of its run.
 
     Args:
         config: ``case``, and perhaps ``set``, ``out``, ``oversubscribe``.

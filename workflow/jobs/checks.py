@@ -26,7 +26,7 @@ class NoAnswer(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Partition:
-    """A partition: its name, all its cores, those of its largest machine, and whether it is the default."""
+    """Slurm partition: name, total cores, cores of its largest node, whether it is the default."""
 
     name: str
     cores: int
@@ -65,7 +65,7 @@ def jobs_in(folder: Path) -> list[str]:
 
 
 def cancel(jobs: list[str]) -> None:
-    """Cancel jobs; those that have ended are none."""
+    """Cancel jobs that have not ended."""
     if jobs:
         subprocess.run(["scancel", *jobs], capture_output=True, timeout=WAIT, check=False)
 

@@ -52,7 +52,7 @@ class Executor(Protocol):
         """Variables that stages see."""
 
     def jobs(self, case: Case) -> Jobs:
-        """Return what the job of each stage asks for; nothing where stages are no jobs."""
+        """Return the resources that the job of each stage requests; empty on this machine."""
 
     def left_over(self, folder: Path) -> list[str]:
         """Return the jobs of an earlier command that are still at work in a folder."""
@@ -81,11 +81,11 @@ class Local:
         return ("--cores", str(self.cores))
 
     def jobs(self, case: Case) -> Jobs:
-        """No stage is a job."""
+        """Return an empty table: no stage is a job."""
         return {}
 
     def left_over(self, folder: Path) -> list[str]:
-        """Nothing outlives a command."""
+        """Return an empty list: no process outlives a command."""
         return []
 
     def end(self, process: subprocess.Popen, folder: Path) -> None:
@@ -124,12 +124,12 @@ class Slurm:
         return (*jobs, "--nocolor", "--quiet", "progress", "host")
 
     def jobs(self, case: Case) -> Jobs:
-        """What ``plan`` predicts, with a margin."""
+        """Return the predicted resources with the margin of the profile."""
         wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
         return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
 
     def left_over(self, folder: Path) -> list[str]:
-        """Those that Slurm knows; none where it does not answer."""
+        """Return the jobs known to Slurm, or an empty list if it does not answer."""
         with suppress(NoAnswer):
             return jobs_in(folder)
         return []

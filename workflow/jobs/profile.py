@@ -21,7 +21,7 @@ KEYS = ("launcher", "walltime_factor")
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What the program takes from a profile; Snakemake reads the rest of its file.
+    """Values of a cluster profile that the program uses; Snakemake reads the rest of the file.
 
     Attributes:
         folder: of the file.

@@ -158,7 +158,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     program = command[0]
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
-    # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
+    # The output is read here, not on a terminal: always in UTF-8.
     environment = without_mpi_job(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
@@ -192,7 +192,7 @@ def _read(path: Path) -> list[str]:
 
 
 def error_of(lines: Sequence[str]) -> str:
-    """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
+    """Return the error message of a program, from its last line that begins with ``TOLD``, or an empty string."""
     begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
     return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""
 

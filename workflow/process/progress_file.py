@@ -34,14 +34,14 @@ class Progress:
 
 
 def tell_in(folder: Path) -> None:
-    """Let this process and what it starts tell their progress in a folder."""
+    """Write the progress of this process and its children to a folder."""
     os.environ[VARIABLE] = str((folder / NAME).resolve())
 
 
 def teller(what: str) -> Callable[[float, str], None]:
     """Return what writes the progress of something that begins now; without ``tell_in`` it does nothing.
 
-    A progress that cannot be written (a full device) is no reason to end.
+    Write errors (a full device) are ignored.
     """
     begin, last = time.time(), [0.0]
     place = os.environ.get(VARIABLE)

@@ -63,7 +63,7 @@ class Terminal(Console):
         super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return a text, which is no markup, unless it is asked for, with its control characters visible."""
+        """Return text without markup (unless requested) and with visible control characters."""
         return super().render_str(visible(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
@@ -93,7 +93,7 @@ def print_error(text: str) -> None:
 
 @contextmanager
 def interruptible(what: str) -> Iterator[None]:
-    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    """Exit with code 1 on Ctrl-C and print the given note."""
     try:
         yield
     except KeyboardInterrupt as error:

@@ -220,14 +220,14 @@ def test_a_drop_that_does_not_wet_its_wall_rebounds():
         ((0.0, 0.9), 1, 2, "stays on the wall, sheds satellites"),
     ],
 )
-def test_what_became_of_a_drop_is_told_in_words(foot, parts, shed, words):
+def test_outcome_of_an_impact_in_words(foot, parts, shed, words):
     history = {"foot": np.array(foot), "parts": np.array([1.0, parts]), "shed": np.array([0.0, shed])}
     assert outcome(history) == words
 
 
-def test_what_strikes_fast_is_told_how_wide_such_drops_spread():
-    message = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
-    assert message == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by that of computed ones"
+def test_fast_impacts_report_the_expected_spread():
+    spread = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
+    assert spread == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by a correlation of computed drops"
     assert "spread_expected" not in solve_droplet(drop(weber=8.0, reynolds=7.7, duration=1e-4)).words
 
 
