@@ -88,9 +88,9 @@ def test_layer_between_stiff_blocks_yields_as_in_one_dimension(formulation):
 
     plastic = brentq(excess, 0.0, 1.0, xtol=1e-15)
     stress = LAW.A + LAW.B * plastic**LAW.n
-    found = result.stress[1]
+    layer_stress = result.stress[1]
     assert plastic > 1e-3
-    assert found == pytest.approx([stress, stress, 0.0, 0.0, 0.0, 0.0], abs=1e-6 * stress)
+    assert layer_stress == pytest.approx([stress, stress, 0.0, 0.0, 0.0, 0.0], abs=1e-6 * stress)
     assert len(result.equilibrium.residuals) <= 10
     assert result.equilibrium.residuals[-1] <= 1e-10
 
