@@ -40,8 +40,8 @@ from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
 from reflowshock.particles.reference.impact_spread import laan, of_measured, pasandideh_fard, roisman, wildeman
 from reflowshock.particles.scenes.dam_break import solve_dam_break
 from reflowshock.particles.scenes.droplet import solve_droplet
-from reflowshock.particles.sph.surface_care import SurfaceLost
 from reflowshock.particles.steps.time_step import capillary_limit
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 mpl.use("Agg")
 RESULTS = Path(__file__).parent / "results" / "droplet_peers.json"

@@ -18,15 +18,17 @@ from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
 from reflowshock.particles.scenes.droplet import liquid_of, start_shape
 from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.heat import Heat, enthalpy_at
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
-from reflowshock.particles.sph.surface_care import EDGE
-from reflowshock.particles.surface.closing import part_of_vertex
-from reflowshock.particles.surface.cloud_level_set import mirrored
-from reflowshock.particles.surface.level_set import LevelSet, within_band
+from reflowshock.particles.surface.cloud_level_set import with_mirror_image
+from reflowshock.particles.surface.level_set import LevelSet, signed_distance_in_band
+from reflowshock.particles.surface.morphological_closing import part_of_vertex
+from reflowshock.particles.surface.remeshing import EDGE
+from reflowshock.particles.surface.surface_mesh import SurfaceMesh
 
 LIQUID, HELD, SOLID = 0, 1, 2
 # In spacings: how far the surface of a new drop is from particles below it.
@@ -89,8 +91,8 @@ class Deposit:
         self.law, tension = liquid_of(drop, spacing)
         self.ground = nothing_of(self.scene, spacing)
         self.fields = flow.liquid_and_walls(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
-        none = np.empty((0, 3)), np.empty((0, 3), np.int32)
-        self.surface = LiquidSurface(*none, tension, cos(drop.angle), self.law)
+        mesh = SurfaceMesh(np.empty((0, 3)), np.empty((0, 3), np.int32), self.law.spacing, bool(self.law.mirror))
+        self.surface = LiquidSurface(mesh, Capillarity(tension, cos(drop.angle), self.law))
 
     def saved(self) -> dict[str, Any]:
         """All of it, for a checkpoint."""
@@ -278,9 +280,9 @@ class Deposit:
 
 def join(ground: LevelSet, body: CuredBody) -> None:
     """Add a solid body to a level set, with its image behind the plate."""
-    points, triangles = mirrored(body.points, body.triangles)
+    points, triangles = with_mirror_image(body.points, body.triangles)
     part, nodes = ground.grid.part_around(points, MARGIN)
-    distance = within_band(points, triangles, part, MARGIN * part.spacing)
+    distance = signed_distance_in_band(points, triangles, part, MARGIN * part.spacing)
     ground.values[nodes] = np.minimum(ground.values[nodes], distance.values)
 
 

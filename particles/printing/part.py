@@ -13,8 +13,8 @@ from reflowshock.particles.core.surface_measure import volume_and_gradient
 from reflowshock.particles.parameters.printing import Printing
 from reflowshock.particles.printing.deposit import Deposit, join, nothing_of
 from reflowshock.particles.sph.flow import Metrics
-from reflowshock.particles.surface.closing import closed_level, groups
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
+from reflowshock.particles.surface.morphological_closing import close_gaps, connected_groups
 
 # In spacings of the particles: gaps of the part that are none; particles whose drops touch are not farther apart.
 GAP, LINK = 1.0, 2.0
@@ -81,7 +81,7 @@ class Part:
 
 def part_of(scene: Printing, deposit: Deposit) -> Part:
     """Return the part that solid bodies make."""
-    level = closed_level(deposit.ground, GAP * deposit.law.spacing)
+    level = close_gaps(deposit.ground, GAP * deposit.law.spacing)
     x, y, z = level.grid.axes()
     above = LevelSet(level.grid, np.maximum(level.values, -z))
     points, triangles = extract_surface(above)
@@ -119,7 +119,7 @@ def _layers(scene: Printing, deposit: Deposit) -> list[Layer]:
         bodies = [body for body in deposit.bodies if body.drop // scene.drops_of_layer == number]
         for body in bodies:
             join(ground, body)
-        level = closed_level(ground, GAP * spacing)
+        level = close_gaps(ground, GAP * spacing)
         field = _field(scene, level.grid.axes(), _heights(level))
         drops = highest[number * scene.drops_of_layer : (number + 1) * scene.drops_of_layer]
         alone, so_far = (_parts(points[some], LINK * spacing) for some in (layer == number, layer <= number))
@@ -143,7 +143,7 @@ def _layers(scene: Printing, deposit: Deposit) -> list[Layer]:
 def _parts(points: Floats, reach: float) -> int:
     """Number of groups of points `(n, 3)` that are no farther than a reach from each other [m]."""
     first, second = cKDTree(points).query_pairs(reach, output_type="ndarray").T
-    return int(groups(first, second, len(points)).max()) + 1
+    return int(connected_groups(first, second, len(points)).max()) + 1
 
 
 def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:

@@ -21,8 +21,8 @@ from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
 from reflowshock.particles.sph.flow import PICTURES, FlowResult, Metrics, Picture
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import SurfaceLost
-from reflowshock.particles.surface.closing import Meeting
+from reflowshock.particles.surface.morphological_closing import TopologyChange
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 COLUMNS = ("time", "drops", "largest_speed", "kinetic_energy", "surface_energy", "height")
 # Steps after which the light is accounted for, and after which a row of the history is kept.
@@ -90,7 +90,7 @@ def solve_printing(
         SurfaceLost: the liquid has left its surface, or that is none any more.
     """
     run = PrintRun(Deposit(scene))
-    saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
+    saved = checkpoint.read((Picture, TopologyChange)) if checkpoint else None
     if saved:
         run.restore(saved)
     while run.landed < scene.drops or run.deposit.simulation:
@@ -188,7 +188,7 @@ def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
         run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.pressures))
     part = part_of(scene, deposit)
     history: dict[str, Floats] = dict(zip(COLUMNS, np.array(run.rows).T, strict=True))
-    meetings = deposit.surface.meetings
+    meetings = deposit.surface.topology_changes
     metrics: Metrics = measure_part(scene, deposit, part) | {
         "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
         "splits": (float(sum(one.after > one.before for one in meetings)), ""),

@@ -18,7 +18,7 @@ from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Particles, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
 from reflowshock.particles.sph.threads import ThreadParticles
-from reflowshock.particles.surface.closing import Meeting
+from reflowshock.particles.surface.morphological_closing import TopologyChange
 
 PICTURES = 24
 SAMPLES = 2000
@@ -114,7 +114,7 @@ def run_flow(
         FloatingPointError: a position is not finite.
     """
     run = FlowRun(simulation)
-    saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
+    saved = checkpoint.read((Picture, TopologyChange)) if checkpoint else None
     if saved:
         run.restore(saved)
     else:

@@ -66,7 +66,7 @@ def test_one_angle_is_what_it_was_without_bounds():
     for simulation in (one, two):
         for _ in range(20):
             simulation.step(1e-8)
-    assert two.surface.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
+    assert two.surface.capillarity.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
     assert np.allclose(one.surface.points, two.surface.points, rtol=0.0, atol=1e-12 * one.law.spacing)
 
 

@@ -107,7 +107,7 @@ def test_one_thread_and_two_print_the_same_bits():
             deposit.step(1.0)
         deposit.update()
         found.append((deposit.points, deposit.surface.points, deposit.fields.density))
-    assert (deposit.surface.wetness[0] > 0.0).any()
+    assert (deposit.surface.mesh.wetness > 0.0).any()
     for one, two in zip(*found, strict=True):
         assert np.array_equal(one, two)
 
