@@ -1,20 +1,19 @@
 """Cost of a step of the scheme ispg against the number of particles: a cube of solder, values of the paper, 60 degrees.
 
-Run: OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (10 s; results/ispg.json)
+Run: PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (10 s)
 Seconds are those of the processor, over the first swing, where factors of the pressure equation age fastest.
 """
 
-import json
-from pathlib import Path
 from time import process_time
 
 import numpy as np
 
+from benchmarks.support import results
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import contact_line, start_flow
 
-RESULTS = Path(__file__).parent / "results" / "ispg.json"
+NAME = "ispg"
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": True, "viscosity": True}
 PER_EDGE = (5, 6, 7, 9, 11)
 STEPS = 60
@@ -42,8 +41,7 @@ def measure(count: int) -> dict[str, float]:
 def main() -> None:
     measure(5)
     rows = [measure(count) for count in PER_EDGE]
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(rows, indent=1))
+    results.write_figures(NAME, rows)
     for row in rows:
         print("  ".join(f"{name} {value:.4g}" for name, value in row.items()))
 

@@ -1,16 +1,14 @@
 """Error against cost of the reflow of joints: spacing, time step, gap; and of the derivatives that the seed takes.
 
-Run: .venv/bin/python benchmarks/bench_reflow.py   (about a minute; writes results/reflow.json)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_reflow.py   (about a minute; writes results/reflow.json)
 Errors are relative to the Young-Laplace meridian; seconds are those of one core after compilation.
 """
 
-import json
-import platform
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from benchmarks.support import results
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
@@ -18,7 +16,7 @@ from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.rest import NotAtRest
 
-RESULTS = Path(__file__).parent / "results" / "reflow.json"
+NAME = "reflow"
 BALL, RADIUS, MM = 0.0724e-9, 0.24e-3, 1e-3
 SPACINGS = (0.10, 0.07, 0.05, 0.04, 0.03, 0.02)
 PER_EDGE = (8, 12, 18, 26)
@@ -85,7 +83,6 @@ def main() -> None:
     steps = [joint(0.31, SolderNumerics(time_step_limit=limit)) for limit in TIME_STEP_LIMITS]
     gaps = [joint(gap, SolderNumerics()) for gap in GAPS]
     result = {
-        "machine": platform.processor() or platform.machine(),
         "spacing": by_spacing,
         "time_step": steps,
         "gaps": gaps,
@@ -93,8 +90,7 @@ def main() -> None:
         "derivatives": [derivative_errors(basis, count) for basis in SUPPORT for count in PER_EDGE],
         "cost_of_a_step": cost_of_a_step(by_spacing),
     }
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(result, indent=1))
+    results.write_figures(NAME, result)
     for name in ("spacing", "time_step", "gaps", "derivatives"):
         print(f"\n{name}")
         for row in result[name]:

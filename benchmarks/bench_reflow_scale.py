@@ -1,6 +1,6 @@
 """Cost of a step against the number of particles, on one and two threads: a cube that spreads to 60 degrees.
 
-Run: .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes results/reflow_scale.json)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes results/reflow_scale.json)
 Each row runs in a process of its own; bytes are the growth of its largest resident size over that of 343 particles.
 """
 
@@ -9,17 +9,17 @@ import os
 import resource
 import subprocess
 import sys
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from benchmarks.support import results
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 
-RESULTS = Path(__file__).parent / "results" / "reflow_scale.json"
+NAME = "reflow_scale"
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}
 PER_EDGE = (11, 13, 17, 27, 41)
 STEPS = 8
@@ -63,8 +63,7 @@ def main() -> None:
             rows.append(json.loads(subprocess.run(command, env=environment, capture_output=True, check=True).stdout))
             print(rows[-1], flush=True)
         print(f"second thread: {rows[-2]['seconds_a_step'] / rows[-1]['seconds_a_step']:.2f} times faster", flush=True)
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(rows, indent=1))
+    results.write_figures(NAME, rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Particle-steps per second of delta-SPH: a dam break in a plane, droplets in space without and with a surface; a GPU.
 
-Run: .venv/bin/python benchmarks/bench_sph.py   (two minutes; results/sph.json)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_sph.py   (two minutes; results/sph.json)
 Whole steps, on one thread and on two in turns. The bars are those of one core in space with all terms, of two threads
 over one, and of a GPU, where there is one: liquid in space without a tracked surface, up to 4e6 particles, beside one,
 two and all threads of the same machine.
@@ -8,13 +8,13 @@ two and all threads of the same machine.
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 from numba import get_num_threads, set_num_threads
 
+from benchmarks.support import results
 from reflowshock.particles.parameters.droplets import Droplet, DropletEffects, DropletNumerics
 from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
 from reflowshock.particles.scenes.dam_break import dam
@@ -23,7 +23,7 @@ from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.threads import ThreadParticles
 
-RESULTS = Path(__file__).parent / "results" / "sph.json"
+NAME = "sph"
 RATE, SPEEDUP, GPU_RATE = 5e5, 1.7, 1e8  # bars
 STEPS, TURNS = 20, 5
 # Across the diameter: sizes on a GPU with steps to measure, and the size that threads compute, too.
@@ -144,8 +144,7 @@ def main() -> None:
         best = max(size["particle_steps_per_second"] for size in gpu["sizes"].values())
         figures["particle_steps_per_second_of_a_gpu"] = (best, GPU_RATE)
     judged = {name: {"value": value, "limit": limit, "ok": value >= limit} for name, (value, limit) in figures.items()}
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps({"scenes": rows, "gpu": gpu, "figures": judged}, indent=1))
+    results.write_figures(NAME, {"scenes": rows, "gpu": gpu, "figures": judged})
     for name, row in (rows | judged).items():
         print(name, "  ".join(f"{key} {value:.4g}" for key, value in row.items()))
     print("gpu", json.dumps(gpu) if gpu else "no CUDA device")

@@ -7,7 +7,6 @@ models of a larger one, how busy they are and what the coupling costs. All other
 ``coupling_stability.py``, ``two_scale.py`` and ``two_scale_peers.py``, which take longer.
 """
 
-import json
 import os
 import tempfile
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.launched_run import largest_difference, launch
 from benchmarks.two_scale import REDUCED
@@ -85,11 +84,10 @@ def other_bars() -> dict[str, dict[str, dict]]:
     """Return the bars in the results of the other benchmarks."""
     found = {}
     for name in SOURCES:
-        path = turns.RESULTS / f"{name}.json"
-        if path.exists():
-            found[name] = json.loads(path.read_text())["bars"]
+        if figures := results.read_figures(name):
+            found[name] = figures["bars"]
         else:
-            print(f"no {path.name}: run benchmarks/{name}.py")
+            print(f"no results of {name}: run benchmarks/{name}.py")
     return found
 
 
@@ -105,7 +103,7 @@ def main() -> None:
             "balance": {scheme: balance(reduced, scheme, folder) for scheme in schemes[:2]},
         }
     bars = own_bars(found)
-    turns.write("coupling", found | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
+    results.write_and_print("coupling", found | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
     print(table({"coupling": bars} | other_bars()))
 
 

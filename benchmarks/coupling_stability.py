@@ -17,7 +17,7 @@ from itertools import product
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
 from reflowshock.cases.hard.trials.windows import PUSH, momentum_error
 from tests.stability.test_fem_window_grid import GROWTH
@@ -97,7 +97,7 @@ def main() -> None:
     for name, line in result["schemes"].items():
         print(f"{name:28s} {line['unstable']:4d} of {line['samples']} grow, worst {line['worst']:.1e} a window")
     print(json.dumps({name: result[name] for name in ("long_runs", "momentum_error")}, indent=1))
-    turns.write("coupling_stability", result | {"bars": bars_of(result)})
+    results.write_and_print("coupling_stability", result | {"bars": bars_of(result)})
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 
-from benchmarks.support import interfoam
+from benchmarks.support import interfoam, results
 from benchmarks.support.interfoam import Wedge
 from benchmarks.support.tables import write_tables
 from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
@@ -44,7 +44,7 @@ from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 mpl.use("Agg")
-RESULTS = Path(__file__).parent / "results" / "droplet_peers.json"
+NAME = "droplet_peers"
 FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "pysph" / "bin" / "python"
 INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072}
@@ -102,8 +102,7 @@ def draw(found: dict) -> None:
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest width over D")
     figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    RESULTS.parent.mkdir(exist_ok=True)
-    figure.savefig(RESULTS.with_suffix(".png"), dpi=100)
+    figure.savefig(results.path_of(NAME).with_suffix(".png"), dpi=100)
 
 
 def one_impact(given: Impact) -> dict:
@@ -222,7 +221,7 @@ def draw_widths(found: dict) -> None:
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest width over D")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
-    figure.savefig(RESULTS.with_name("droplet_widths.png"), dpi=100)
+    figure.savefig(results.path_of("droplet_widths").with_suffix(".png"), dpi=100)
 
 
 def dam_break() -> dict:
@@ -294,4 +293,4 @@ def install() -> bool:
 
 
 if __name__ == "__main__":
-    write_tables(__doc__.splitlines()[0], {"impact": impact, "widths": widths, "dam_break": dam_break}, RESULTS)
+    write_tables(__doc__.splitlines()[0], {"impact": impact, "widths": widths, "dam_break": dam_break}, NAME)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.forces.force import Kinematics, force_terms
@@ -115,7 +115,8 @@ def main() -> None:
     seconds = turns.in_turns({name: turns.batch(work) for name, work in sides().items()})
     found = ratios(seconds)
     MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": found}, indent=1) + "\n")
-    turns.write("effects", {"effects": found, "seconds": {name: float(np.median(s)) for name, s in seconds.items()}})
+    medians = {name: float(np.median(s)) for name, s in seconds.items()}
+    results.write_and_print("effects", {"effects": found, "seconds": medians})
 
 
 if __name__ == "__main__":

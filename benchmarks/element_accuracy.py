@@ -1,9 +1,7 @@
 """Work-precision of the elements: error against cost for kind, size and solver, on a cantilever and a plate.
 
-Run: .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
-     .venv/bin/python benchmarks/element_accuracy.py             (some minutes; to benchmarks/results)
-     .venv/bin/python benchmarks/element_accuracy.py --publish   (and to the README of cases/cantilever)
-     .venv/bin/python benchmarks/element_accuracy.py --publish --stored   (writes what is stored again)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
+     PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py             (some minutes)
 Seconds are those of one core, to follow one period of the first mode: explicit steps of 0.9 of the smallest element
 critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
 whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
@@ -12,12 +10,9 @@ plate is compared with Mindlin's. The linear one-point hexahedron has the stiffn
 """
 
 import argparse
-import json
 import os
-import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from time import process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -25,6 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.support import results
 from reflowshock.cases.hard.trials.boxes import KINDS, box
 from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.division.tables import prepare
@@ -42,15 +38,7 @@ from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.local_mesh import distribute
 
-RESULTS = Path(__file__).parent / "results" / "element_accuracy.json"
-README = Path(__file__).parents[1] / "cases" / "cantilever" / "README.md"
-STORED = README.with_name("work_precision.json")
-BEGIN, END = "<!-- work-precision: written by benchmarks/element_accuracy.py -->", "<!-- work-precision: end -->"
-HEAD = ["problem", "mesh", "deflection", "frequency", "critical step", "steps", "updates", "explicit", "implicit"]
-CLAMP = (
-    "Nearly incompressible, what is left of the error is the clamp's: an element that ends there cannot contract before"
-    " its far face, over a length that one layer of hexahedra does without."
-)
+NAME = "element_accuracy"
 NAMES = {
     "incompatible_modes": "hexahedra",
     "tetrahedron": "tetrahedra",
@@ -235,12 +223,11 @@ def run_all(refinements: tuple[Refinement, ...]) -> dict:
     """Measure the refinements; what is measured is on disk after each row."""
     next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
     speed = speeds(refinements[-1].cells[-1])
-    result = {"machine": platform.machine(), "rows": [], "speeds": speed, **reference_check(refinements)}
-    RESULTS.parent.mkdir(exist_ok=True)
+    result = {"rows": [], "speeds": speed, **reference_check(refinements)}
     for refinement in refinements:
         for row in measure(refinement):
             result["rows"].append(row)
-            RESULTS.write_text(json.dumps(result, indent=1) + "\n")
+            results.write_figures(NAME, result)
             print(" | ".join(cells_of(row)), flush=True)
     return result
 
@@ -265,44 +252,11 @@ def seconds(value: float) -> str:
     return f"{value:.0f} s" if value >= 10 else f"{value:.2g} s"
 
 
-def markdown(result: dict) -> str:
-    """The tables for the README."""
-    speed = [
-        [kind, *(f"{1e-6 * found[name]:.1f} M/s" for name in KINEMATICS)] for kind, found in result["speeds"].items()
-    ]
-    check = f"{CLAMP} The finest plate is {100 * result['finest_plate_over_mindlin']:+.2f} % from Mindlin's frequency."
-    return "\n\n".join(
-        [
-            lines_of([HEAD, *map(cells_of, result["rows"])]),
-            f"{check} Element updates per second of whole steps, on the finest plate of the table:",
-            lines_of([["kind", "small strains", "finite strains"], *speed]),
-        ]
-    )
-
-
-def lines_of(table: list[list[str]]) -> str:
-    """A table in Markdown, its head first."""
-    rows = [table[0], ["---"] * len(table[0]), *table[1:]]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in rows)
-
-
-def publish(result: dict) -> None:
-    """Store a measurement with the case, and its table in the README."""
-    STORED.write_text(json.dumps(result, indent=1) + "\n")
-    before, rest = README.read_text().split(BEGIN)
-    README.write_text(f"{before}{BEGIN}\n{markdown(result)}\n{END}{rest.split(END)[1]}")
-
-
 def main() -> None:
-    """Measure, or take what is stored; write JSON and table."""
+    """Measure the coarse or all meshes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="coarse meshes only")
-    parser.add_argument("--stored", action="store_true", help="measure nothing, take the stored rows")
-    parser.add_argument("--publish", action="store_true", help="write to cases/cantilever as well")
-    options = parser.parse_args()
-    result = json.loads(STORED.read_text()) if options.stored else run_all(QUICK if options.quick else FULL)
-    if options.publish:
-        publish(result)
+    run_all(QUICK if parser.parse_args().quick else FULL)
 
 
 if __name__ == "__main__":

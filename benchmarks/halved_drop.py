@@ -18,13 +18,14 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 import numpy as np
 
+from benchmarks.support import results
 from benchmarks.support.drop_scene import CASES, DropScene
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.workflow.convergence.errors import richardson
 from reflowshock.workflow.convergence.packages import package_study
 from reflowshock.workflow.pipeline.reader import read_case
 
-RESULTS = Path(__file__).parent / "results" / "halved_drop.json"
+RESULTS = "halved_drop"
 NAME, JOINT = "jedec_bga", "A4"
 SCENE = ("scale=quick", "board.holes.inset_x='3 mm'", "shock.numerics.kinematics=corotational")
 SHOCK = {
@@ -92,8 +93,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("sizes", nargs="*", type=float, help=f"of elements; without, {SIZES}")
     chosen = parser.parse_args().sizes or SIZES
-    RESULTS.parent.mkdir(exist_ok=True)
-    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"meshes": {}}
+    found = results.read_figures(RESULTS) or {"meshes": {}}
     for size in chosen:
         found["meshes"][f"{size:g}"] = measured(size)
         print(f"{size:g}", json.dumps(found["meshes"][f"{size:g}"]), flush=True)
@@ -102,7 +102,7 @@ def main() -> None:
         found["changes"] = {f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)}
         limits = {key: richardson(sizes[-3:], [value[key] for value in values[-3:]], None) for key in values[0]}
         found["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
-        RESULTS.write_text(json.dumps(found, indent=1))
+        results.write_figures(RESULTS, found)
     print(json.dumps({key: found[key] for key in ("changes", "orders")}, indent=1))
 
 

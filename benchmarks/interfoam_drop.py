@@ -10,7 +10,6 @@ Seconds are those of the processor, one core each.
 """
 
 import json
-import platform
 import shutil
 import tempfile
 from collections.abc import Iterable
@@ -20,7 +19,7 @@ from time import process_time
 
 import numpy as np
 
-from benchmarks.support import interfoam
+from benchmarks.support import interfoam, results
 from benchmarks.support.interfoam import State, Wedge
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
@@ -28,7 +27,7 @@ from reflowshock.particles.reference.young_laplace import Meridian, sessile_meri
 from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
 from reflowshock.particles.steps.time_step import capillary_limit
 
-RESULTS = Path(__file__).parent / "results" / "interfoam_drop.json"
+NAME = "interfoam_drop"
 VOLUME, ANGLE = 1e-9, 60.0
 PAPER = {"density": 8930.0, "surface_tension": 4.985, "viscosity": 0.227}
 WEDGE = Wedge(cell=5e-5, columns=32, rows=40)
@@ -169,15 +168,13 @@ def main() -> None:
     foam, particles = by_interfoam(solder, exact), by_particles(exact)
     spent = foam["seconds_to_rest"] or foam["seconds"]
     found = {
-        "machine": platform.machine(),
         "interfoam": foam,
         "particles": particles,
         "interfoam_came_to_rest": foam["seconds_to_rest"] is not None,
         "interfoam_over_particles": spent / particles["seconds_to_rest"],
     }
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(found, indent=1) + "\n")
-    print(RESULTS.read_text())
+    results.write_figures(NAME, found)
+    print(json.dumps(found, indent=1))
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem import dolfinx_api
@@ -178,7 +178,7 @@ def main() -> None:
         f"{name} bytes an element": turns.bar(max(memories[name].values()), limit, at_least=False)
         for name, limit in BYTES.items()
     }
-    turns.write(
+    results.write_and_print(
         "internal_force",
         {
             "elements": counts,

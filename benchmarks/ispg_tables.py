@@ -17,6 +17,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
+from benchmarks.support import results
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import pair_to_rest
 from reflowshock.particles.scenes.free_drop import solve_oscillation
@@ -27,7 +28,7 @@ from reflowshock.workflow.solder import stages
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
 
 ROOT = Path(__file__).resolve().parents[1]
-RESULTS = ROOT / "benchmarks" / "results" / "ispg_tables.json"
+NAME = "ispg_tables"
 Molten = DropCase | JointCase | DropsCase | OscillationCase
 
 
@@ -256,8 +257,7 @@ def main() -> None:
     unknown = set(given.tables) - set(TABLES)
     if unknown:
         parser.error(f"no table {', '.join(sorted(unknown))}; there are {', '.join(TABLES)}")
-    RESULTS.parent.mkdir(exist_ok=True)
-    stored = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    stored = results.read_figures(NAME)
     is_warm = given.list
     for table in given.tables or TABLES:
         print(table, flush=True)
@@ -268,7 +268,7 @@ def main() -> None:
                     warm()
                     is_warm = True
                 rows[row.name] = compute(row)
-                RESULTS.write_text(json.dumps(stored, indent=1))
+                results.write_figures(NAME, stored)
             print(line(row.name, rows[row.name]) if row.name in rows else f"| {row.name} |", flush=True)
 
 

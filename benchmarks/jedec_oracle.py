@@ -12,7 +12,6 @@ Seconds are process CPU seconds of set-up (assembly and factorisation) and steps
 import argparse
 import json
 import os
-import platform
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -24,6 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.support import results
 from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
@@ -39,7 +39,7 @@ from reflowshock.fem.run.structure import StructureDynamics
 from reflowshock.meshing.board.box import write_box
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 
-RESULTS = Path(__file__).parent / "results" / "jedec_oracle.json"
+NAME = "jedec_oracle"
 LENGTH, WIDTH, THICKNESS, SPACING, HOLE = 132e-3, 77e-3, 1e-3, (105e-3, 71e-3), 3e-3
 PULSE, DURATION, SAMPLES = 0.5e-3, 2e-3, 400
 KINDS = {
@@ -245,15 +245,13 @@ def main() -> None:
     rows = tables["steps"] + tables["meshes"]
     ratios = [row["forecast_seconds"] / row["seconds"] for row in rows]
     result = {
-        "machine": platform.processor() or platform.machine(),
         "blas": blas(),
         **tables,
         "forecast_ratio": [min(ratios), max(ratios)],
     }
     print("forecast over measured seconds:", *(f"{value:.2f}" for value in result["forecast_ratio"]))
     if not quick:
-        RESULTS.parent.mkdir(exist_ok=True)
-        RESULTS.write_text(json.dumps(result, indent=1))
+        results.write_figures(NAME, result)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ absolute value. Plastic measures are those of the solder within 25 um of either 
 
 import os
 from collections.abc import Callable
-from pathlib import Path
 from time import process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -25,7 +24,7 @@ from tests.support.joint_oracle import Patch, equilibrium, haversine, steps_in_t
 from tests.support.joint_patch import QUADRATIC, TRILINEAR, UM, JointPatch, mesh_patch
 from tests.support.joint_program import Course, ProgramPatch, box_mesh, matching_mesh
 
-RESULTS = Path(__file__).parent / "results" / "joint_oracle.json"
+NAME = "joint_oracle"
 PATCH = JointPatch()
 BLOW, SLOW = 20e-6, 0.2e-3
 SHARE = 0.6  # of the slow motion
@@ -119,4 +118,4 @@ def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
 
 if __name__ == "__main__":
     computed = {name: lambda rows=rows: measured(rows()) for name, rows in TABLES.items()}
-    write_tables(__doc__.splitlines()[0], computed, RESULTS)
+    write_tables(__doc__.splitlines()[0], computed, NAME)

@@ -12,7 +12,6 @@ ISPG with a cube until it rests.
 
 import os
 from math import pi, radians
-from pathlib import Path
 from time import process_time
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
@@ -32,7 +31,7 @@ from reflowshock.particles.scenes.rebuild import hand_over, rebuild
 from reflowshock.particles.scenes.reflow import start_flow
 from reflowshock.particles.surface.profile import section_areas
 
-RESULTS = Path(__file__).parent / "results" / "liquid_schemes.json"
+NAME = "liquid_schemes"
 VOLUME = 1e-9
 RADIUS = float(np.cbrt(0.75 * VOLUME / pi))
 # Radius of the sphere of both [m].
@@ -183,4 +182,4 @@ def caps() -> dict:
 
 
 if __name__ == "__main__":
-    write_tables(__doc__.splitlines()[0], {"merging": merging, "caps": caps}, RESULTS)
+    write_tables(__doc__.splitlines()[0], {"merging": merging, "caps": caps}, NAME)

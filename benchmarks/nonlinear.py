@@ -26,7 +26,6 @@ there is none, ``not_measured`` has the command.
 """
 
 import argparse
-import json
 import os
 import tempfile
 from collections.abc import Callable
@@ -42,7 +41,7 @@ from mpi4py import MPI
 from benchmarks import peers
 from benchmarks.coupling_stability import GROWTH, grid
 from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.kept_rows import KeptRows
@@ -65,8 +64,7 @@ from reflowshock.fem.model.assembly import ForceOptions, make_body
 from reflowshock.fem.output.compare import compare_histories
 from tests.support.fem_tangent import flowing_pair
 
-RESULT = turns.RESULTS / "nonlinear.json"
-BUILD = turns.RESULTS.parents[1] / "build"
+BUILD = results.FOLDER.parents[1] / "build"
 FINITE = {"kinematics": "corotational", "plasticity": "on", "formulation": "one_point"}
 ELASTIC = {"plasticity": "off", "formulation": "one_point"}
 HELD = {"scheme": "held_velocity", "fine_joints": CRITICAL[:1]}
@@ -376,14 +374,14 @@ def main() -> None:
     options = parser.parse_args()
     parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
-    found = json.loads(RESULT.read_text()) if RESULT.exists() else {"bars": {}}
+    found = results.read_figures("nonlinear") or {"bars": {}}
     for name in chosen:
         bars, rest = parts[name]()
         found["bars"] |= bars
         found[name] = rest
         bars, found["not_measured"] = found_in_runs()
         found["bars"] |= bars
-        turns.write("nonlinear", found)
+        results.write_and_print("nonlinear", found)
 
 
 if __name__ == "__main__":

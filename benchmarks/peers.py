@@ -20,7 +20,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 import numpy as np
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.cube import STEEL, cube, elements_of
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.forces.force_assembled import AssembledElements
@@ -167,7 +167,7 @@ def main() -> None:
     pairs = [(f"congruent_{work}", f"{name}_{work}") for name in peers for work in WORKS[name]]
     pairs += [("assembled_force", f"{name}_force") for name in peers if "force" in WORKS[name]]
     ratios = {f"{ours} / {theirs}": turns.ratio(seconds, ours, theirs) for ours, theirs in pairs}
-    turns.write(
+    results.write_and_print(
         "peers",
         {
             "elements": len(mesh.cells),

@@ -20,7 +20,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.drop_scene import DropScene
 from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.parallel.communicators import Communicators
@@ -99,7 +99,7 @@ def main(counts: list[int]) -> None:
             command = mpi_command(count, program, oversubscribe=True)
             subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.DEVNULL, check=True)
             table |= json.loads(path.read_text())
-    turns.write("placement", {"rows": table, "bars": {name: bars(row) for name, row in table.items()}})
+    results.write_and_print("placement", {"rows": table, "bars": {name: bars(row) for name, row in table.items()}})
 
 
 def bars(row: dict) -> dict:

@@ -1,17 +1,16 @@
 """Two hundred joints of known shapes, meshed or refused: method, errors, quality, tries and cost of each kind.
 
-Run: .venv/bin/python benchmarks/remeshing.py           (about a minute; to benchmarks/results)
-     .venv/bin/python benchmarks/remeshing.py --quick   (every eighth of each kind)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py           (about a minute; to benchmarks/results)
+     PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py --quick   (every eighth of each kind)
 Seconds are those of this process; Gmsh makes tetrahedra in processes of its own, which are not counted.
 """
 
 import argparse
-import json
-from pathlib import Path
 
+from benchmarks.support import results
 from tests.support.many_joints import COUNTS, outcome, samples
 
-RESULTS = Path(__file__).parent / "results" / "remeshing.json"
+NAME = "remeshing"
 WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviation", "tries")
 
 
@@ -43,8 +42,7 @@ def main() -> None:
     for one in found:
         if one["method"] == "refused":
             print(f"refused: {one['kind']}: {one['reason']}")
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps({"kinds": table, "joints": found}, indent=1) + "\n")
+    results.write_figures(NAME, {"kinds": table, "joints": found})
 
 
 if __name__ == "__main__":

@@ -1,19 +1,20 @@
 """What a report costs: processor time beyond that of loading the program, and the size of the page.
 
-Run: .venv/bin/python benchmarks/report_cost.py [RUN ...]   (a minute; writes results/report_cost.json)
+Run: PYTHONPATH=. .venv/bin/python benchmarks/report_cost.py [RUN ...]   (a minute; writes results/report_cost.json)
 Without run folders it first runs the shortened case of the tests, into build/report_cost.
 """
 
 import json
-import platform
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from time import process_time
 
+from benchmarks.support import results
+
 ROOT = Path(__file__).resolve().parents[1]
-RESULTS = ROOT / "benchmarks/results/report_cost.json"
+NAME = "report_cost"
 CASE, RUN = ROOT / "tests/pipeline/small.toml", ROOT / "build/report_cost"
 
 
@@ -48,7 +49,6 @@ if __name__ == "__main__":
         print(json.dumps(one(Path(sys.argv[2]))))
         raise SystemExit
     rows = [cost(run) for run in map(Path, sys.argv[1:])] or [cost(small_run())]
-    RESULTS.parent.mkdir(parents=True, exist_ok=True)
-    RESULTS.write_text(json.dumps({"machine": platform.processor(), "reports": rows}, indent=1) + "\n")
+    results.write_figures(NAME, {"reports": rows})
     for row in rows:
         print("{run}: {processor_seconds:.2f} s, {bytes} B; loading the program {loading_seconds:.2f} s".format(**row))

@@ -22,7 +22,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.cube import STEEL, cube
 from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.division.tables import prepare
@@ -124,7 +124,7 @@ def report(least: dict[str, float]) -> dict:
 def main() -> None:
     command = mpi_command(2, [sys.executable, __file__, "ranks"], oversubscribe=False)
     done = subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.PIPE, text=True, check=True)
-    turns.write("step_scaling", json.loads(done.stdout))
+    results.write_and_print("step_scaling", json.loads(done.stdout))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ takes turns between the models; seconds of the runs are those of one core. Ten m
 import json
 import os
 from functools import cache, partial
-from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
@@ -22,12 +21,13 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.ticker import NullFormatter
 
+from benchmarks.support import results
 from benchmarks.support.tables import write_tables
 from benchmarks.support.turns import batch, in_turns
 from benchmarks.tension.scenes import MODELS, TRACKED, at_rest, cap_at_rest, merging, start, swing, unit_drop
 
 mpl.use("Agg")
-RESULTS = Path(__file__).parent / "results" / "tension_models.json"
+NAME = "tension_models"
 # Particles a diameter; of the sphere on which the forces between pairs are calibrated, and whose cost is measured.
 SIZES, SMALLER, SPHERE = (10, 14), (8, 10), 14
 # Marks of core-seconds.
@@ -50,7 +50,7 @@ def strength() -> float:
 @cache
 def calibrated() -> float:
     """Strength as it was found last."""
-    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    kept = results.read_figures(NAME)
     return kept.get("strength") or strength()
 
 
@@ -102,7 +102,7 @@ def draw(found: dict) -> None:
         panel.yaxis.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("error (%)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
-    figure.savefig(RESULTS.with_suffix(".png"), dpi=120)
+    figure.savefig(results.path_of(NAME).with_suffix(".png"), dpi=120)
 
 
 if __name__ == "__main__":
@@ -117,7 +117,7 @@ if __name__ == "__main__":
             "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
             "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
         },
-        RESULTS,
+        NAME,
     )
-    kept = json.loads(RESULTS.read_text())
+    kept = results.read_figures(NAME)
     draw({scene: kept[scene] for scene in DRAWN if scene in kept})

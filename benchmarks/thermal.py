@@ -10,7 +10,6 @@ assembled by DOLFINx from UFL forms, an independent code. Seconds are process CP
 """
 
 import argparse
-import json
 import os
 import tempfile
 from pathlib import Path
@@ -24,6 +23,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from benchmarks.support import results
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.materials.elasticity import elasticity_matrix
@@ -41,7 +41,7 @@ from reflowshock.meshing.board.assembly import write_assembly, write_heated_asse
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.workflow.pipeline.reader import read_case
 
-RESULTS = Path(__file__).parent / "results" / "thermal.json"
+NAME = "thermal"
 CASE = Path(__file__).parents[1] / "cases" / "bga_drop" / "case.toml"
 RISE, SUBSTRATE, DIE, THICKNESS = 175.0, 5.5e-3, 4e-3, 0.4e-3
 
@@ -219,8 +219,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     print(f"PETSc {PETSc.Sys.getVersion()}, DOLFINx {dolfinx.__version__}, one core")
     tables = {"meshes": meshes(quick), "boards": boards(quick)}
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(tables, indent=1))
+    results.write_figures(NAME, tables)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 import numpy as np
 
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.fem.output.compare import compare_histories
@@ -138,7 +138,8 @@ def main() -> None:
         short = scene if options.full else DropScene.write(folders["short"], SHORT)
         errors = error_table(short, names, shock, folders["histories"])
     result = {"size": "full" if options.full else "reduced", "costs": costs, "errors": errors}
-    turns.write("two_scale_full" if options.full else "two_scale", result | {"bars": bars_of(costs, errors)})
+    name = "two_scale_full" if options.full else "two_scale"
+    results.write_and_print(name, result | {"bars": bars_of(costs, errors)})
 
 
 if __name__ == "__main__":

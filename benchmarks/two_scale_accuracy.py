@@ -18,7 +18,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 
 from benchmarks.coupling import SMALL
-from benchmarks.support import turns
+from benchmarks.support import results
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.fem.output.compare import compare_histories
@@ -93,7 +93,7 @@ def main() -> None:
                 item["time_ratio"] = item["seconds"] / dns["seconds"]
                 rows.append(item)
                 print(shown(item), flush=True)
-    turns.write("two_scale_accuracy", {"rows": rows, "orders": orders(rows)})
+    results.write_and_print("two_scale_accuracy", {"rows": rows, "orders": orders(rows)})
 
 
 if __name__ == "__main__":

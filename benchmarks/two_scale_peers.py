@@ -24,7 +24,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from benchmarks.peers import FOLDER, Peer, install, model_arrays
-from benchmarks.support import turns
+from benchmarks.support import results, turns
 from benchmarks.support.conforming_package import MATERIALS, conforming_package
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.fem.materials.library import SAC405
@@ -170,7 +170,7 @@ def main() -> None:
             result["bars"] |= bars
     if not result["bars"]:
         raise SystemExit("no peer can be installed: nothing to compare with")
-    turns.write("two_scale_peers", result)
+    results.write_and_print("two_scale_peers", result)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,18 @@
 """The command line of benchmarks with several tables: computes those that are named, keeps the others."""
 
 import argparse
-import json
 from collections.abc import Callable, Mapping
-from pathlib import Path
+
+from benchmarks.support import results
 
 
-def write_tables(description: str, tables: Mapping[str, Callable[[], object]], results: Path) -> None:
-    """Compute the tables that the command line names, all without a name, and write each as soon as it is there."""
+def write_tables(description: str, tables: Mapping[str, Callable[[], object]], benchmark: str) -> None:
+    """Compute the tables that the command line names (all without a name), and store each when it is complete."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(tables)}; all without")
     chosen = parser.parse_args().tables or list(tables)
-    results.parent.mkdir(exist_ok=True)
-    found = json.loads(results.read_text()) if results.exists() else {}
+    figures = results.read_figures(benchmark)
     for name in chosen:
         print(name, flush=True)
-        found[name] = tables[name]()
-        results.write_text(json.dumps(found, indent=1))
+        figures[name] = tables[name]()
+        results.write_figures(benchmark, figures)

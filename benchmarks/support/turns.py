@@ -1,14 +1,11 @@
 """Processor seconds of several sides of a comparison, measured in turns: a loaded machine slows all of them alike."""
 
-import json
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-RESULTS = Path(__file__).parents[1] / "results"
 ROUNDS = 9
 BATCH_SECONDS = 0.1
 
@@ -55,11 +52,3 @@ def bar(value: float, limit: float, at_least: bool = True) -> dict[str, Any]:
         "holds_if": "at least" if at_least else "at most",
         "ok": bool(value >= limit if at_least else value <= limit),
     }
-
-
-def write(name: str, result: dict[str, Any]) -> None:
-    """Write ``results/<name>.json`` and print it."""
-    RESULTS.mkdir(exist_ok=True)
-    text = json.dumps(result, indent=1)
-    (RESULTS / f"{name}.json").write_text(text)
-    print(text)

@@ -1,18 +1,16 @@
 """The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
-from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace, choose_levels
-from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
-from reflowshock.fem.division.path_levels import with_path_levels
+from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace
+from reflowshock.fem.division.decide import decide_scheme, in_local_steps, in_path_levels, in_two_steps, plan_windows
+from reflowshock.fem.division.division import Choice, Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole, nodes_of, seeds_of, touching
-from reflowshock.fem.errors import CouplingError, LevelError
+from reflowshock.fem.errors import LevelError
 from reflowshock.fem.estimates.estimate import (
     BOARD_ADVANTAGE,
     UPDATES_PER_SECOND,
@@ -45,29 +43,10 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme that the user wants, or that the problem calls for, and why.
-
-    Raises:
-        CouplingError: Local steps are wanted, and supports have springs.
-    """
-    wanted = rules.coupling.scheme
-    if wanted == "local_steps" and rules.sprung:
-        raise CouplingError(
-            "coupling.scheme = local_steps is for supports without springs, which take no smaller steps"
-        )
-    if rules.copied is not None:
-        return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
-    if wanted != "auto":
-        return Choice(wanted, f"coupling.scheme = {wanted}")
-    coarse_step = float(survey.step[rules.coarse].min(initial=np.inf))
-    light = rules.stiffness <= LARGEST_DAMPING * rules.fraction * coarse_step
-    linear = bool(survey.linear.all())
-    choice = choose_scheme(linear and light and not rules.sprung, bool(by_buffer(whole, survey, rules).macro.any()))
-    if linear and rules.sprung:
-        return Choice(choice.scheme, "springs of supports take no local steps")
-    if linear and not light:
-        return Choice(choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s leaves no local steps")
-    return choice
+    """Return the scheme for a mesh, with the reason; errors as ``decide_scheme``."""
+    return decide_scheme(
+        rules, survey.step, bool(survey.linear.all()), lambda: bool(by_buffer(whole, survey, rules).macro.any())
+    )
 
 
 def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -94,7 +73,7 @@ def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
         return division.meso & touching(whole.mesh.cells, nodes)
 
     pace = Pace(survey.step, survey.cost, division.plan.window, rules.fraction)
-    return with_path_levels(division, pace, around, rules.coupling.most_levels)
+    return in_path_levels(division, rules, pace, around)
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -105,7 +84,7 @@ def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
 def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
     """Return the division of held velocity whose meso model has given cells ``(ne,)``."""
     slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
-    return two_steps("held_velocity", rules, (~meso, meso), (slow, survey.step))
+    return in_two_steps("held_velocity", ~meso, meso, plan_windows(rules, slow, survey.step))
 
 
 def submodel(
@@ -120,8 +99,8 @@ def submodel(
         nodes = seeds_of(whole, meso)
         nodes[whole.tie.slave[nodes[whole.tie.master].any(axis=1)]] = True
         meso |= ~copied & ~copy & touching(cells, nodes)
-    division = two_steps("held_velocity", rules, (~copied, meso), (~copied, survey.step))
-    return replace(division, copy=copy)
+    plan = plan_windows(rules, ~copied, survey.step)
+    return replace(in_two_steps("held_velocity", ~copied, meso, plan), copy=copy)
 
 
 def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
@@ -131,27 +110,8 @@ def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> 
 
 def at_ties(_whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Give the meso model all that is no board: Gravouil-Combescure, whose interface is the nodes tied to."""
-    return two_steps("gravouil_combescure", rules, (rules.coarse, ~rules.coarse), (rules.coarse, survey.step))
-
-
-def two_steps(
-    scheme: SchemeName,
-    rules: Rules,
-    models: tuple[NDArray[np.bool_], NDArray[np.bool_]],
-    steps: tuple[NDArray[np.bool_], NDArray[np.float64]],
-) -> Division:
-    """Return the division of a scheme whose models take one step each.
-
-    Args:
-        scheme: Its name.
-        rules: What it follows.
-        models: ``(ne,)`` cells of macro and meso model.
-        steps: ``(ne,)`` cells that the window follows; critical steps of all cells [s].
-    """
-    slow, critical = steps
-    damped = damped_critical_step(critical, rules.stiffness)
-    plan = rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
-    return Division(scheme, *models, models[1].astype(np.int32), (plan.substeps,), plan)
+    plan = plan_windows(rules, rules.coarse, survey.step)
+    return in_two_steps("gravouil_combescure", rules.coarse, ~rules.coarse, plan)
 
 
 def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
@@ -181,11 +141,9 @@ def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
 
 def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
     """Return the division of the window that follows a critical step [s]; errors as ``choose_levels``."""
-    plan, most = rules.plan(step, step), rules.coupling.most_levels
+    plan = rules.plan(step, step)
     pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
-    level, ratios = choose_levels(whole.mesh.cells, whole.tie, pace, most)
-    plan = replace(plan, substeps=math.prod(ratios))
-    return Division("local_steps", level == 0, level > 0, level, ratios, plan)
+    return in_local_steps(whole.mesh.cells, whole.tie, pace, plan, rules.coupling.most_levels)
 
 
 def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:

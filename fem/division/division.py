@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.estimates.estimate import WindowPlan, window_plan
-from reflowshock.fem.problem.shock import Coupling
+from reflowshock.fem.problem.shock import Coupling, Shock
 
 SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
 BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose interface lies below layers of board
@@ -44,6 +44,22 @@ class Rules:
     sprung: bool = False
     pushed: bool = True
     shaken: Sequence[int] | NDArray[np.int32] = ()
+
+    @classmethod
+    def of_shock(
+        cls, shock: Shock, coarse: NDArray[np.bool_], duration: float, *, sprung: bool, cooled: bool
+    ) -> "Rules":
+        """Return the rules of a drop of ``duration`` [s]; ``cooled`` means that stress of cooling is at rest in it."""
+        return cls(
+            coupling=shock.coupling,
+            coarse=coarse,
+            fraction=shock.numerics.step_fraction,
+            stiffness=shock.damping.coefficients[1],
+            duration=duration,
+            samples=shock.numerics.history_samples,
+            sprung=sprung,
+            pushed=sprung or cooled or any(shock.damping.coefficients),
+        )
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
         """Return the windows that follow from two critical steps [s]."""

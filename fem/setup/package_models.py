@@ -44,23 +44,19 @@ def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
 
 def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     """Read, check and divide all meshes; errors as ``read_package``, ``division.checks``."""
-    shock, numerics = request.shock, request.shock.numerics
+    shock = request.shock
     whole = joined(with_neighbours(read_package(request), request.packages))
     fitted = fitted_board(whole, request)
     plain = survey(whole.mesh, request.materials, treatment_of(request))
     found = on_springs(plain, whole.mesh, fitted, request.supports)
-    rules = Rules(
-        coupling=shock.coupling,
-        coarse=whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name)),
-        fraction=numerics.step_fraction,
-        stiffness=shock.damping.coefficients[1],
-        duration=shock.decided_duration,
-        samples=numerics.history_samples,
-        sprung=bool(fitted and fitted.bedded),
-        pushed=bool(fitted and fitted.bedded) or bool(request.cooling) or any(shock.damping.coefficients),
-        shaken=whole.mesh.facet_nodes("mounting_holes") if shock.method == "large_mass" else (),
-        **(dict(zip(("copied", "copy"), copied_joints(whole.mesh), strict=True)) if request.one_way else {}),
-    )
+    coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name))
+    sprung = bool(fitted and fitted.bedded)
+    rules = Rules.of_shock(shock, coarse, shock.decided_duration, sprung=sprung, cooled=bool(request.cooling))
+    if shock.method == "large_mass":
+        rules = replace(rules, shaken=whole.mesh.facet_nodes("mounting_holes"))
+    if request.one_way:
+        copied, copy = copied_joints(whole.mesh)
+        rules = replace(rules, copied=copied, copy=copy)
     division = divide(whole, found, rules)
     steps = steps_of_division(whole, found, division, rules)
     if fitted:

@@ -1,4 +1,4 @@
-"""Masses and implicit surface tension, what a change of the velocity in a step has to overcome, factored."""
+"""Effective mass of a step, m / dt + dt K: masses and implicit surface tension, factored."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -16,14 +16,14 @@ from reflowshock.particles.discretisation.incompressibility import SolveFailed
 
 @dataclass(frozen=True, slots=True)
 class BandedCholesky:
-    """Cholesky factors of a sparse matrix `(s, s)`, in an order in which they lie next to the diagonal.
+    """Cholesky factors of a sparse matrix of shape (s, s), stored as a band.
 
-    Points of a surface in the order of Cuthill and McKee have those around them within a strip across it. LAPACK
-    factors and solves in such a band two to three times as fast as general sparse factors are made and used.
+    In reverse Cuthill-McKee order the neighbours of a surface point lie within a strip across the surface. The band
+    routines of LAPACK factor and solve two to three times as fast as general sparse solvers.
 
     Attributes:
-        order: `(s,)` which row each row of the band is.
-        root: R of R^T R, by diagonals as LAPACK has them, `(b + 1, s)`.
+        order: Row of the matrix of each row of the band, shape (s,).
+        root: R of R^T R, by diagonals in LAPACK's layout, shape (b + 1, s).
     """
 
     order: NDArray[np.int64]
@@ -31,10 +31,15 @@ class BandedCholesky:
 
     @classmethod
     def of(cls, diagonal: Floats, factor: float, stiffness: sparse.bsr_matrix) -> Self:
-        """Factor a diagonal `(s,)` and a symmetric matrix `(s, s)` times a factor, of square blocks.
+        """Factor a diagonal plus a multiple of a block matrix.
+
+        Args:
+            diagonal: Diagonal, shape (s,).
+            factor: Factor of the block matrix.
+            stiffness: Symmetric matrix of square blocks, shape (s, s).
 
         Raises:
-            SolveFailed: the sum is not positive definite.
+            SolveFailed: The sum is not positive definite.
         """
         size = stiffness.blocksize[0]
         starts, columns = stiffness.indptr, stiffness.indices
@@ -48,15 +53,15 @@ class BandedCholesky:
         return cls(order, root)
 
     def solve(self, load: Floats) -> Floats:
-        """Solve for right-hand sides `(s,)` or `(s, l)`."""
-        found = np.empty_like(load)
-        found[self.order] = lapack.dpbtrs(self.root, load[self.order], lower=0, overwrite_b=1)[0]
-        return found
+        """Solve for right-hand sides of shape (s,) or (s, l)."""
+        solution = np.empty_like(load)
+        solution[self.order] = lapack.dpbtrs(self.root, load[self.order], lower=0, overwrite_b=1)[0]
+        return solution
 
 
 @njit(cache=True)
 def _band(diagonal, factor, matrix, order):
-    """Upper half of the band of a diagonal and a matrix of blocks times a factor, column by column `(s, b + 1)`."""
+    """Return the upper band of a diagonal plus a multiple of a block matrix, column by column, shape (s, b + 1)."""
     starts, columns, blocks = matrix
     count, size = order.shape[0], blocks.shape[1]
     rank, width = np.empty(count, np.int64), 0
@@ -81,16 +86,16 @@ def _band(diagonal, factor, matrix, order):
 
 @dataclass(frozen=True, slots=True)
 class EffectiveMass:
-    """Masses and implicit surface tension of d velocities, m / dt + dt P^T K P, K of the first s.
+    """Effective mass m / dt + dt P^T K P of d velocity components, with K on the first s.
 
-    P takes out the rigid motions R, orthonormal by the masses: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
+    P removes the mass-orthonormal rigid-body motions R: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
 
     Attributes:
-        inertia: m / dt `(d,)` [kg/s].
-        factors: of m / dt + dt K, `(s, s)`.
-        across: `(d, 2 k)` columns m R^T and K R^T.
-        moved: `(d, 2 k)` these, solved for.
-        core: `(2 k, 2 k)` of Woodbury's formula.
+        inertia: m / dt, shape (d,) [kg/s].
+        factors: Factors of m / dt + dt K, shape (s, s).
+        across: Columns m R^T and K R^T, shape (d, 2 k).
+        moved: Solutions for these columns, shape (d, 2 k).
+        core: Core matrix of Woodbury's formula, shape (2 k, 2 k).
     """
 
     inertia: Floats
@@ -101,10 +106,16 @@ class EffectiveMass:
 
     @classmethod
     def of(cls, masses: Floats, stiffness: sparse.bsr_matrix, rigid: Floats, time_step: float) -> "EffectiveMass":
-        """Factor masses `(d,)` [kg] and stiffness `(s, s)` [N/m] with rigid motions `(k, d)`, for a time step [s].
+        """Factor the effective mass.
+
+        Args:
+            masses: Masses, shape (d,) [kg].
+            stiffness: Stiffness K, shape (s, s) [N/m].
+            rigid: Mass-orthonormal rigid-body motions R, shape (k, d) [1/sqrt(kg)].
+            time_step: Time step [s].
 
         Raises:
-            SolveFailed: the stiffness outweighs the masses where it is negative.
+            SolveFailed: Negative stiffness outweighs the masses.
         """
         inertia, size, count = masses / time_step, stiffness.shape[0], len(rigid)
         factors = BandedCholesky.of(inertia[:size], time_step, stiffness)
@@ -112,18 +123,18 @@ class EffectiveMass:
         pull[:, :size] = (stiffness @ rigid[:, :size].T).T
         across = np.concatenate((masses * rigid, pull)).T
         without = cls(inertia, factors, across[:, :0], across[:, :0], np.zeros((0, 0)))
-        pulled, unit = without.bare(pull.T), np.eye(count)
+        pulled, unit = without.solve_unconstrained(pull.T), np.eye(count)
         moved = np.concatenate((time_step * (rigid - time_step * pulled.T), pulled.T)).T
         inner = np.block([[np.zeros((count, count)), -unit], [-unit, -pull @ rigid.T]]) / time_step
         return cls(inertia, factors, across, moved, np.linalg.inv(inner + across.T @ moved))
 
     def solve(self, load: Floats) -> Floats:
-        """Velocities `(d,)` or `(d, l)` that loads reach in a time step."""
-        first = self.bare(load)
+        """Return the velocities [m/s] that loads [N] of shape (d,) or (d, l) cause in a time step."""
+        first = self.solve_unconstrained(load)
         return first - self.moved @ (self.core @ (self.across.T @ first))
 
-    def bare(self, load: Floats) -> Floats:
-        """The same if tension resisted rigid motions, too."""
+    def solve_unconstrained(self, load: Floats) -> Floats:
+        """Solve with K instead of P^T K P, so that tension resists rigid-body motions, too."""
         size = len(self.factors.order)
         first = (load.T / self.inertia).T
         first[:size] = self.factors.solve(load[:size])

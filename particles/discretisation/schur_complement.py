@@ -1,11 +1,12 @@
-"""The pressure equation's matrix, B (m / dt + dt K)^-1 B^T: rows of B by particle, the rest low in rank.
+"""Schur complement of the pressure equation, B (m/dt + dt K)^-1 B^T, as sparse rows plus a matrix of low rank.
 
-B = G + v u^T: rates of volume G that are sparse, and what they miss of the rate of the whole, u, shared out by v. With
-the factors of m / dt + dt K but for rigid motions, S, and Woodbury's formula for these, S^-1 - X c X^T with X = S^-1 Y,
+B = G + v u^T has sparse rates of volume G; u is the part of the gradient of the enclosed volume that they miss, and v
+distributes it. Let S be m/dt + dt K, and Woodbury's formula give the inverse without stiffness along rigid-body
+motions as S^-1 - X c X^T with X = S^-1 Y. Then
 
-    B (S^-1 - X c X^T) B^T = G S^-1 G^T + v z^T + z v^T + (u . S^-1 u) v v^T - (B X) c (B X)^T,     z = G S^-1 u.
+    B (S^-1 - X c X^T) B^T = G S^-1 G^T + v z^T + z v^T + (u . S^-1 u) v v^T - (B X) c (B X)^T,     z = G S^-1 u,
 
-So an application passes over G twice and solves once, whatever else there is.
+so that one application passes over G twice and solves with S once.
 """
 
 from dataclasses import dataclass
@@ -23,12 +24,12 @@ from reflowshock.particles.discretisation.lagged_cholesky import Band
 
 @dataclass(frozen=True, slots=True)
 class VolumeRateRows:
-    """Rates of volume of n particles' velocities, those that walls admit, as rows of pairs.
+    """Sparse rows of G: rates of the volumes of n particles by admissible velocities.
 
     Attributes:
-        starts: of the rows, `(n + 1,)`.
-        columns: particle of each pair, once a row.
-        entries: `(k, 3)` gradient by its velocity [m^2].
+        starts: Start of each row, shape (n + 1,).
+        columns: Particle of each entry, at most once per row, shape (k,).
+        entries: Gradient by the velocity of that particle, shape (k, 3) [m^2].
     """
 
     starts: NDArray[np.int64]
@@ -36,19 +37,38 @@ class VolumeRateRows:
     entries: Floats
 
     def band(self, stiffness: Floats, order: NDArray[np.int64]) -> Band:
-        """G D^-1 G^T of a diagonal D `(n, 3)` [kg/s], in an order of the rows `(n,)` that makes it a band."""
+        """Assemble G D^-1 G^T as a band matrix.
+
+        Args:
+            stiffness: Diagonal D, shape (n, 3) [kg/s].
+            order: Order of the rows that makes the matrix a band, shape (n,).
+        """
         rows, scale = _banded(self.starts, self.columns, self.entries, 1.0 / np.sqrt(stiffness), order)
         return Band(rows, scale, order)
 
 
 @dataclass(frozen=True, slots=True)
-class SchurComplement:
-    """The matrix of n pressures.
+class LowRank:
+    """Symmetric matrix of low rank, columns core columns^T.
 
     Attributes:
-        rates: G, its columns in the order of S.
-        inertia: m / dt + dt K.
-        low, across: `(n, r)` and `(r, n)`, whose product is what is low in rank.
+        columns: Columns, shape (n, k).
+        core: Symmetric core, shape (k, k).
+    """
+
+    columns: Floats
+    core: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class SchurComplement:
+    """Matrix of the equation for n pressures.
+
+    Attributes:
+        rates: G, with columns in the order of the factors of S.
+        inertia: Factored effective mass.
+        low: Left factor of the part of low rank, shape (n, r).
+        across: Right factor of that part, shape (r, n).
     """
 
     rates: VolumeRateRows
@@ -58,33 +78,34 @@ class SchurComplement:
 
     @classmethod
     def of(
-        cls, rates: VolumeRateRows, missed: tuple[Floats, Floats], inertia: EffectiveMass, more: tuple[Floats, Floats]
+        cls, rates: VolumeRateRows, shares: Floats, gradient: Floats, inertia: EffectiveMass, extra: LowRank
     ) -> Self:
-        """Join them.
+        """Combine the sparse and the low-rank parts.
 
         Args:
-            rates: G.
-            missed: shares `(n,)` and gradient by velocities that walls admit `(n, 3)` [m^2]: v and u.
-            inertia: what resists velocities.
-            more: columns `(n, k)` and core `(k, k)` of anything else.
+            rates: Sparse rates of volume G.
+            shares: Distribution v of the missing rate over the rows, shape (n,).
+            gradient: Missing gradient u by admissible velocities, shape (n, 3) [m^2].
+            inertia: Factored effective mass.
+            extra: Further terms, e.g. of floating plates.
         """
         count, size = len(rates.starts) - 1, len(inertia.factors.order)
-        place = np.arange(count, dtype=np.int32)
-        place[inertia.factors.order[::3] // 3] = np.arange(size // 3, dtype=np.int32)
-        shares, gradient = missed[0], missed[1].reshape(-1, 1)
-        answer = inertia.bare(gradient)
+        position = np.arange(count, dtype=np.int32)
+        position[inertia.factors.order[::3] // 3] = np.arange(size // 3, dtype=np.int32)
+        gradient = gradient.reshape(-1, 1)
+        answer = inertia.solve_unconstrained(gradient)
         fields = np.concatenate((answer, inertia.moved), axis=1)
         moved = _rates_of_all(rates.starts, rates.columns, rates.entries, fields)
         moved[:, 1:] += np.outer(shares, gradient[:, 0] @ inertia.moved)
-        low, last, pairs = np.column_stack((shares, moved, more[0])), 2 + len(inertia.core), more[1]
+        low, last = np.column_stack((shares, moved, extra.columns)), 2 + len(inertia.core)
         core = np.zeros((low.shape[1],) * 2)
         core[0, 0], core[0, 1], core[1, 0] = gradient[:, 0] @ answer[:, 0], 1.0, 1.0
-        core[2:last, 2:last], core[last:, last:] = -inertia.core, pairs
-        ordered = VolumeRateRows(rates.starts, place[rates.columns], rates.entries)
+        core[2:last, 2:last], core[last:, last:] = -inertia.core, extra.core
+        ordered = VolumeRateRows(rates.starts, position[rates.columns], rates.entries)
         return cls(ordered, inertia, low, core @ low.T)
 
     def __call__(self, pressure: Floats) -> Floats:
-        """Rates of volume `(n,)` under pressures `(n,)`."""
+        """Return the rates of volume that pressures of shape (n,) [Pa] cause, shape (n,) [m^3/s]."""
         rates, inertia, size = self.rates, self.inertia, len(self.inertia.factors.order)
         forces = _forces(rates.starts, rates.columns, rates.entries, pressure)
         forces[size:] /= inertia.inertia[size:]
@@ -95,7 +116,7 @@ class SchurComplement:
 
 @njit(cache=True, fastmath={"contract"})
 def _rates(starts, columns, entries, field):
-    """G v `(n,)` of a velocity `(3 n,)` by particle."""
+    """Return G v, shape (n,), of a velocity by particle, shape (3 n,)."""
     result = np.empty(starts.shape[0] - 1)
     for i in range(result.shape[0]):
         total = 0.0
@@ -108,7 +129,7 @@ def _rates(starts, columns, entries, field):
 
 @njit(cache=True, fastmath={"contract"})
 def _rates_of_all(starts, columns, entries, fields):
-    """The same of m velocities `(3 n, m)`, `(n, m)`."""
+    """Return G v, shape (n, m), of m velocities, shape (3 n, m)."""
     result = np.zeros((starts.shape[0] - 1, fields.shape[1]))
     for i in range(result.shape[0]):
         for k in range(starts[i], starts[i + 1]):
@@ -120,7 +141,7 @@ def _rates_of_all(starts, columns, entries, fields):
 
 @njit(cache=True, fastmath={"contract"})
 def _forces(starts, columns, entries, pressure):
-    """G^T p `(3 n,)` of pressures `(n,)`."""
+    """Return G^T p, shape (3 n,), of pressures, shape (n,)."""
     result = np.zeros(3 * pressure.shape[0])
     for i in range(pressure.shape[0]):
         p = pressure[i]
@@ -134,17 +155,25 @@ def _forces(starts, columns, entries, pressure):
 
 @njit(cache=True)
 def _by_particle(starts, columns, entries, roots, order):
-    """Entries times a root by the particle of their column, those of each in an order of the rows, of length one each.
+    """Return G D^-1/2 by column, with rows in a given order and normalised to length one.
 
-    Firsts `(n + 1,)`, ranks of the rows, entries `(k, 3)`; place among these of each pair; lengths that the rows had;
-    how far apart the ranks of one particle are at most.
+    Args:
+        starts: Start of each row of G, shape (n + 1,).
+        columns: Particle of each entry, shape (k,).
+        entries: Entries of G, shape (k, 3).
+        roots: Diagonal of D^-1/2, shape (n, 3).
+        order: Order of the rows, shape (n,).
+
+    Returns:
+        Start of each column, shape (n + 1,); rank of the row of each entry, shape (k,); entries, shape (k, 3); position
+        of each entry of G among these, shape (k,); lengths of the rows before, shape (n,); and the bandwidth.
     """
     count = starts.shape[0] - 1
     firsts = np.zeros(count + 1, np.int64)
     for j in columns:
         firsts[j + 1] += 1
     firsts = np.cumsum(firsts)
-    fill, rank, places = firsts.copy(), np.empty(columns.shape[0], np.int32), np.empty(columns.shape[0], np.int64)
+    fill, rank, positions = firsts.copy(), np.empty(columns.shape[0], np.int32), np.empty(columns.shape[0], np.int64)
     result, lengths, width = np.empty((columns.shape[0], 3), np.float32), np.empty(count), 0
     for r in range(count):
         row, square = order[r], 0.0
@@ -154,25 +183,25 @@ def _by_particle(starts, columns, entries, roots, order):
         lengths[row] = np.sqrt(square)
         for k in range(starts[row], starts[row + 1]):
             j = columns[k]
-            rank[fill[j]], places[k] = r, fill[j]
+            rank[fill[j]], positions[k] = r, fill[j]
             for c in range(3):
                 result[fill[j], c] = entries[k, c] * roots[j, c] / lengths[row]
             width = max(width, r - rank[firsts[j]])
             fill[j] += 1
-    return firsts, rank, result, places, lengths, width
+    return firsts, rank, result, positions, lengths, width
 
 
 @njit(cache=True, parallel=True)
 def _banded(starts, columns, entries, roots, order):
-    """Band, in single precision, of G D^-1 G^T, roots `(n, 3)` of D^-1, and its scale `(n,)`; `Band` says how."""
-    firsts, rank, parts, places, lengths, width = _by_particle(starts, columns, entries, roots, order)
+    """Return rows and scale of ``Band`` for G D^-1 G^T in single precision; ``roots`` is D^-1/2, shape (n, 3)."""
+    firsts, rank, parts, positions, lengths, width = _by_particle(starts, columns, entries, roots, order)
     count = order.shape[0]
     band = np.zeros((count, width + 1), np.float32)
     for r in prange(count):
         line, shift = band[r], width - r
         for k in range(starts[order[r]], starts[order[r] + 1]):
-            own = places[k]
-            x, y, z = parts[own, 0], parts[own, 1], parts[own, 2]
-            for a in range(firsts[columns[k]], own + 1):
+            entry = positions[k]
+            x, y, z = parts[entry, 0], parts[entry, 1], parts[entry, 2]
+            for a in range(firsts[columns[k]], entry + 1):
                 line[rank[a] + shift] += x * parts[a, 0] + y * parts[a, 1] + z * parts[a, 2]
     return band, 1.0 / lengths

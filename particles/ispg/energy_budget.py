@@ -1,4 +1,4 @@
-"""The ledger of a step of the Galerkin scheme: what acted in it, where it ends, and the energies that are lost."""
+"""Energy budget of a step of the Galerkin scheme: every loss of energy is attributed to a cause."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
+from reflowshock.particles.ispg.wall_forces import StepSolution, WallForces
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.one_leg import OneLeg
 from reflowshock.particles.surface.contact_line import RubbingLine
@@ -13,17 +14,17 @@ from reflowshock.particles.surface.contact_line import RubbingLine
 
 @dataclass(frozen=True, slots=True)
 class EnergyLosses:
-    """Energies that a flow has lost [J].
+    """Energy that a flow has lost, by cause [J]. The metric ``<name>_loss`` reports each field.
 
     Attributes:
-        viscous: to viscosity, in the liquid and on its walls.
-        smoothing: to the smoothing of velocities.
-        integration: to the time integration: of the momentum, and of the way that the forces act along.
-        transfer: to the shift of particles, which take the velocity where they come, and to new masses.
-        evening: to what keeps triangles well shaped, at the volume.
-        rebuilding: to bodies made anew, where liquids meet or part.
-        line: to the friction of contact lines on walls with hysteresis.
-        plates: to plates that are moved; negative where they give work to the liquid.
+        viscous: Viscous dissipation in the liquid and on its walls.
+        smoothing: Dissipation by velocity smoothing.
+        integration: Loss by time integration of momentum and of the work of forces.
+        transfer: Loss by particle shifting and by new particle masses.
+        evening: Loss by mesh smoothing at constant volume.
+        rebuilding: Loss by remeshing where liquids merge or detach.
+        line: Dissipation by contact-line friction on walls with hysteresis.
+        plates: Work done on plates with prescribed motion; negative if they do work on the liquid.
     """
 
     viscous: float = 0.0
@@ -37,47 +38,26 @@ class EnergyLosses:
 
     @property
     def total(self) -> float:
-        """All of them."""
+        """Sum of all losses [J]."""
         return float(sum(getattr(self, entry.name) for entry in fields(self)))
 
 
 def total_losses(losses: Sequence[EnergyLosses]) -> EnergyLosses:
-    """Losses of several flows, each by its kind."""
-    return EnergyLosses(*(sum(getattr(one, entry.name) for one in losses) for entry in fields(EnergyLosses)))
-
-
-@dataclass(frozen=True, slots=True)
-class StepSolution:
-    """What acts in a step by its equations.
-
-    Attributes:
-        force: of the surface, with that of the tension along the prediction, `(n, 3)` [N].
-        start: velocity that the step starts with, `(n, 3)` [m/s].
-        rubbed: velocity that friction acts on, `(n, 3)` [m/s].
-        mean: velocity over the times of the method, `(n, 3)` [m/s].
-        pressure: `(n,)` [Pa].
-        walls: forces of walls, at particles and images; None where nothing asks for them.
-    """
-
-    force: Floats
-    start: Floats
-    rubbed: Floats
-    mean: Floats
-    pressure: Floats
-    walls: tuple[Floats, Floats] | None
+    """Return the sum of the losses of several flows, cause by cause."""
+    return EnergyLosses(*(sum(getattr(part, entry.name) for part in losses) for entry in fields(EnergyLosses)))
 
 
 @dataclass(frozen=True, slots=True)
 class StepEnd:
-    """Where a step ends.
+    """Body and plates at the end of a step.
 
     Attributes:
-        body: the liquid body there.
-        velocity: of the particles, `(n, 3)` [m/s].
-        potential: energy of the forces [J].
-        history: the step, of the particles.
-        plates: of the plates that moved, by their index.
-        twists: mean twists of these, `(6,)`.
+        body: Liquid body at the end of the step.
+        velocity: Velocity of the particles, shape (n, 3) [m/s].
+        potential: Potential energy [J].
+        history: Displacement and velocity change of the particles.
+        plates: Displacement and twist change of each moving plate.
+        twists: Mean twist of each moving plate, shape (6,) [m/s, rad/s].
     """
 
     body: Body
@@ -89,72 +69,85 @@ class StepEnd:
 
     @property
     def transport(self) -> Floats:
-        """Velocity that moved the particles, `(n, 3)` [m/s]."""
+        """Velocity that moves the particles over the whole step, shape (n, 3) [m/s]."""
         return self.history.displacement / self.history.time_step
 
     @property
-    def ways(self) -> dict[int, Floats]:
-        """Displacements of plates, `(6,)` [m, rad]."""
+    def plate_displacements(self) -> dict[int, Floats]:
+        """Displacement and rotation of each moving plate, shape (6,) [m, rad]."""
         return {wall: plate.displacement for wall, plate in self.plates.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class EnergyBudget:
-    """Energies of a step.
+    """Energy budget of a step.
 
     Attributes:
-        physics: what acts on the body.
-        equations: of the step.
-        predicted: the body where they hold.
-        given: twists of plates that are moved, `(6,)`.
-        acting: what acted.
-        end: where the step ends.
+        physics: Effects that act on the body.
+        equations: Equations of the step.
+        predicted: Body at the positions where the equations hold.
+        prescribed: Mean twist of each plate with prescribed motion, shape (6,) [m/s, rad/s].
+        solution: Solution of the equations.
+        wall_forces: Forces of the walls on the liquid; None unless plates move or contact lines have friction.
+        end: Body and plates at the end of the step.
     """
 
     physics: Physics
     equations: GalerkinEquations
     predicted: Body
-    given: dict[int, Floats]
-    acting: StepSolution
+    prescribed: dict[int, Floats]
+    solution: StepSolution
+    wall_forces: WallForces | None
     end: StepEnd
 
-    def booked(
-        self, losses: EnergyLosses, before: tuple[Floats, float], rubbing: Sequence[RubbingLine], tension: float
+    def update(
+        self,
+        losses: EnergyLosses,
+        velocity: Floats,
+        potential: float,
+        hysteresis_lines: Sequence[RubbingLine],
+        surface_tension: float,
     ) -> tuple[EnergyLosses, float]:
-        """Losses with those of the step, and the mean force that has moved plates [N], not a number where none was.
+        """Add the losses of the step and compute the mean force on plates with prescribed motion.
 
-        What work, friction of contact lines and the change of the energy do not explain is lost to the time
-        integration.
+        Energy that neither work nor friction explains is attributed to the time integration.
 
         Args:
-            losses: of the steps before.
-            before: velocity of the particles `(n, 3)` [m/s] and energy of the forces [J] at its start.
-            rubbing: contact lines with friction.
-            tension: surface tension of the liquid [N/m].
+            losses: Losses before the step.
+            velocity: Velocity at the start of the step, shape (n, 3) [m/s].
+            potential: Potential energy at the start of the step [J].
+            hysteresis_lines: Contact lines with friction.
+            surface_tension: Surface tension of the liquid [N/m].
+
+        Returns:
+            Losses after the step, and the mean force along the motion of the plates [N], NaN without such motion.
         """
-        time_step, (velocity, potential) = self.end.history.time_step, before
+        time_step = self.end.history.time_step
         losses = self._with_motion(losses, velocity)
-        work, (done, pull) = self._work(), self._of_plates()
-        if self.given:
-            work += time_step * self.equations.power(self.predicted, self.given, self._wall_forces()) - done
-        slid = time_step * tension * sum(line.rubbed(self.predicted, self._way()) for line in rubbing)
+        work, (plate_work, plate_force) = self._work(), self._plate_work()
+        if self.prescribed:
+            work += time_step * self._forces().power(self.predicted, self.prescribed) - plate_work
+        friction = (line.rubbed(self.predicted, self._work_velocity()) for line in hysteresis_lines)
+        slid = time_step * surface_tension * sum(friction)
         integration = losses.integration + potential - self.end.potential - work - slid
-        return replace(losses, integration=integration, plates=losses.plates - done, line=losses.line + slid), pull
+        plates, line = losses.plates - plate_work, losses.line + slid
+        return replace(losses, integration=integration, plates=plates, line=line), plate_force
 
-    def _way(self) -> Floats:
-        """Velocity along which forces act, `(n, 3)` [m/s]: plates that turn take particles along arcs."""
-        return self.acting.mean if self.end.plates else self.end.transport
+    def _work_velocity(self) -> Floats:
+        """Return the velocity along which forces do work, shape (n, 3) [m/s]: rotating plates move along arcs."""
+        return self.solution.mean if self.end.plates else self.end.transport
 
-    def _with_motion(self, losses: EnergyLosses, last: Floats) -> EnergyLosses:
-        """Losses with those of friction, and what the change of momentum takes beyond that of the kinetic energy.
+    def _with_motion(self, losses: EnergyLosses, previous: Floats) -> EnergyLosses:
+        """Add the dissipation by friction and the momentum change beyond the change of the kinetic energy.
 
-        This is one of the time integration.
+        The latter is a loss of the time integration.
         """
-        equations, acting, time_step, way = self.equations, self.acting, self.end.history.time_step, self._way()
-        power = equations.losses(acting.rubbed, way)
-        acceleration = (acting.mean - acting.start) / equations.time_step
-        change = time_step * float((way * equations.momentum(acceleration)).sum())
-        gain = equations.kinetic(self.end.velocity) - equations.kinetic(last)
+        equations, solution, time_step = self.equations, self.solution, self.end.history.time_step
+        velocity = self._work_velocity()
+        power = equations.lost_power(solution.after_friction, velocity)
+        acceleration = (solution.mean - solution.start) / equations.time_step
+        change = time_step * float((velocity * equations.momentum(acceleration)).sum())
+        gain = equations.kinetic_energy(self.end.velocity) - equations.kinetic_energy(previous)
         return replace(
             losses,
             viscous=losses.viscous + time_step * power.viscous,
@@ -163,22 +156,23 @@ class EnergyBudget:
         )
 
     def _work(self) -> float:
-        """Work of surface, pressure and loads on plates along the step [J]."""
-        equations, acting, way, twists = self.equations, self.acting, self._way(), self.end.twists
-        driving = acting.force - equations.time_step * equations.tension(acting.mean)
+        """Return the work of the surface, the pressure and the loads on plates in the step [J]."""
+        equations, solution, velocity, twists = self.equations, self.solution, self._work_velocity(), self.end.twists
+        driving = solution.force - equations.time_step * equations.tension_stiffness(solution.mean)
         loads = sum(float(motion.load @ twists[motion.wall][:3]) for motion in self.physics.motions)
-        along = float((driving * way).sum() + acting.pressure @ equations.constraint(way))
-        return self.end.history.time_step * (along + loads)
+        power = float((driving * velocity).sum() + solution.pressure @ equations.volume_rates(velocity))
+        return self.end.history.time_step * (power + loads)
 
-    def _of_plates(self) -> tuple[float, float]:
-        """Work on plates that are moved [J], and the mean force along their way [N], not a number where none is."""
-        if not self.given:
+    def _plate_work(self) -> tuple[float, float]:
+        """Return the work on plates with prescribed motion [J] and the mean force [N], NaN without such motion."""
+        if not self.prescribed:
             return 0.0, float("nan")
-        ways = self.end.ways
-        return self.equations.work(self.predicted, {wall: ways[wall] for wall in self.given}, self._wall_forces())
+        displacements = self.end.plate_displacements
+        prescribed = {wall: displacements[wall] for wall in self.prescribed}
+        return self._forces().work(self.predicted, prescribed)
 
-    def _wall_forces(self) -> tuple[Floats, Floats]:
-        """Forces of walls, which plates that are moved ask for."""
-        if self.acting.walls is None:
-            raise ValueError("plates that are moved need the forces of walls")
-        return self.acting.walls
+    def _forces(self) -> WallForces:
+        """Return the forces of the walls, which prescribed motion requires."""
+        if self.wall_forces is None:
+            raise ValueError("prescribed plate motion requires the forces of the walls")
+        return self.wall_forces

@@ -1,8 +1,8 @@
-"""Space of the Galerkin scheme: linear MLS of the velocity, direct nodal integration, walls mirrored.
+"""Galerkin space of the particles: linear moving least squares, direct nodal integration, mirrored walls.
 
-Velocities of particles are odd across a wall, so that nothing passes it, and along it even with free slip, odd without
-slip, between the two with Navier slip (`mirror`). The operators act without being assembled; the transposed of each is
-made of the same weights, so that what a force or stress does to the particles is its virtual power, to rounding.
+The velocity of the ghost particles is odd across a wall, so that nothing passes it. Along the wall it is even with free
+slip, odd without slip, and in between with Navier slip (``ghosts.py``). Operators act without being assembled. The
+transpose of each uses the same weights, so that forces and stresses do exactly their virtual power on the particles.
 """
 
 from collections.abc import Mapping
@@ -24,26 +24,28 @@ from reflowshock.particles.ispg.moving_plates import FloatingModes
 from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, nodal_volumes, with_moments
 from reflowshock.particles.ispg.stencils import check_stencils
 
-# Reach of the search for neighbours in spacings, and that of particles with too few of them.
+# Search radius for neighbours in spacings, and the larger one of particles with too few of them.
 REACH, WIDEST = 2.4, 4.4
-# The least that a particle counts of its volume V in V + N^T V: at the rim of a film that is thinner than a spacing
-# N^T V may be below -V, where the shape functions continue what is inside, and its mass would be negative.
+# Lower bound of V + N^T V as a share of the volume V: at the rim of a film thinner than a spacing the shape functions
+# extrapolate, N^T V may be below -V, and the mass would be negative.
 LEAST_CARRIED = 0.5
-AT_REST: Mapping[int, Floats] = MappingProxyType({})  # no plate moves
+AT_REST: Mapping[int, Floats] = MappingProxyType({})  # twists without a moving plate
 
 
 @dataclass(frozen=True, slots=True)
 class GalerkinSpace:
-    """Shape functions at n particles and the volumes that stand for integrals.
+    """Shape functions at n particles with g ghost particles, and the weights of nodal integration.
 
     Attributes:
-        volumes: `(n,)` of the particles as points of integration [m^3].
-        carried: `(n,)` volumes whose mass the particles carry [m^3].
-        starts, columns, weights: rows of psi and its derivatives [1/m], columns up to n + g.
-        ghosts: g images of the particles at the walls.
-        order: `(n,)` particles one after the other along the longest side of the body.
-        drift: `(g, 3)` velocities of these where walls move as prescribed and particles do not [m/s].
-        riders: motions of plates that float.
+        volumes: Nodal volumes, the weights of integration, shape (n,) [m^3].
+        carried: Volumes whose mass the particles carry, shape (n,) [m^3].
+        starts: Start of the row of each particle, shape (n + 1,).
+        columns: Particle or ghost of each entry, shape (k,).
+        weights: Shape function and its derivatives [1/m] of each entry, shape (k, 4).
+        ghosts: Ghost particles at walls and planes of symmetry.
+        order: Particles sorted along the longest side of the body, shape (n,).
+        drift: Velocities of the ghosts that prescribed plate motion gives with particles at rest, shape (g, 3) [m/s].
+        floating: Rigid-body modes of the floating plates; None without such plates.
     """
 
     volumes: Floats
@@ -54,15 +56,20 @@ class GalerkinSpace:
     ghosts: Ghosts
     order: NDArray[np.int64]
     drift: Floats
-    riders: FloatingModes | None = None
+    floating: FloatingModes | None = None
 
     @classmethod
     def of(cls, body: Body, slip_length: float = np.inf, twists: Mapping[int, Floats] = AT_REST) -> "GalerkinSpace":
-        """Fit the shape functions at the particles of a body, on plates with a slip length [m] and some twists `(6,)`.
+        """Fit the shape functions at the particles of a body.
+
+        Args:
+            body: Liquid body.
+            slip_length: Slip length of the plates [m]; 0 without slip.
+            twists: Twist of each plate on a prescribed path by its index, shape (6,) [m/s, rad/s].
 
         Raises:
-            DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
-            NoNodalVolumes: the particles do not fill the body.
+            DegenerateStencil: A particle has too few neighbours, or they lie in a plane.
+            NoNodalVolumes: No positive nodal volumes match the volume and the centre of the body.
         """
         count, spacing = len(body.points), body.cloud.spacing
         planes = symmetry_planes(body.cloud)
@@ -71,11 +78,12 @@ class GalerkinSpace:
         points = np.concatenate((body.points, ghosts.points))
         lists = find_neighbours(points, REACH * spacing, rows=count)
         squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
-        lacking = np.flatnonzero(squares == 0.0)
-        if len(lacking):
-            lists = kernels.with_rows(lists, lacking, find_near(points[lacking], points, WIDEST * spacing))
-            wider = kernels.supports(lacking, points, (*lists, WIDEST * spacing), spacing)
-            squares[lacking], lengths[lacking] = wider
+        sparse_rows = np.flatnonzero(squares == 0.0)
+        if len(sparse_rows):
+            near = find_near(points[sparse_rows], points, WIDEST * spacing)
+            lists = kernels.with_rows(lists, sparse_rows, near)
+            wider = kernels.supports(sparse_rows, points, (*lists, WIDEST * spacing), spacing)
+            squares[sparse_rows], lengths[sparse_rows] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)
@@ -84,8 +92,8 @@ class GalerkinSpace:
         check_stencils(body, density > 0.0, "has all its neighbours in a plane")
         moments = body_moments(body)
         volumes = nodal_volumes(body, density, moments)
-        of_shapes = kernels.spread(starts, columns, weights, volumes, ghosts.source)
-        carried = with_moments(body, np.maximum(volumes + of_shapes, LEAST_CARRIED * volumes), moments)
+        spread = kernels.spread(starts, columns, weights, volumes, ghosts.source)
+        carried = with_moments(body, np.maximum(volumes + spread, LEAST_CARRIED * volumes), moments)
         drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
         order = np.argsort(body.points[:, np.argmax(np.ptp(body.points, axis=0))], kind="stable")
         return cls(volumes, carried, starts, columns, weights, ghosts, order, drift)
@@ -97,90 +105,99 @@ class GalerkinSpace:
 
     @property
     def images(self) -> tuple[NDArray[np.int64], Floats]:
-        """Sources and reflections of the images, for kernels."""
+        """Source particles and reflection matrices of the ghosts, for kernels."""
         return self.ghosts.source, self.ghosts.reflection
 
     @property
     def shape(self) -> sparse.csr_matrix:
-        """Psi alone, `(n, n + g)`."""
+        """Shape functions without derivatives, shape (n, n + g)."""
         size = len(self.starts) - 1, len(self.volumes) + len(self.ghosts.source)
         return sparse.csr_matrix((self.weights[:, 0].copy(), self.columns, self.starts), shape=size)
 
     def averages(self, coefficients: Floats) -> Floats:
-        """Values at the particles `(n,)` of a scalar that is even at the walls."""
+        """Return the approximated values N c at the particles of a scalar that is even at the walls, shape (n,)."""
         even = np.concatenate((coefficients, coefficients[self.ghosts.source]))
         return kernels.values(*self.rows, even[:, None])[:, 0]
 
-    def rough(self, field: Floats) -> Floats:
-        """What the shape functions do not show of a velocity `(n, 3)`, v - N v."""
+    def unresolved(self, field: Floats) -> Floats:
+        """Return v - N v, the part of a velocity field that the shape functions do not resolve, shape (n, 3)."""
         return field - kernels.values(*self.rows, self.with_images(field))
 
     def gradient(self, field: Floats) -> Floats:
-        """Gradient of a velocity `(n, 3, 3)` [1/s], [i, c, d] = d v_c / d x_d, at the particles."""
+        """Return the velocity gradient d v_c / d x_d at the particles, shape (n, 3, 3) [1/s]."""
         return kernels.velocity_gradient(self.starts, self.columns, self.weights, self.with_images(field))
 
     def resistance(self, field: Floats, factors: Floats) -> Floats:
-        """Forces `(n, 3)` [N] that resist a velocity `(n, 3)` [m/s]: of roughness, walls and viscosity.
+        """Return the forces of smoothing, wall drag and viscosity that resist a velocity field, shape (n, 3) [N].
 
         Args:
-            field: the velocity.
-            factors: `(n, 3)` of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], each with a force
-                on what it resists, by the transposed of what finds it.
+            field: Velocity, shape (n, 3) [m/s].
+            factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
         """
         images = self.with_images(field)
         return self._folded(kernels.resistance(self.starts, self.columns, self.weights, images, factors))
 
-    def lost_power(self, fields: tuple[Floats, Floats], factors: Floats, walls: Floats) -> tuple[float, float, float]:
-        """Power [W] of the forces that resist the first of two velocities `(n, 3)` [m/s] in the second one.
+    def lost_power(self, first: Floats, second: Floats, factors: Floats, walls: Floats) -> tuple[float, float, float]:
+        """Return the power in one velocity field of the forces that resist another one.
 
         Args:
-            fields: the velocities.
-            factors: of `resistance`, `(n, 3)`.
-            walls: velocities of walls `(n, 3)` [m/s], against which N v slides.
+            first: Velocity that causes the forces, shape (n, 3) [m/s].
+            second: Velocity in which their power is taken, shape (n, 3) [m/s].
+            factors: Coefficients as in ``resistance``, shape (n, 3).
+            walls: Wall velocities, relative to which N v slips, shape (n, 3) [m/s].
 
         Returns:
-            By roughness, by walls and by viscosity.
+            Power of smoothing, of wall drag and of viscosity [W].
         """
-        first, second = (self.with_images(field) for field in fields)
-        return kernels.lost_power(self.rows, (first, second), factors, walls)
+        fields = self.with_images(first), self.with_images(second)
+        return kernels.lost_power(self.rows, fields, factors, walls)
 
     def divergence(self, field: Floats) -> Floats:
-        """Divergence of a velocity at the particles `(n,)` [1/s]."""
+        """Return the divergence of a velocity field at the particles, shape (n,) [1/s]."""
         return kernels.divergence(self.starts, self.columns, self.weights, self.with_images(field))
 
     def divergence_load(self, factor: Floats) -> Floats:
-        """The transposed of `divergence`: forces on the particles `(n, 3)` [N] of factors `(n,)` [N m]."""
-        result = self._nothing()
+        """Apply the transpose of ``divergence`` to factors of shape (n,) [N m]: forces, shape (n, 3) [N]."""
+        result = self._no_forces()
         kernels.divergence_transposed(self.starts, self.columns, self.weights, factor, result)
         return self._folded(result)
 
     def with_images(self, field: Floats) -> Floats:
-        """A velocity `(n, 3)` with that of the images, `(n + g, 3)` [m/s]."""
+        """Append the velocities of the ghosts to a velocity field of shape (n, 3): shape (n + g, 3) [m/s]."""
         images = kernels.reflected(field, self.ghosts.source, self.ghosts.reflection)
-        images[len(field) :] += self.driven(field)
+        images[len(field) :] += self.ghost_drift(field)
         return images
 
-    def driven(self, field: Floats) -> Floats:
-        """Velocities that plates which move give the images `(g, 3)` [m/s]: as prescribed, or with a field `(n, 3)`."""
-        if self.riders is None:
-            return self.drift
-        return self.drift + np.tensordot(self.riders.rates(field), self.riders.drifts, 1)
+    def ghost_drift(self, field: Floats) -> Floats:
+        """Return the ghost velocities due to moving plates, shape (g, 3) [m/s].
 
-    def shown(self, force: Floats) -> Floats:
-        """Forces on particles `(n, 3)` [N] of those on N v."""
+        Args:
+            field: Velocity, which contains the motion of the floating plates, shape (n, 3) [m/s].
+        """
+        if self.floating is None:
+            return self.drift
+        return self.drift + np.tensordot(self.floating.amplitudes(field), self.floating.drifts, 1)
+
+    def distribute(self, force: Floats) -> Floats:
+        """Return N^T f, the forces on particles that correspond to forces f on N v, shape (n, 3) [N]."""
         return self._folded(self.shape.T @ force)
 
     def drift_of(self, body: Body, twists: Mapping[int, Floats]) -> Floats:
-        """Velocities of the images `(g, 3)` [m/s] of resting particles of a body whose plates have some twists."""
+        """Return the ghost velocities with particles at rest and moving plates, shape (g, 3) [m/s].
+
+        Args:
+            body: Liquid body with its plates.
+            twists: Twist of each moving plate by its index, shape (6,) [m/s, rad/s].
+        """
         return self.ghosts.drift(body.points, (*body.plates, *symmetry_planes(body.cloud)), twists)
 
     def _folded(self, forces: Floats) -> Floats:
         return kernels.folded(forces, self.ghosts.source, self.ghosts.reflection)
 
-    def _nothing(self) -> Floats:
+    def _no_forces(self) -> Floats:
         return np.zeros((len(self.starts) - 1 + len(self.ghosts.source), 3))
 
 
 def symmetry_planes(cloud: Cloud) -> list[Plate]:
-    """The planes of symmetry as plates, which are mirrored like walls."""
+    """Return the planes of symmetry of a cloud as plates, to be mirrored like walls."""
     return [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in cloud.symmetry]

@@ -10,21 +10,22 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.plate import Plate
 
-# Particles nearer to a plate than this share of the reach lie on it: they are their own image.
+# Particles nearer to a plate than this share of the reach lie on it and have no ghost.
 ON_PLATE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Ghosts:
-    """Images of n particles.
+    """Mirror images of n particles at walls.
 
     Attributes:
-        points: `(g, 3)` [m].
-        source: `(g,)` the particle that each is the image of.
-        reflection: `(g, 3, 3)` matrices that map the source's vectors to the image's; orthogonal without friction.
-        parent: `(g,)` what each is mirrored from: a particle or, from n on, an image of another plate.
-        wall: `(g,)` the plate that mirrors it.
-        flip: `(g, 3, 3)` the matrices of that plate alone.
+        points: Positions, shape (g, 3) [m].
+        source: Particle that each ghost is an image of, shape (g,).
+        reflection: Matrices that map vectors at the source to vectors at the ghost, shape (g, 3, 3); orthogonal without
+            wall friction.
+        parent: Particle, or from n on ghost of an earlier plate, that each ghost mirrors, shape (g,).
+        wall: Plate that mirrors it, shape (g,).
+        flip: Reflection matrices of that plate alone, shape (g, 3, 3).
     """
 
     points: Floats
@@ -35,32 +36,34 @@ class Ghosts:
     flip: Floats
 
     def drift(self, points: Floats, plates: Sequence[Plate], twists: Mapping[int, Floats]) -> Floats:
-        """Velocities `(g, 3)` [m/s] that plates which move give the images of particles `(n, 3)` [m] at rest.
+        """Return the ghost velocities that moving plates cause with particles at rest, shape (g, 3) [m/s].
 
-        An image moves as its particle does, seen from the plate: w' + R (v - w), w and w' the plate's velocity at the
-        particle and at its image.
+        A ghost moves relative to the plate as its particle does: v_ghost = w' + R (v - w), with the plate velocities w
+        at the particle and w' at the ghost.
 
         Args:
-            points: the particles.
-            plates: walls, as `mirror` had them.
-            twists: `(6,)` of plates that move, by their index.
+            points: Particle positions, shape (n, 3) [m].
+            plates: Walls, as passed to ``mirror``.
+            twists: Twist of each moving plate by its index, shape (6,) [m/s, rad/s].
         """
         count, everything = len(points), np.concatenate((points, self.points))
         result = np.zeros_like(everything)
         for wall, plate in enumerate(plates):
-            own = np.flatnonzero(self.wall == wall)
-            parent, image = self.parent[own], count + own
+            mirrored = np.flatnonzero(self.wall == wall)
+            parent, image = self.parent[mirrored], count + mirrored
             carried = plate.rigid_velocity(twists.get(wall, np.zeros(6)), everything)
-            result[image] = carried[image] + np.einsum("gcd,gd->gc", self.flip[own], result[parent] - carried[parent])
+            result[image] = carried[image] + np.einsum(
+                "gcd,gd->gc", self.flip[mirrored], result[parent] - carried[parent]
+            )
         return result[count:]
 
     def even(self, count: int) -> sparse.csr_matrix:
-        """Extension of a scalar from n particles to them and their images, `(n + g, n)`."""
+        """Return the even extension of a scalar from n particles to particles and ghosts, shape (n + g, n)."""
         columns = np.concatenate((np.arange(count), self.source))
         return sparse.csr_matrix((np.ones(len(columns)), columns, np.arange(len(columns) + 1)), (len(columns), count))
 
     def vector(self, count: int) -> sparse.csr_matrix:
-        """Extension of a vector field, `(3 (n + g), 3 n)`, components one after the other."""
+        """Return the reflecting extension of a vector field stored by component, shape (3 (n + g), 3 n)."""
         frames = np.concatenate((np.broadcast_to(np.eye(3), (count, 3, 3)), self.reflection))
         columns = np.concatenate((np.arange(count), self.source))
         total = len(columns)
@@ -79,17 +82,17 @@ class Ghosts:
 def mirror(
     points: Floats, plates: Sequence[Plate], reach: float, slip_lengths: Sequence[float] | None = None
 ) -> Ghosts:
-    """Mirror the particles `(n, 3)` [m] that are nearer to a plate than the reach [m], plate by plate.
+    """Mirror the particles near each plate, plate by plate.
 
-    What the plates before have added is mirrored, too: an edge between two plates at right angles has images of both.
-    Velocities along a plate become (b - z) / (b + z) of theirs, b the slip length and z the height of the particle: a
-    flow that is linear and would rest at a depth b stays so. They are even with free slip and odd without slip.
+    Ghosts of earlier plates are mirrored, too, so that an edge between two plates at right angles has images of both.
+    Tangential velocities at the ghost are (b - z) / (b + z) times those of the particle, with the slip length b and the
+    height z above the plate: a linear shear flow at rest at a depth b is continued exactly.
 
     Args:
-        points: particles.
-        plates: walls.
-        reach: of the images [m].
-        slip_lengths: of the plates [m], 0 without slip; free slip where none are given.
+        points: Particle positions, shape (n, 3) [m].
+        plates: Walls.
+        reach: Distance from a plate up to which particles are mirrored [m].
+        slip_lengths: Slip length of each plate [m], 0 without slip; free slip by default.
     """
     all_points, source, nothing = points, np.arange(len(points)), np.zeros(0, np.int64)
     reflection = np.tile(np.eye(3), (len(points), 1, 1))

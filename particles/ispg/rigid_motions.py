@@ -1,4 +1,4 @@
-"""Rigid motions of a body, and its momenta along them: what walls admit of them must not change without a force."""
+"""Rigid-body motions of a body and its momenta; those that walls admit change only by forces."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,37 +12,53 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 
-# Of the largest velocity of a rigid motion: more than this across a wall is none that it admits.
+# A wall admits a rigid-body motion whose velocity across it is at most this share of its largest velocity.
 ROUNDING = 1e-9
-TURN = 5  # about the z axis, of the rigid motions
+TURN = 5  # index of the rotation about the z axis
 
 
 def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
-    """Which rigid motions of points `(n, 3)` [m] walls admit, `(6,)`, by the projections of velocities `(n, 3, 3)`."""
+    """Return which rigid-body motions the walls admit, shape (6,).
+
+    Args:
+        points: Particle positions, shape (n, 3) [m].
+        projections: Projections onto the velocities that walls admit, shape (n, 3, 3).
+    """
     motions = rigid_motions(points)
     changes = [np.abs(projected(projections, motion) - motion).max() for motion in motions]
     return np.array(changes) <= ROUNDING * np.abs(motions).max(axis=(1, 2))
 
 
 def edges_are_coaxial(body: Body, physics: Physics) -> bool:
-    """Whether edges hold vertices that are circles about the z axis, about which they have no moment.
+    """Return whether all pad edges are circles about the z axis, so that they exert no moment about it.
 
-    A vertex that an edge holds does not slide along it, either. What momentum that gives the body about the axis is
-    none that it has when the edges let it go.
+    A vertex pinned at an edge does not slide along it either. The spurious angular momentum that this gives the body
+    must vanish when the edges release it.
+
+    Args:
+        body: Liquid body.
+        physics: Effects that act on the body.
     """
-    unheld = admitted_motions(body.points, replace(physics, lines=()).projections(body))[TURN]
-    return bool(unheld and all(_about_axis(line.pads, body.plates[line.wall]) for line in physics.lines))
+    unpinned = admitted_motions(body.points, replace(physics, lines=()).projections(body))[TURN]
+    return bool(unpinned and all(_about_axis(line.pads, body.plates[line.wall]) for line in physics.lines))
 
 
 def _about_axis(pads: Sequence[Pad], plate: Plate) -> bool:
-    """Whether a plate has one pad with an edge, a circle about the z axis."""
+    """Return whether a plate has a single circular pad about the z axis."""
     centres = plate.place(np.array([[*pad.centre, 0.0] for pad in pads]))[:, :2]
     reach = max(pad.radius for pad in pads)
     return len(pads) == 1 and bool(np.isfinite(reach)) and np.abs(centres).max() <= ROUNDING * reach
 
 
 def rigid_motions(points: Floats) -> Floats:
-    """Translations along and rotations about the axes through the origin at points `(n, 3)` [m], `(6, n, 3)`."""
+    """Return unit translations along and unit rotations about the axes through the origin.
+
+    Args:
+        points: Particle positions, shape (n, 3) [m].
+
+    Returns:
+        Velocity fields of three translations, then three rotations, shape (6, n, 3).
+    """
     motions = np.zeros((6, *points.shape))
     for axis in range(3):
         motions[axis, :, axis] = 1.0
@@ -51,7 +67,15 @@ def rigid_motions(points: Floats) -> Floats:
 
 
 def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
-    """Velocities of plates at the particles on them `(n, 3)` [m/s], zero elsewhere; twists `(6,)` by the plate."""
+    """Return the velocity of the plates at the particles on them, zero elsewhere.
+
+    Args:
+        body: Liquid body.
+        twists: Twist of each moving plate by its index, shape (6,) [m/s, rad/s].
+
+    Returns:
+        Velocity, shape (n, 3) [m/s].
+    """
     field = np.zeros_like(body.points)
     for wall, twist in twists.items():
         on_plate = body.cloud.wall == wall
@@ -59,30 +83,63 @@ def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
     return field
 
 
-def held(projections: Floats, field: Floats) -> Floats:
-    """The part of a field `(n, 3)` that walls do not admit, by their projections `(n, 3, 3)`."""
+def constrained_part(projections: Floats, field: Floats) -> Floats:
+    """Return the part of a velocity field that the walls do not admit.
+
+    Args:
+        projections: Projections onto the velocities that walls admit, shape (n, 3, 3).
+        field: Velocity field, shape (n, 3) [m/s].
+    """
     return field - projected(projections, field)
 
 
 def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
-    """Momenta `(k,)` of a velocity `(n, 3)` [m/s] along rigid motions `(k, n, 3)`; masses `(n,)` [kg]."""
+    """Return the momenta of a velocity field along rigid-body motions.
+
+    Args:
+        motions: Rigid-body motions, shape (k, n, 3).
+        masses: Particle masses, shape (n,) [kg].
+        velocity: Velocity, shape (n, 3) [m/s].
+
+    Returns:
+        Momenta, shape (k,): [kg m/s] for translations, [kg m^2/s] for rotations.
+    """
     return motions.reshape(len(motions), velocity.size) @ (masses[:, None] * velocity).ravel()
 
 
 def orthonormal(motions: Floats, masses: Floats) -> Floats:
-    """A basis of rigid motions `(k, n, 3)`, orthonormal by the masses `(n,)` [kg]."""
+    """Return a mass-orthonormal basis of rigid-body motions, shape (k, n, 3) [1/sqrt(kg)].
+
+    Args:
+        motions: Rigid-body motions, shape (k, n, 3).
+        masses: Particle masses, shape (n,) [kg].
+    """
     flat = motions.reshape(len(motions), 3 * len(masses))
     basis = np.linalg.inv(np.linalg.cholesky(flat @ (np.repeat(masses, 3) * flat).T)) @ flat
     return basis.reshape(motions.shape)
 
 
 def rigid_part(basis: Floats, masses: Floats, velocity: Floats) -> Floats:
-    """The part of a velocity `(n, 3)` [m/s] that is a sum of rigid motions, a basis as `orthonormal` gives it."""
+    """Return the rigid-body part of a velocity field, shape (n, 3) [m/s].
+
+    Args:
+        basis: Mass-orthonormal rigid-body motions, shape (k, n, 3) [1/sqrt(kg)].
+        masses: Particle masses, shape (n,) [kg].
+        velocity: Velocity, shape (n, 3) [m/s].
+    """
     return np.tensordot(rigid_momenta(basis, masses, velocity), basis, axes=1)
 
 
 def with_momenta(motions: Floats, masses: Floats, basis: Floats, velocity: Floats, momenta: Floats) -> Floats:
-    """A velocity `(n, 3)` [m/s] with momenta `(k,)` along k rigid motions, corrected by a basis of as many others."""
+    """Return a velocity field corrected to given momenta.
+
+    Args:
+        motions: Rigid-body motions along which the momenta are prescribed, shape (k, n, 3).
+        masses: Particle masses, shape (n,) [kg].
+        basis: Rigid-body motions that are added, shape (k, n, 3).
+        velocity: Velocity, shape (n, 3) [m/s].
+        momenta: Required momenta, shape (k,).
+    """
     moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T  # by columns
     missing = momenta - rigid_momenta(motions, masses, velocity)
     return velocity + np.tensordot(np.linalg.solve(moved, missing), basis, axes=1)

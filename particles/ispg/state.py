@@ -1,46 +1,49 @@
-"""What a step of the Galerkin scheme leaves to the next one, and where the equations of that one hold."""
+"""State that one step of the Galerkin scheme hands to the next, and the prediction made from it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
+from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.ispg.energy_budget import EnergyLosses
 from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.nodal_volumes import body_moments
-from reflowshock.particles.ispg.rigid_motions import held, wall_velocities, with_momenta
+from reflowshock.particles.ispg.rigid_motions import constrained_part, wall_velocities, with_momenta
 from reflowshock.particles.ispg.step_kernels import projected
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.one_leg import OneLeg
 
-# Passes that even out the triangles: by the strain of the liquid, and by the time over that of the grid's waves.
-EVENED_BY_STRAIN, EVENING_RATE = 5.0, 1.0
+# Mesh smoothing passes per unit strain of the liquid, and per period of the grid's capillary waves.
+PASSES_PER_STRAIN, PASSES_PER_PERIOD = 5.0, 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class GalerkinState:
-    """What the last step left.
+    """State of the particles and plates at the end of a step.
 
     Attributes:
-        points: `(n, 3)` where it took the particles [m].
-        centre: `(3,)` to which its momentum took that of the liquid [m].
-        velocity: `(n, 3)` of the particles [m/s].
-        gradient: `(n, 3, 3)` of the velocity [1/s].
-        kinetic, potential: energies after it, before triangles were evened out [J]; None before the first step.
-        pressure: `(n,)` coefficients [Pa].
-        acceleration: `(n, 3)` by all forces but friction [m/s^2].
-        volumes: `(n,)` that the particles carried in it [m^3].
-        evening: passes that even out the triangles after the next step.
-        momenta: `(6,)` linear [kg m/s] and angular about the origin [kg m^2/s].
-        momenta_change: of these in it, `(6,)`.
-        history: its displacement and change of the velocity.
-        losses: of all steps.
-        plates: `(3, 6)` displacement in the last step, twist at its end and change of that in it, of each plate that
-            moved, by its index.
+        points: Positions at the end of the step, before mesh smoothing and particle shifting, shape (n, 3) [m].
+        centre: Centre of mass predicted from the momentum, shape (3,) [m].
+        velocity: Velocity, shape (n, 3) [m/s].
+        gradient: Velocity gradient, shape (n, 3, 3) [1/s].
+        kinetic: Kinetic energy [J]; None before the first step.
+        potential: Potential energy before mesh smoothing [J].
+        pressure: Pressure coefficients, shape (n,) [Pa].
+        acceleration: Acceleration by all forces except friction, shape (n, 3) [m/s^2].
+        volumes: Volumes whose mass the particles carried in the step, shape (n,) [m^3].
+        smoothing_passes: Number of mesh smoothing passes due after the step.
+        momenta: Linear momentum [kg m/s] and angular momentum about the origin [kg m^2/s], shape (6,).
+        momenta_change: Change of these momenta in the step, shape (6,).
+        history: Displacement and velocity change of the step.
+        losses: Energy losses since the start of the run.
+        plates: Displacement in the step [m, rad], twist at its end [m/s, rad/s] and change of that twist, shape (3, 6),
+            of each moving plate by its index.
     """
 
     points: Floats
@@ -52,7 +55,7 @@ class GalerkinState:
     pressure: Floats
     acceleration: Floats
     volumes: Floats
-    evening: float
+    smoothing_passes: float
     momenta: Floats
     momenta_change: Floats
     history: OneLeg
@@ -60,63 +63,115 @@ class GalerkinState:
     plates: Mapping[int, Floats] = field(default_factory=dict)
 
     @property
-    def ways(self) -> dict[int, Floats]:
-        """Displacement and rotation of plates in the last step, `(6,)` [m, rad]."""
-        return {wall: moved[0] for wall, moved in self.plates.items()}
+    def plate_displacements(self) -> dict[int, Floats]:
+        """Displacement and rotation of each moving plate in the step, shape (6,) [m, rad]."""
+        return {wall: motion[0] for wall, motion in self.plates.items()}
 
     @property
-    def twists(self) -> dict[int, Floats]:
-        """Twists of plates at the end of the last step, `(6,)` [m/s, rad/s]."""
-        return {wall: moved[1] for wall, moved in self.plates.items()}
+    def plate_twists(self) -> dict[int, Floats]:
+        """Twist of each moving plate at the end of the step, shape (6,) [m/s, rad/s]."""
+        return {wall: motion[1] for wall, motion in self.plates.items()}
 
     @classmethod
     def start(cls, body: Body, potential: float, losses: EnergyLosses | None = None) -> "GalerkinState":
-        """A body that starts with its velocity, and an energy of the forces [J]."""
-        slope, start = np.zeros((len(body.points), 3, 3)), OneLeg.start(len(body.points))
-        losses = losses or EnergyLosses()
-        still, unknown = np.zeros(6), np.zeros(len(body.points))
-        at_rest = (body.pressure, np.zeros((len(body.points), 3)), unknown, 1.0, still, still)
-        return cls(body.points, centre(body), body.velocity, slope, None, potential, *at_rest, start, losses)
+        """Return the state before the first step of a body with a velocity and a potential energy [J]."""
+        count = len(body.points)
+        return cls(
+            points=body.points,
+            centre=centre(body),
+            velocity=body.velocity,
+            gradient=np.zeros((count, 3, 3)),
+            kinetic=None,
+            potential=potential,
+            pressure=body.pressure,
+            acceleration=np.zeros((count, 3)),
+            volumes=np.zeros(count),
+            smoothing_passes=1.0,
+            momenta=np.zeros(6),
+            momenta_change=np.zeros(6),
+            history=OneLeg.start(count),
+            losses=losses or EnergyLosses(),
+        )
 
-    def carried_losses(self, kinetic: float, potential: float) -> EnergyLosses:
-        """Losses up to a step that starts with these energies [J], of new masses and of triangles that have moved."""
+    def saved(self) -> dict[str, Any]:
+        """Return the data that a checkpoint keeps."""
+        return fields_of(self) | {
+            "history": fields_of(self.history),
+            "losses": fields_of(self.losses),
+            "plates": {str(wall): motion for wall, motion in self.plates.items()},
+        }
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, Any]) -> "GalerkinState":
+        """Return the state whose data ``saved`` returned."""
+        history, losses = OneLeg(**saved["history"]), EnergyLosses(**saved["losses"])
+        plates = {int(wall): motion for wall, motion in saved["plates"].items()}
+        return cls(**{**saved, "history": history, "losses": losses, "plates": plates})
+
+    def losses_before(self, kinetic: float, potential: float) -> EnergyLosses:
+        """Return the losses up to the start of the next step, with those of mesh smoothing and of new particle masses.
+
+        Args:
+            kinetic: Kinetic energy with the masses of the next step [J].
+            potential: Potential energy after mesh smoothing [J].
+        """
         transfer = 0.0 if self.kinetic is None else self.kinetic - kinetic
         evening = self.potential - potential
         losses = self.losses
         return replace(losses, transfer=losses.transfer + transfer, evening=losses.evening + evening)
 
-    def carried_on(
+    def moved_to(
         self, body: Body, physics: Physics, projections: Floats, admitted: NDArray[np.bool_]
     ) -> "GalerkinState":
-        """The state of particles that are now elsewhere: with the velocity there, as projections `(n, 3, 3)` have it.
+        """Return the state at the positions of the body after mesh smoothing and particle shifting.
 
-        The body is put where its momentum took its centre, along axes that walls admit `(3,)`: evening out triangles
-        gives volume to one side and takes it from another, and would let a drop wander over its wall.
+        The velocity is continued linearly to the new positions. The body is translated in place to the centre of mass
+        that its momentum predicts: mesh smoothing transfers volume from one side to the other, so that a drop would
+        drift along its wall.
+
+        Args:
+            body: Liquid body; translated in place.
+            physics: Effects that act on the body.
+            projections: Projections onto the velocities that walls admit, shape (n, 3, 3).
+            admitted: Whether walls admit a translation along each axis, shape (3,).
         """
         change = projected(self.gradient, body.points - self.points)
         body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
-        with_plates = held(projections, wall_velocities(body, self.twists))
+        with_plates = constrained_part(projections, wall_velocities(body, self.plate_twists))
         velocity = projected(projections, self.velocity + change) + with_plates
-        history = self.history.stopped(physics.pinned(body), wall_velocities(body, self.ways))
+        history = self.history.stopped(physics.pinned(body), wall_velocities(body, self.plate_displacements))
         acceleration = projected(projections, self.acceleration)
         return replace(self, points=body.points, velocity=velocity, acceleration=acceleration, history=history)
 
-    def with_momenta(self, equations: GalerkinEquations, motions: Floats, kept: NDArray[np.bool_]) -> "GalerkinState":
-        """The state with the momenta of the last steps along those of the rigid motions `(6, n, 3)` that are kept.
+    def with_momenta(
+        self, equations: GalerkinEquations, motions: Floats, admitted: NDArray[np.bool_]
+    ) -> "GalerkinState":
+        """Return the state with its velocity corrected to the momenta of the last step.
 
-        Shifted particles and their new masses would change them: a drop would slide away on a wall with free slip.
-        Levers are those of the positions that the forces are taken at, about which these have no moment: with others a
-        drop would be left turning.
+        Particle shifting and new masses change the momenta; uncorrected, a drop would slide on a frictionless wall.
+        Lever arms are those of the predicted positions, where the forces are evaluated: the forces have no moment about
+        these only.
+
+        Args:
+            equations: Equations at the predicted positions.
+            motions: Rigid-body motions at these positions, shape (6, n, 3).
+            admitted: Whether walls admit each of them, shape (6,).
         """
-        if not kept.any():
+        if not admitted.any():
             return self
-        along = motions[kept], equations.masses, equations.rigid
-        velocity = with_momenta(*along, self.velocity, self.momenta[kept])
-        change = with_momenta(*along, self.history.velocity_change, self.momenta_change[kept])
+        basis = motions[admitted], equations.masses, equations.rigid
+        velocity = with_momenta(*basis, self.velocity, self.momenta[admitted])
+        change = with_momenta(*basis, self.history.velocity_change, self.momenta_change[admitted])
         return replace(self, velocity=velocity, history=replace(self.history, velocity_change=change))
 
-    def stopped(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinState":
-        """The state of particles that edges hold now, by projections `(n, 3, 3)`: they have not moved; plates rest."""
+    def pinned(self, body: Body, physics: Physics, projections: Floats) -> "GalerkinState":
+        """Return the state with the particles at rest that contact lines have pinned since; the plates are at rest.
+
+        Args:
+            body: Liquid body.
+            physics: Effects that act on the body, with the current state of the contact lines.
+            projections: Projections onto the velocities that walls admit, shape (n, 3, 3).
+        """
         history = self.history.stopped(physics.pinned(body), np.zeros_like(body.points))
         velocity, acceleration = (projected(projections, each) for each in (self.velocity, self.acceleration))
         return replace(self, velocity=velocity, acceleration=acceleration, history=history)
@@ -124,45 +179,51 @@ class GalerkinState:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Where the equations of a step hold.
+    """Predicted positions of a step, where forces and operators are evaluated.
 
     Attributes:
-        state: what the last step left, with the momenta along rigid motions that it had.
-        base: start of the equivalent backward Euler step.
-        given, guessed: mean twists of plates that are moved, and those predicted of plates that float, `(6,)`.
-        guess: velocity of the prediction, `(n, 3)` [m/s].
-        body: at the predicted positions.
-        equations: there.
-        motions: rigid ones there, `(6, n, 3)`.
+        state: State at the end of the last step, with momentum restored.
+        base: Start of the equivalent backward Euler step.
+        prescribed: Mean twist of each plate on a prescribed path, shape (6,) [m/s, rad/s].
+        floating: Predicted mean twist of each floating plate, shape (6,) [m/s, rad/s].
+        velocity: Predicted velocity, shape (n, 3) [m/s].
+        body: Liquid body at the predicted positions.
+        equations: Equations at the predicted positions.
+        motions: Rigid-body motions at the predicted positions, shape (6, n, 3).
     """
 
     state: GalerkinState
     base: Base
-    given: dict[int, Floats]
-    guessed: dict[int, Floats]
-    guess: Floats
+    prescribed: dict[int, Floats]
+    floating: dict[int, Floats]
+    velocity: Floats
     body: Body
     equations: GalerkinEquations
     motions: Floats
 
+    @property
+    def plate_twists(self) -> dict[int, Floats]:
+        """Mean twist of each moving plate, shape (6,) [m/s, rad/s]."""
+        return self.prescribed | self.floating
+
 
 def centre(body: Body) -> Floats:
-    """Centre of the liquid `(3,)` [m]."""
+    """Return the centre of volume of the liquid, shape (3,) [m]."""
     volume, first, _ = body_moments(body)
     return first / volume
 
 
 def smoothing_passes(gradient: Floats, frequency: float, time_step: float) -> float:
-    """Passes that even out triangles after a step [s] with a gradient of the velocity `(n, 3, 3)` [1/s].
+    """Return the number of mesh smoothing passes due after a step, at most one.
 
-    Uneven triangles have a little more energy. Where a whole pass follows each step, however short, it is taken from a
-    swing each time that it strains them: 5 % in two periods, with 309 particles.
+    Distorted triangles have slightly more energy. A whole pass after every step, however short, would take that energy
+    from an oscillation each time it distorts them: 5 % in two periods with 309 particles.
 
     Args:
-        gradient: of the velocity.
-        frequency: of the grid's capillary waves [1/s].
-        time_step: the step.
+        gradient: Velocity gradient, shape (n, 3, 3) [1/s].
+        frequency: Frequency of the grid's capillary waves [1/s].
+        time_step: Time step [s].
     """
     strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
-    by_strain = EVENED_BY_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
-    return min(1.0, by_strain + EVENING_RATE * time_step * frequency)
+    by_strain = PASSES_PER_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))
+    return min(1.0, by_strain + PASSES_PER_PERIOD * time_step * frequency)

@@ -1,4 +1,4 @@
-"""Stencils of moving least squares: Cholesky factors of their small dense systems, and the check that these exist."""
+"""Stencils of moving least squares: Cholesky factors of their small dense systems, and a check of degeneracy."""
 
 import numpy as np
 from numba import njit
@@ -10,24 +10,29 @@ PIVOT_FLOOR = 1e-9
 
 
 class DegenerateStencil(ArithmeticError):
-    """A particle has too few neighbours to fit a gradient."""
+    """Error of a particle with too few neighbours, or neighbours in a plane, to fit a gradient."""
 
 
 def check_stencils(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
-    """Refuse particles `(n,)` whose stencils are not sound; the message names the first and its trouble.
+    """Raise an error if the stencil of a particle is degenerate.
+
+    Args:
+        body: Liquid body.
+        sound: Whether the stencil of each particle is sound, shape (n,).
+        trouble: Predicate of the message, e.g. "has fewer than 16 neighbours".
 
     Raises:
-        DegenerateStencil: there is one.
+        DegenerateStencil: A stencil is not sound; the message names the first such particle and its position.
     """
     if not sound.all():
         worst = int(np.argmin(sound))
-        place = ", ".join(f"{coordinate:.4g}" for coordinate in body.points[worst])
-        raise DegenerateStencil(f"particle {worst} at ({place}) m {trouble}")
+        position = ", ".join(f"{coordinate:.4g}" for coordinate in body.points[worst])
+        raise DegenerateStencil(f"particle {worst} at ({position}) m {trouble}")
 
 
 @njit(cache=True)
 def factor_spd(matrix, size):
-    """Cholesky factor in place, lower triangle; False where a pivot vanishes (too few neighbours)."""
+    """Factor a symmetric positive definite matrix in place (lower triangle); return False if a pivot vanishes."""
     floor = 0.0
     for a in range(size):
         floor = max(floor, PIVOT_FLOOR * matrix[a, a])
@@ -45,7 +50,7 @@ def factor_spd(matrix, size):
 
 @njit(cache=True)
 def substitute(factor, right, size):
-    """Solve in place for all columns of right with a Cholesky factor."""
+    """Solve in place for all columns of ``right`` with a Cholesky factor."""
     for col in range(right.shape[1]):
         for a in range(size):
             for c in range(a):

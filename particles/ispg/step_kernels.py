@@ -1,12 +1,14 @@
-"""Loops of a step's equations: operators that touch each pair once, and the rows of the pressure equation.
+"""Kernels of the equations of a step: operators that visit each pair once, and the rows of the pressure equation.
 
-Arguments that several take: rows of the shape functions (starts, columns, weights), images (source, reflection), both
-as in `galerkin_kernels`.
+``rows`` are the starts, columns and weights of the shape functions, ``images`` the sources and reflections of the ghost
+particles, as in ``galerkin_kernels.py``.
 """
 
 import numpy as np
 from numba import njit
+from scipy import sparse
 
+from reflowshock.arrays import Floats
 from reflowshock.particles.ispg.galerkin_kernels import (
     divergence,
     divergence_transposed,
@@ -18,7 +20,15 @@ from reflowshock.particles.ispg.galerkin_kernels import (
 
 @njit(cache=True)
 def projected(frames, field):
-    """Vectors `(n, 3)` times a matrix of each particle `(n, 3, 3)`."""
+    """Multiply the vector of each particle by its matrix.
+
+    Args:
+        frames: Matrices, shape (n, 3, 3).
+        field: Vectors, shape (n, 3).
+
+    Returns:
+        Products, shape (n, 3).
+    """
     result = np.empty_like(field)
     for i in range(field.shape[0]):
         x, y, z = field[i, 0], field[i, 1], field[i, 2]
@@ -29,15 +39,22 @@ def projected(frames, field):
 
 @njit(cache=True)
 def projected_blocks(starts, columns, blocks, frames):
-    """Blocks `(k, 3, 3)` of a matrix between a matrix of each row's and of each column's particle `(n, 3, 3)`."""
+    """Multiply the blocks of a sparse matrix by symmetric matrices of their row and column: F_i A_ij F_j.
+
+    Args:
+        starts: Start of each block row, shape (n + 1,).
+        columns: Column of each block, shape (k,).
+        blocks: Blocks, shape (k, 3, 3).
+        frames: Matrix of each particle, shape (n, 3, 3).
+    """
     result, half = np.empty_like(blocks), np.empty((3, 3))
     for i in range(starts.shape[0] - 1):
-        own = frames[i]
+        frame = frames[i]
         for k in range(starts[i], starts[i + 1]):
             block, other = blocks[k], frames[columns[k]]
             for c in range(3):
                 for d in range(3):
-                    half[c, d] = own[c, 0] * block[0, d] + own[c, 1] * block[1, d] + own[c, 2] * block[2, d]
+                    half[c, d] = frame[c, 0] * block[0, d] + frame[c, 1] * block[1, d] + frame[c, 2] * block[2, d]
             for c in range(3):
                 for d in range(3):
                     result[k, c, d] = half[c, 0] * other[0, d] + half[c, 1] * other[1, d] + half[c, 2] * other[2, d]
@@ -46,7 +63,14 @@ def projected_blocks(starts, columns, blocks, frames):
 
 @njit(cache=True)
 def rates_of_volume(rows, images, parts, field):
-    """Rates of volume `(n,)` [m^3/s] of velocities `(n, 3)`, those of `parts`: volumes `(n,)`, unbalanced `(n, 3)`."""
+    """Return B v, the rates of the nodal volumes, shape (n,) [m^3/s].
+
+    Args:
+        rows: Shape functions.
+        images: Ghost particles.
+        parts: Nodal volumes, shape (n,) [m^3], and the gradient they miss, shape (n, 3) [m^2].
+        field: Velocity, shape (n, 3) [m/s].
+    """
     volumes, unbalanced = parts
     missed, total = 0.0, 0.0
     for i in range(volumes.shape[0]):
@@ -58,7 +82,7 @@ def rates_of_volume(rows, images, parts, field):
 
 @njit(cache=True)
 def pressure_forces(rows, images, parts, pressure):
-    """The transposed: forces `(n, 3)` [N] of pressures `(n,)`."""
+    """Return B^T p, the transpose of ``rates_of_volume``: forces, shape (n, 3) [N], of pressures, shape (n,) [Pa]."""
     volumes, unbalanced = parts
     forces = np.zeros((volumes.shape[0] + images[0].shape[0], 3))
     divergence_transposed(*rows, volumes * pressure, forces)
@@ -67,10 +91,14 @@ def pressure_forces(rows, images, parts, pressure):
 
 @njit(cache=True)
 def friction_operator(rows, images, resisted, field):
-    """Forces `(n, 3)` that walls admit of velocities `(n, 3)`: of inertia and friction.
+    """Apply m/dt + V + S to a velocity field and project the force onto admissible directions, shape (n, 3) [N].
 
-    ``resisted``: masses over the time step `(n,)` [kg/s], factors of `resistance`, projections of the particles
-    `(n, 3, 3)`.
+    Args:
+        rows: Shape functions.
+        images: Ghost particles.
+        resisted: Masses over the time step, shape (n,) [kg/s]; coefficients of ``resistance``, shape (n, 3);
+            projections of the particles, shape (n, 3, 3).
+        field: Velocity, shape (n, 3) [m/s].
     """
     inertia, factors, admitted = resisted
     force = folded(resistance(*rows, reflected(field, *images), factors), *images)
@@ -82,13 +110,19 @@ def friction_operator(rows, images, resisted, field):
 
 @njit(cache=True)
 def admitted_rates(rows, images, volumes, admitted):
-    """Rows of rates of volume by particle, as `VolumeRateRows`, of velocities that projections `(n, 3, 3)` admit.
+    """Return the rows of B restricted to admissible velocities, in the form of ``VolumeRateRows``.
 
-    Without what is unbalanced. A particle and its images make one entry.
+    The correction of nodal integration is left out. A particle and its ghosts make one entry.
+
+    Args:
+        rows: Shape functions.
+        images: Ghost particles.
+        volumes: Nodal volumes, shape (n,) [m^3].
+        admitted: Projections onto the velocities that walls admit, shape (n, 3, 3).
     """
     (starts, columns, weights), (source, reflection) = rows, images
     count = starts.shape[0] - 1
-    place, ends = np.full(count, -1), np.zeros_like(starts)
+    slot, ends = np.full(count, -1), np.zeros_like(starts)
     particle, entries, at = np.empty_like(columns), np.empty((columns.shape[0], 3)), 0
     for i in range(count):
         first = at
@@ -102,12 +136,23 @@ def admitted_rates(rows, images, volumes, admitted):
                     r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
                     r[0, 2] * x + r[1, 2] * y + r[2, 2] * z,
                 )
-            if place[j] < first:
-                place[j], particle[at] = at, j
+            if slot[j] < first:
+                slot[j], particle[at] = at, j
                 entries[at, 0] = entries[at, 1] = entries[at, 2] = 0.0
                 at += 1
             p = admitted[j]
             for c in range(3):
-                entries[place[j], c] += volumes[i] * (p[c, 0] * x + p[c, 1] * y + p[c, 2] * z)
+                entries[slot[j], c] += volumes[i] * (p[c, 0] * x + p[c, 1] * y + p[c, 2] * z)
         ends[i + 1] = at
     return ends, particle[:at], entries[:at]
+
+
+def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
+    """Project a stiffness matrix onto the velocities that walls admit.
+
+    Args:
+        stiffness: Stiffness by particle, shape (3 s, 3 s) [N/m].
+        admitted: Projections of the particles, the first s of which are used, shape (n, 3, 3).
+    """
+    blocks = projected_blocks(stiffness.indptr, stiffness.indices, stiffness.data, admitted)
+    return sparse.bsr_matrix((blocks, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

@@ -2,7 +2,7 @@
 
 A body of revolution starts as a cylinder as high as the cube that other drops start as. In a plane it starts as the
 cube's section, and the piece of it that has the volume is as deep as the cube. What acts on it is what acts on a body,
-with the forces of a chain in the place of those of triangles.
+with the forces of a polyline in the place of those of triangles.
 """
 
 from dataclasses import replace
@@ -24,17 +24,17 @@ from reflowshock.particles.steps.time_step import TimeStep, largest_step
 def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> SectionFlow:
     """Set up the flow of a drop's section from rest, with only the effects that are on."""
     if drop.section == "plane":
-        chain, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
+        polyline, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
     else:
-        chain, width = Polyline.meridian(), drop.edge / np.sqrt(np.pi)
-    body = Section.filled(block(chain, width, drop.edge, drop.count), chain)
+        polyline, width = Polyline.meridian(), drop.edge / np.sqrt(np.pi)
+    body = Section.filled(block(polyline, width, drop.edge, drop.count), polyline)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
     return SectionFlow(body, section_physics(solder, effects), time_step, SectionStep())
 
 
 def section_physics(solder: Solder, effects: dict[str, bool]) -> Physics:
-    """What acts on a section of a drop: the effects that are on, those of its surface by its chain."""
+    """What acts on a section of a drop: the effects that are on, those of its surface by its polyline."""
     physics = build_physics(solder, effects | {"wall_adhesion": False}, ())
     wetting = (PolylineWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
 

@@ -1,1 +1,1 @@
-"""The scheme ispg in a plane: bodies of revolution by their meridian, and drops that are the same along y."""
+"""ISPG in two dimensions: bodies of revolution by their meridian, and plane drops; start with ``section_step.py``."""

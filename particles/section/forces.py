@@ -1,4 +1,4 @@
-"""Forces on a chain, gradients of their energies: surface tension, weight, wetting of the wall z = 0."""
+"""Forces on a surface in section, as energy gradients: surface tension, weight, wetting of the wall z = 0."""
 
 from dataclasses import dataclass
 
@@ -12,58 +12,57 @@ from reflowshock.particles.section.section import as_section
 
 
 class PolylineTension(SurfaceTension):
-    """Energy gamma A of the surface."""
+    """Surface tension with the energy gamma A."""
 
     def energy(self, body: Body) -> float:
-        """Surface energy [J]."""
+        """Return the surface energy [J]."""
         section = as_section(body)
-        return self.coefficient * section.chain.area(section.line)[0]
+        return self.coefficient * section.polyline.area(section.line)[0]
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]."""
+        """Return the force -dE/dx, shape (n, 3) [N]."""
         section = as_section(body)
-        return -self.coefficient * section.on_particles(section.chain.area(section.line)[1])
+        return -self.coefficient * section.on_particles(section.polyline.area(section.line)[1])
 
     def stiffness(self, body: Body) -> sparse.csr_matrix:
-        """Stiffness gamma K of the surface, `(3 n, 3 n)` by particle [N/m]."""
+        """Return the stiffness gamma K of the surface by particle, shape (3 n, 3 n) [N/m]."""
         section = as_section(body)
-        return self.coefficient * section.chain.stiffness(section.line, len(section.points))
+        return self.coefficient * section.polyline.stiffness(section.line, len(section.points))
 
 
 class PolylineWeight(Gravity):
-    """Potential energy of the weight, zero at the height of the origin."""
+    """Weight with a potential energy that vanishes at the height of the origin."""
 
     def energy(self, body: Body) -> float:
-        """Potential energy [J]."""
+        """Return the potential energy [J]."""
         section = as_section(body)
-        return self.weight * section.chain.integral(section.line, 0, 1)[0]
+        return self.weight * section.polyline.integral(section.line, 0, 1)[0]
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]."""
+        """Return the force -dE/dx, shape (n, 3) [N]."""
         section = as_section(body)
-        return -self.weight * section.on_particles(section.chain.integral(section.line, 0, 1)[1])
+        return -self.weight * section.on_particles(section.polyline.integral(section.line, 0, 1)[1])
 
 
 @dataclass(frozen=True, slots=True)
 class PolylineWetting:
-    """Energy -gamma cos(theta) A_wet of the wetted wall.
+    """Wetting of the wall with the energy -gamma cos(theta) A_wet.
 
     Attributes:
-        coefficient: surface tension [N/m].
-        angle: contact angle [rad].
+        coefficient: Surface tension [N/m].
+        angle: Contact angle [rad].
     """
 
     coefficient: float
     angle: float
 
     def energy(self, body: Body) -> float:
-        """Energy of the wall [J]."""
+        """Return the energy of the wetted wall [J]."""
         section = as_section(body)
-        return -self.coefficient * float(np.cos(self.angle)) * section.chain.wetted(section.line)[0]
+        return -self.coefficient * float(np.cos(self.angle)) * section.polyline.wetted(section.line)[0]
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx on the contact points, `(n, 3)` [N]."""
+        """Return the force -dE/dx, which acts on the contact points, shape (n, 3) [N]."""
         section = as_section(body)
-        return (
-            self.coefficient * float(np.cos(self.angle)) * section.on_particles(section.chain.wetted(section.line)[1])
-        )
+        gradient = section.on_particles(section.polyline.wetted(section.line)[1])
+        return self.coefficient * float(np.cos(self.angle)) * gradient

@@ -1,10 +1,13 @@
-"""A surface in section: a chain of segments that stands for cones, or for planes of some depth along y.
+"""Free surface in section: a polyline that represents a body of revolution, or a plane drop of some depth along y.
 
-Next to the axis a segment is a parabola with its apex there: the curvature of a cone's tip is a quarter too small.
-The liquid is on its left: counter-clockwise from the right contact point, or from the lower end of the axis. Integrals
-of x^p z^q over what it encloses with the wall z = 0 and the axis x = 0, weighed by c x^k, are those over the chain of
-x^(p + k + 1) z^q dz, times c / (p + k + 1), by the divergence theorem; the sums here are exact. A meridian stands for
-half a body of revolution (k = 1, c = pi), which is what a plane of symmetry leaves of it.
+Segments stand for cones or plane strips. Next to the axis a segment is a parabola with its apex there, because the
+curvature at a cone's tip is a quarter too small: area over volume gives 1.5 / R instead of 2 / R.
+
+The liquid is on the left of the polyline, which runs counter-clockwise from the right contact point or from the lower
+end of the axis. By the divergence theorem, integrals of x^p z^q with weight c x^k over the region between the polyline,
+the wall z = 0 and the axis x = 0 are those of x^(p + k + 1) z^q dz along the polyline times c / (p + k + 1); Gauss
+quadrature makes them exact. A meridian represents half a body of revolution (k = 1, c = pi), as a plane of symmetry
+leaves it.
 """
 
 from dataclasses import dataclass
@@ -14,19 +17,23 @@ from scipy import sparse
 
 from reflowshock.arrays import Floats
 
-# Rule of Gauss over a segment, exact for polynomials up to t^7.
+# Gauss-Legendre rule on a segment, exact for polynomials up to t^7.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = 0.5 + 0.5 * NODES, 0.5 * WEIGHTS
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentQuadrature:
-    """Places on e segments, `(e, g)` at the nodes of the rule.
+    """Quadrature points on e segments, g per segment, with the parameter t in [0, 1] along each.
 
     Attributes:
-        x, z: coordinates [m].
-        x_share: `(g,)` share of the second vertex in x; z_share: `(e, g)` in z.
-        x_rise: `(e, 1)` dx/dt [m]; z_rise: `(e, g)` dz/dt [m]; slope: `(e, g)` d z_share / dt.
+        x: Coordinates x, shape (e, g) [m].
+        z: Coordinates z, shape (e, g) [m].
+        x_share: Weight of the second vertex in x, shape (g,).
+        z_share: Weight of the second vertex in z, shape (e, g).
+        x_rise: Derivative dx/dt, shape (e, 1) [m].
+        z_rise: Derivative dz/dt, shape (e, g) [m].
+        slope: Derivative of ``z_share`` by t, shape (e, g).
     """
 
     x: Floats
@@ -39,11 +46,21 @@ class SegmentQuadrature:
 
     @property
     def length(self) -> Floats:
-        """Length by t, `(e, g)` [m]."""
+        """Arc length per parameter, shape (e, g) [m]."""
         return np.hypot(self.x_rise, self.z_rise)
 
     def by_ends(self, by_x: Floats, by_z: Floats, by_x_rise: Floats | None, by_z_rise: Floats) -> list[Floats]:
-        """Gradient by the first and the second vertices `(e, 3)` of sums over the nodes, from derivatives `(e, g)`."""
+        """Return the gradients of a sum over the quadrature points by the first and by the second vertices.
+
+        Args:
+            by_x: Derivative by x, shape (e, g).
+            by_z: Derivative by z, shape (e, g).
+            by_x_rise: Derivative by dx/dt, shape (e, g); None if zero.
+            by_z_rise: Derivative by dz/dt, shape (e, g).
+
+        Returns:
+            Two gradients, shape (e, 3).
+        """
         gradients = []
         for sign, in_x, in_z in ((-1.0, 1.0 - self.x_share, 1.0 - self.z_share), (1.0, self.x_share, self.z_share)):
             gradient = np.zeros((len(self.x), 3))
@@ -57,12 +74,12 @@ class SegmentQuadrature:
 
 @dataclass(frozen=True, slots=True)
 class Polyline:
-    """What the segments between s vertices stand for; vertices `(s, 3)` [m] lie in the plane y = 0.
+    """Geometry of a surface in section, as functions of its s vertices in the plane y = 0, shape (s, 3) [m].
 
     Attributes:
-        power: k, 1 about an axis and 0 in a plane.
-        factor: c.
-        is_closed: whether the last vertex is followed by the first.
+        power: Exponent k of x in the weight: 1 about an axis, 0 in a plane.
+        factor: Factor c of the weight: pi, or the depth along y [m].
+        is_closed: Whether the last vertex is joined to the first.
     """
 
     power: int
@@ -71,27 +88,32 @@ class Polyline:
 
     @classmethod
     def meridian(cls) -> "Polyline":
-        """Half a body of revolution about the z axis."""
+        """Return the meridian of half a body of revolution about the z axis."""
         return cls(1, np.pi)
 
     @classmethod
     def plane(cls, is_closed: bool, depth: float = 1.0) -> "Polyline":
-        """A piece of a depth along y [m]."""
+        """Return the section of a plane drop.
+
+        Args:
+            is_closed: Whether the surface is closed, without a wall.
+            depth: Depth along y [m].
+        """
         return cls(0, depth, is_closed)
 
     def ends(self, line: Floats) -> tuple[Floats, Floats]:
-        """First and second vertices of the segments, `(e, 3)` each."""
+        """Return the first and the second vertices of the segments, shape (e, 3) each [m]."""
         return (line, np.roll(line, -1, axis=0)) if self.is_closed else (line[:-1], line[1:])
 
     def _sum(self, first: Floats, second: Floats) -> Floats:
-        """Sum by vertex of what segments give to their first and second ends, `(e, ...)` each."""
+        """Sum contributions of segments to their first and second vertices, shape (e, ...) each, by vertex."""
         if self.is_closed:
             return first + np.roll(second, 1, axis=0)
         none = np.zeros((1, *first.shape[1:]))
         return np.concatenate((first, none)) + np.concatenate((none, second))
 
-    def arcs(self, line: Floats) -> SegmentQuadrature:
-        """Places on the segments: straight ones, and parabolas with their apex on the axis."""
+    def quadrature(self, line: Floats) -> SegmentQuadrature:
+        """Return the quadrature points of straight segments and of parabolas with their apex on the axis."""
         first, second = self.ends(line)
         share, slope = np.tile(NODES, (len(first), 1)), np.ones((len(first), len(NODES)))
         if self.power:
@@ -112,44 +134,58 @@ class Polyline:
         )
 
     def integral(self, line: Floats, p: int, q: int) -> tuple[float, Floats]:
-        """Integral of x^p z^q over what the chain encloses, and its gradient by the vertices `(s, 3)`."""
-        arcs, power = self.arcs(line), p + self.power + 1
+        """Return the weighted integral of x^p z^q over the enclosed region, and its gradient.
+
+        Args:
+            line: Vertices, shape (s, 3) [m].
+            p: Exponent of x.
+            q: Exponent of z.
+
+        Returns:
+            Integral [m^(3 + p + q)] and its gradient by the vertices, shape (s, 3).
+        """
+        points, power = self.quadrature(line), p + self.power + 1
         scale = self.factor / power * WEIGHTS
-        values = scale * arcs.x**power * arcs.z**q
-        by_x = scale * power * arcs.x ** (power - 1) * arcs.z**q * arcs.z_rise
-        by_z = scale * arcs.x**power * (q * arcs.z ** (q - 1) if q else 0.0) * arcs.z_rise
-        return float((values * arcs.z_rise).sum()), self._sum(*arcs.by_ends(by_x, by_z, None, values))
+        values = scale * points.x**power * points.z**q
+        by_x = scale * power * points.x ** (power - 1) * points.z**q * points.z_rise
+        by_z = scale * points.x**power * (q * points.z ** (q - 1) if q else 0.0) * points.z_rise
+        return float((values * points.z_rise).sum()), self._sum(*points.by_ends(by_x, by_z, None, values))
 
     def area(self, line: Floats) -> tuple[float, Floats]:
-        """Area of the surface and its gradient by the vertices `(s, 3)`."""
-        arcs = self.arcs(line)
-        length, weight = arcs.length, self.factor * WEIGHTS * arcs.x**self.power
+        """Return the area of the surface [m^2] and its gradient by the vertices, shape (s, 3) [m]."""
+        points = self.quadrature(line)
+        length, weight = points.length, self.factor * WEIGHTS * points.x**self.power
         by_x = self.power * self.factor * WEIGHTS * length
-        pulls = (weight * arcs.x_rise / length, weight * arcs.z_rise / length)
-        return float((weight * length).sum()), self._sum(*arcs.by_ends(by_x, np.zeros_like(length), *pulls))
+        pulls = (weight * points.x_rise / length, weight * points.z_rise / length)
+        return float((weight * length).sum()), self._sum(*points.by_ends(by_x, np.zeros_like(length), *pulls))
 
     def stiffness(self, line: Floats, count: int) -> sparse.csr_matrix:
-        """Stiffness K of the surface Laplacian, velocities of the first s of n particles, `(3 n, 3 n)` by particle.
+        """Return the stiffness K of the surface Laplacian with the hoop terms of an axis.
 
-        About the axis hoops of the surface resist, too: x of each vertex with the length around it over its radius.
+        Args:
+            line: Vertices, shape (s, 3) [m].
+            count: Number n of particles, of which the vertices are the first.
+
+        Returns:
+            Stiffness per unit surface tension by particle, shape (3 n, 3 n).
         """
-        arcs = self.arcs(line)
-        weight = self.factor * WEIGHTS * arcs.x**self.power / arcs.length
-        weight = np.column_stack((weight.sum(axis=1), (weight * arcs.slope**2).sum(axis=1))).ravel()
-        i = np.arange(len(arcs.x))
+        points = self.quadrature(line)
+        weight = self.factor * WEIGHTS * points.x**self.power / points.length
+        weight = np.column_stack((weight.sum(axis=1), (weight * points.slope**2).sum(axis=1))).ravel()
+        i = np.arange(len(points.x))
         j = (i + 1) % len(line)
-        i, j = ((3 * one[:, None] + [0, 2]).ravel() for one in (i, j))
+        i, j = ((3 * vertex[:, None] + [0, 2]).ravel() for vertex in (i, j))
         rows, columns = np.concatenate((i, j, i, j)), np.concatenate((j, i, i, j))
         values = np.concatenate((-weight, -weight, weight, weight))
         if self.power:
-            length, off_axis = arcs.length @ WEIGHTS, np.flatnonzero(line[:, 0] > 0.0)
+            length, off_axis = points.length @ WEIGHTS, np.flatnonzero(line[:, 0] > 0.0)
             around = self._sum(0.5 * length, 0.5 * length)[off_axis]
-            rows, columns = (np.concatenate((one, 3 * off_axis)) for one in (rows, columns))
+            rows, columns = (np.concatenate((index, 3 * off_axis)) for index in (rows, columns))
             values = np.concatenate((values, self.factor * around / line[off_axis, 0]))
         return sparse.csr_matrix((values, (rows, columns)), shape=(3 * count, 3 * count))
 
     def wetted(self, line: Floats) -> tuple[float, Floats]:
-        """Area of the wall z = 0 under the liquid, and its gradient by the vertices `(s, 3)`."""
+        """Return the wetted area of the wall z = 0 [m^2] and its gradient by the vertices, shape (s, 3) [m]."""
         power, gradient = self.power + 1, np.zeros_like(line)
         gradient[0, 0] = self.factor * line[0, 0] ** self.power
         area = self.factor / power * line[0, 0] ** power
@@ -159,16 +195,21 @@ class Polyline:
         return float(area), gradient
 
     def areas(self, line: Floats, heights: Floats) -> Floats:
-        """Areas `(k,)` [m^2] of horizontal sections at heights `(k,)` [m], at no vertex: of discs.
+        """Return the areas of horizontal discs at given heights; in a plane, of the disc of the same width.
 
-        In a plane of the disc that is as wide.
+        Args:
+            line: Vertices, shape (s, 3) [m].
+            heights: Heights, none equal to that of a vertex, shape (k,) [m].
+
+        Returns:
+            Areas, shape (k,) [m^2].
         """
         first, second = self.ends(line)
         low, high = (np.broadcast_to(end[:, 2], (len(heights), len(end))) for end in (first, second))
         height = heights[:, None]
         sense = np.sign(high - low) * ((low < height) != (high < height))
         share = np.where(sense == 0.0, 0.0, (height - low) / np.where(sense == 0.0, 1.0, high - low))
-        if self.power:  # on a parabola heights go with the square of x
+        if self.power:  # on a parabola z is proportional to x^2
             share = np.where(first[:, 0] == 0.0, np.sqrt(share), share)
             share = np.where(second[:, 0] == 0.0, 1.0 - np.sqrt(1.0 - share), share)
         x = first[:, 0] + share * (second[:, 0] - first[:, 0])
@@ -177,24 +218,32 @@ class Polyline:
         return 0.25 * np.pi * (sense * x).sum(axis=1) ** 2
 
     def normals(self, line: Floats) -> Floats:
-        """Unit normals out of the liquid at the vertices `(s, 3)`, of the chord between their neighbours."""
+        """Return outward unit normals at the vertices, normal to the chord between their neighbours, shape (s, 3)."""
         first, second = self.ends(line)
-        along = self._sum(second - first, second - first)
-        if self.power:  # at the axis the other half follows
-            along[np.abs(line[:, 0]) <= 0.0, 2] = 0.0
-        normal = np.column_stack((along[:, 2], np.zeros(len(line)), -along[:, 0]))
+        chord = self._sum(second - first, second - first)
+        if self.power:  # at the axis the mirrored half follows
+            chord[np.abs(line[:, 0]) <= 0.0, 2] = 0.0
+        normal = np.column_stack((chord[:, 2], np.zeros(len(line)), -chord[:, 0]))
         return normal / np.linalg.norm(normal, axis=1)[:, None]
 
-    def evening(self, line: Floats, share: float) -> Floats:
-        """Displacements `(s, 3)` of vertices by a share of the way to the middle of their neighbours; ends stay.
+    def smoothing_offsets(self, line: Floats, share: float) -> Floats:
+        """Return displacements that even the spacing of the vertices; the ends stay in place.
 
-        Along the parabola through the three: they stay on a smooth surface to third order.
+        Vertices move along the parabola through themselves and their neighbours, and so stay on a smooth surface to
+        third order.
+
+        Args:
+            line: Vertices, shape (s, 3) [m].
+            share: Share of the distance to the middle of the neighbours.
+
+        Returns:
+            Displacements, shape (s, 3) [m].
         """
         before, after = np.roll(line, 1, axis=0), np.roll(line, -1, axis=0)
         back, ahead = line - before, after - line
-        a, b = (np.linalg.norm(one, axis=1)[:, None] for one in (back, ahead))
-        way = 0.5 * share * (b - a)
-        offset = way * (back / a + (way + a) / (a + b) * (ahead / b - back / a))
+        a, b = (np.linalg.norm(edge, axis=1)[:, None] for edge in (back, ahead))
+        length = 0.5 * share * (b - a)
+        offset = length * (back / a + (length + a) / (a + b) * (ahead / b - back / a))
         if not self.is_closed:
             offset[[0, -1]] = 0.0
         return offset

@@ -1,6 +1,6 @@
-"""A body in section: particles in the plane y = 0, of which the first are the vertices of a chain.
+"""Liquid body in section: particles in the plane y = 0, of which the first are the vertices of the surface polyline.
 
-Fields have three components, the one along y is zero, so that steps, time integration and forces are those of bodies.
+Fields have three components with zero along y, so that steps, time integration and forces are those of bodies in space.
 A meridian is the part x >= 0 that a plane of symmetry x = 0 leaves.
 """
 
@@ -15,91 +15,93 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.section.polyline import Polyline
 
 NO_TRIANGLES = np.zeros((0, 3), np.int32)
-NARROW = 1e-3  # [rad], or spacings
-LONG = 100.0  # times the width or height
-MERIDIANS = 64  # around the axis, of the triangles that a body is shown with
+NARROW = 1e-3  # angle [rad] or distance [spacings] between the copies of a narrow body
+LONG = 100.0  # depth over width or height of a plane body whose ends do not matter
+MERIDIANS = 64  # copies around the axis in a triangulated body of revolution
 
 
 @dataclass(slots=True)
 class Section(Body):
-    """State of a body in section; volumes are those of half a body of revolution, or of a piece in a plane.
+    """State of a body in section; volumes are those of half a body of revolution, or of a plane drop of some depth.
 
     Attributes:
-        chain: what the surface stands for.
+        polyline: Geometry of the surface.
     """
 
-    chain: Polyline
+    polyline: Polyline
 
     @classmethod
-    def filled(cls, cloud: Cloud, chain: Polyline) -> "Section":
-        """Start at rest from a cloud."""
+    def filled(cls, cloud: Cloud, polyline: Polyline) -> "Section":
+        """Return a body at rest made of the particles of a cloud."""
         count = len(cloud.points)
         still = (np.zeros((count, 3)), np.zeros(count), 0.0)
-        return cls(cloud, cloud.points.copy(), *still, cloud.triangles, np.zeros(count), cloud.plates, chain)
+        return cls(cloud, cloud.points.copy(), *still, cloud.triangles, np.zeros(count), cloud.plates, polyline)
 
     @property
     def line(self) -> Floats:
-        """The surface `(s, 3)` [m]."""
+        """Vertices of the surface, shape (s, 3) [m]."""
         return self.points[: self.cloud.surface_count]
 
     def on_particles(self, field: Floats) -> Floats:
-        """A field of the surface `(s, 3)`, zero below it, `(n, 3)`."""
+        """Extend a field of the vertices, shape (s, 3), by zeros to all particles, shape (n, 3)."""
         result = np.zeros_like(self.points)
         result[: len(field)] = field
         return result
 
     def volume(self) -> tuple[float, Floats]:
-        """Enclosed volume [m^3] and its gradient `(n, 3)` [m^2]."""
-        volume, gradient = self.chain.integral(self.line, 0, 0)
+        """Return the enclosed volume [m^3] and its gradient by the particles, shape (n, 3) [m^2]."""
+        volume, gradient = self.polyline.integral(self.line, 0, 0)
         return volume, self.on_particles(gradient)
 
     def moments(self) -> tuple[float, Floats, Floats]:
-        """Integrals of 1, x `(3,)` and x x `(3, 3)` over the part of the liquid that the section stands for, y = 0."""
+        """Return integrals over the liquid of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5], with y = 0."""
 
         def integral(p: int, q: int) -> float:
-            return self.chain.integral(self.line, p, q)[0]
+            return self.polyline.integral(self.line, p, q)[0]
 
         xz = integral(1, 1)
         second = np.array([[integral(2, 0), 0.0, xz], [0.0, 0.0, 0.0], [xz, 0.0, integral(0, 2)]])
         return integral(0, 0), np.array([integral(1, 0), 0.0, integral(0, 1)]), second
 
     def whole(self) -> Body:
-        """The body with triangles: a meridian turned about its axis, a plane as deep as its piece and without ends.
+        """Return a triangulated body: the meridian rotated about its axis, or the plane drop without its ends.
 
-        The particles below the surface stay in the section.
+        Particles below the surface stay in the section.
         """
-        if self.chain.power:
-            return self.swept(turns(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
-        return self.swept(sheets(self.chain.factor), is_closed=False)
+        if self.polyline.power:
+            return self.swept(rotated(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
+        return self.swept(translated(self.polyline.factor), is_closed=False)
 
     def enclosing(self) -> Body:
-        """The body with triangles around all of it; a plane so long that its ends are out of sight."""
-        if self.chain.power:
+        """Return a triangulated body whose surface encloses the liquid; a plane drop gets a depth of 100 widths."""
+        if self.polyline.power:
             return self.whole()
-        return self.swept(sheets(LONG * float(np.ptp(self.line, axis=0).max())), is_closed=False)
+        return self.swept(translated(LONG * float(np.ptp(self.line, axis=0).max())), is_closed=False)
 
     def narrow(self) -> Body:
-        """The surface between two copies of the chain so close that triangles are as exact as it is."""
-        copies = turns(np.array([0.0, NARROW])) if self.chain.power else sheets(NARROW * self.cloud.spacing)
+        """Return the surface between two copies of the polyline so close that triangles are as accurate as segments."""
+        copies = rotated(np.array([0.0, NARROW])) if self.polyline.power else translated(NARROW * self.cloud.spacing)
         return self.swept(copies, is_closed=False)
 
-    def swept(self, places: tuple[Floats, Floats], is_closed: bool) -> Body:
-        """The surface between copies of the chain, one after the other in the sense of y.
+    def swept(self, copies: "Placements", is_closed: bool) -> Body:
+        """Return the triangulated surface between copies of the polyline.
 
         Args:
-            places: rotation `(m, 3, 3)` and translation `(m, 3)` [m] of each copy.
-            is_closed: whether the first copy follows the last.
+            copies: Placements of the copies, ordered along +y.
+            is_closed: Whether the last copy is joined to the first.
         """
-        rotations, shifts = places
-        chain, count, copies = self.chain, self.cloud.surface_count, len(rotations)
-        single = (self.line[:, 0] == 0.0) & bool(chain.power)
-        number = np.cumsum(np.where(single, 1, copies))[:, None] - np.where(single, 1, copies)[:, None]
-        number = number + np.where(single[:, None], 0, np.arange(copies))
-        along = np.arange(count) if chain.is_closed else np.arange(count - 1)
-        around = np.arange(copies) if is_closed else np.arange(copies - 1)
+        rotations, shifts = copies.rotations, copies.shifts
+        polyline, count, number_of_copies = self.polyline, self.cloud.surface_count, len(rotations)
+        single = (self.line[:, 0] == 0.0) & bool(polyline.power)
+        number = (
+            np.cumsum(np.where(single, 1, number_of_copies))[:, None] - np.where(single, 1, number_of_copies)[:, None]
+        )
+        number = number + np.where(single[:, None], 0, np.arange(number_of_copies))
+        along = np.arange(count) if polyline.is_closed else np.arange(count - 1)
+        around = np.arange(number_of_copies) if is_closed else np.arange(number_of_copies - 1)
         k, j = (grid.ravel() for grid in np.meshgrid(along, around, indexing="ij"))
-        after, beside = (k + 1) % count, (j + 1) % copies
-        a, b, c, d = number[k, j], number[k, beside], number[after, beside], number[after, j]
+        after, next_copy = (k + 1) % count, (j + 1) % number_of_copies
+        a, b, c, d = number[k, j], number[k, next_copy], number[after, next_copy], number[after, j]
         triangles = np.concatenate((np.column_stack((a, b, c)), np.column_stack((a, c, d)))).astype(np.int32)
         triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
 
@@ -114,7 +116,7 @@ class Section(Body):
         pressure[number] = self.pressure[:count, None]
         wall = np.full(len(points), -1, np.int8)
         wall[len(points) - len(self.points) + count :] = self.cloud.wall[count:]
-        wetted = number[0] if chain.power else np.concatenate((number[0], number[-1, ::-1]))
+        wetted = number[0] if polyline.power else np.concatenate((number[0], number[-1, ::-1]))
         rings = (wetted.astype(np.int32),) if self.plates else ()
         wall[np.concatenate([*rings, NO_TRIANGLES[:, 0]])] = 0
         first = int(number.max()) + 1
@@ -124,80 +126,94 @@ class Section(Body):
 
 
 def as_section(body: Body) -> Section:
-    """The same body, for what acts on sections alone.
+    """Return the body as a section.
 
     Raises:
-        TypeError: it is none.
+        TypeError: The body is not a section.
     """
     if not isinstance(body, Section):
-        raise TypeError("the forces and steps of a section act on no other body")
+        raise TypeError("forces and steps in section require a body in section")
     return body
 
 
-def turns(angles: Floats) -> tuple[Floats, Floats]:
-    """Rotations about the z axis by angles `(m,)` [rad], and no translations."""
+@dataclass(frozen=True, slots=True)
+class Placements:
+    """Placements of m copies of a section in space.
+
+    Attributes:
+        rotations: Rotation matrices, shape (m, 3, 3).
+        shifts: Translations, shape (m, 3) [m].
+    """
+
+    rotations: Floats
+    shifts: Floats
+
+
+def rotated(angles: Floats) -> Placements:
+    """Return copies rotated about the z axis by angles of shape (m,) [rad]."""
     cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
     rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, none + 1.0]]
-    return np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3))
+    return Placements(np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3)))
 
 
-def sheets(depth: float) -> tuple[Floats, Floats]:
-    """Two places a depth apart along y [m], about the plane of the section."""
-    return np.broadcast_to(np.eye(3), (2, 3, 3)), depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
+def translated(depth: float) -> Placements:
+    """Return two copies a depth [m] apart along y, on either side of the section."""
+    shifts = depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
+    return Placements(np.broadcast_to(np.eye(3), (2, 3, 3)), shifts)
 
 
-def block(chain: Polyline, width: float, height: float, count: int) -> Cloud:
-    """A lattice on the wall z = 0.
+def block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
+    """Return a rectangular lattice of particles on the wall z = 0.
 
-    Below the surface none lie on the axis, the first are half a spacing away: each particle has a pressure that keeps
-    its volume, and on the axis one velocity only, so that a column of them locks.
+    The first particles below the surface are half a spacing off the axis: each has a pressure that keeps its volume,
+    and on the axis only one velocity component, so that a column of them would lock.
 
     Args:
-        chain: of a meridian, where only the part x >= 0 is filled, or of an open plane.
-        width: from the middle to the sides [m].
-        height: [m].
-        count: particles along the height.
+        polyline: Meridian, of which only the part x >= 0 is filled, or open section of a plane drop.
+        width: Half width [m].
+        height: Height [m].
+        count: Number of particles along the height.
     """
     last = count - 1
     across = max(3, round(width / height * last))
-    columns = np.linspace(0.5, across - 1.0, across - 1) if chain.power else np.arange(1.0 - across, across)
+    columns = np.linspace(0.5, across - 1.0, across - 1) if polyline.power else np.arange(1.0 - across, across)
     x, z = (grid.ravel() for grid in np.meshgrid(columns, np.arange(last), indexing="ij"))
     up = [(across, level) for level in range(count)]
-    over = [(column, last) for column in range(across - 1, (-1 if chain.power else -across - 1), -1)]
-    down = [] if chain.power else [(-across, level) for level in range(last - 1, -1, -1)]
+    over = [(column, last) for column in range(across - 1, (-1 if polyline.power else -across - 1), -1)]
+    down = [] if polyline.power else [(-across, level) for level in range(last - 1, -1, -1)]
     surface = np.array(up + over + down)
     lattice = np.concatenate((surface, np.column_stack((x, z))))
     points = np.column_stack(
         (lattice[:, 0] * (width / across), np.zeros(len(lattice)), lattice[:, 1] * (height / last))
     )
     wall = np.where(lattice[:, 1] == 0, 0, -1).astype(np.int8)
-    contact = np.array([0] if chain.power else [0, len(surface) - 1], np.int32)
-    axes = (0,) if chain.power else ()
+    contact = np.array([0] if polyline.power else [0, len(surface) - 1], np.int32)
+    axes = (0,) if polyline.power else ()
     walls = ((contact,), (Plate.horizontal(0.0),))
     return Cloud(points, len(surface), NO_TRIANGLES, *walls, wall, height / last, axes)
 
 
-def disc(chain: Polyline, radius: float, rings: int) -> Cloud:
-    """Circles about a particle at the origin, half circles of a meridian, as in `block`; no wall touches it.
+def disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
+    """Return concentric circles of particles without a wall; half circles without particles on the axis for a meridian.
 
     Args:
-        chain: of a meridian or of a closed plane.
-        radius: of the polygon's vertices [m].
-        rings: number of circles.
+        polyline: Meridian, or closed section of a plane drop.
+        radius: Radius of the outer circle [m].
+        rings: Number of circles.
     """
     shells = []
     for ring in range(rings, 0, -1):
         arcs = max(2, round(np.pi * ring))
         turn = np.pi * np.arange(2 * arcs) / arcs
-        if chain.power:
+        if polyline.power:
             turn = np.pi * ((np.arange(arcs + 1) if ring == rings else np.arange(arcs) + 0.5) / arcs - 0.5)
         circle = np.column_stack((np.cos(turn), np.zeros(len(turn)), np.sin(turn))) * (radius * ring / rings)
         shells.append(circle)
-    if chain.power:
+    if polyline.power:
         shells[0][[0, -1], 0] = 0.0
     else:
         shells.append(np.zeros((1, 3)))
     points = np.concatenate(shells)
     wall = np.full(len(points), -1, np.int8)
-    axes = (0,) if chain.power else ()
+    axes = (0,) if polyline.power else ()
     return Cloud(points, len(shells[0]), NO_TRIANGLES, (), (), wall, radius / rings, axes)

@@ -1,7 +1,8 @@
-"""Steps of a body in section by the scheme ispg: the step of bodies, with the space and the surface of a section.
+"""ISPG step in section: the step in space, with the Galerkin space and the surface of a section.
 
-The vertices of the chain are spaced evenly at the rate at which triangles are evened out, particles below it are
-shifted as in space.
+Mesh smoothing spaces the vertices of the polyline evenly at the rate of mesh smoothing in space; particles below the
+surface are shifted as in space. The hoop terms of the implicit surface tension are essential: without them the axis is
+unstable from some 50 steps per period on. Masses are those of the nodal volumes V alone.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,8 +22,8 @@ from reflowshock.particles.discretisation.lagged_cholesky import Apply, Band, To
 from reflowshock.particles.ispg.galerkin_equations import (
     MOMENTUM_TOLERANCE,
     NEGLIGIBLE,
-    Drive,
     GalerkinEquations,
+    Response,
 )
 from reflowshock.particles.ispg.galerkin_space import AT_REST, GalerkinSpace
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
@@ -36,23 +37,23 @@ from reflowshock.particles.steps.descent import MeshSmoothing, correct_volume
 from reflowshock.particles.steps.flow import FLOW_RECORDS, LiquidFlow
 from reflowshock.particles.steps.step_solver import Motion
 from reflowshock.particles.surface.profile import Profile, fit_areas
-from reflowshock.particles.surface.surface_quality import SMOOTHING as EVENING
+from reflowshock.particles.surface.surface_quality import SMOOTHING
 
 
 @dataclass(frozen=True, slots=True)
 class SectionEquations(GalerkinEquations):
-    """The equations of a section, by matrices.
+    """Equations of a body in section, as sparse matrices.
 
     Attributes:
-        matrices: shape functions and volumes.
-        basis: `(3 n, d)` admissible velocities, by particle.
+        matrices: Shape functions and nodal volumes.
+        basis: Basis of the admissible velocities by particle, shape (3 n, d).
     """
 
     matrices: SectionSpace
     basis: sparse.csr_matrix
 
-    def rubbed(self, velocity: Floats, force: Floats) -> Floats:
-        """Velocity [m/s] under friction, as in space."""
+    def velocity_after_friction(self, velocity: Floats, force: Floats) -> Floats:
+        """Solve for the velocity after viscosity and velocity smoothing, as in space, shape (n, 3) [m/s]."""
         basis, across = self.basis, self.basis.T
         load = self.momentum(velocity) / self.time_step + force
         mean = NEGLIGIBLE * self.spacing * float(self.masses.mean()) / self.time_step**2
@@ -67,49 +68,49 @@ class SectionEquations(GalerkinEquations):
         return (basis @ solution).reshape(-1, 3)
 
     def friction(self, field: Floats) -> Floats:
-        """m/dt + V + S of a velocity, [N]."""
+        """Apply m/dt + V + S to a velocity field, shape (n, 3) [N]."""
         return self.momentum(field) / self.time_step + self.matrices.resistance(field, self.factors)
 
-    def driver(self) -> Drive:
-        """How forces `(n, 3)` [N] move masses and surface in a step, as in space."""
+    def response(self) -> Response:
+        """Return a function that maps forces to the velocity they cause in a step from rest, as in space."""
         basis, across = self.basis, self.basis.T
         return lambda force, _: (basis @ self.inertia.solve(across @ force.ravel())).reshape(-1, 3)
 
-    def pressure_equation(self, drive: Drive) -> tuple[Apply, Callable[[], Band]]:
-        """Rates of volume under pressures, A, and a matrix of it but for what nodal integration misses."""
+    def pressure_equation(self, respond: Response) -> tuple[Apply, Callable[[], Band]]:
+        """Return the operator from pressures to rates of volume, and a function that assembles its preconditioner."""
 
         def matrix() -> Band:
             rates = sparse.diags(self.matrices.volumes) @ self.matrices.divergence_rows() @ self.basis
             return Band.of(rates @ self.inertia.solve(rates.T.toarray()))
 
         none = np.zeros(0)
-        return lambda pressure: self.constraint(drive(self.push(pressure), none)), matrix
+        return lambda pressure: self.volume_rates(respond(self.pressure_forces(pressure), none)), matrix
 
-    def constraint(self, field: Floats) -> Floats:
-        """B v: rates of volume `(n,)` [m^3/s]."""
+    def volume_rates(self, field: Floats) -> Floats:
+        """Return B v, the rates of the nodal volumes, shape (n,) [m^3/s]."""
         volumes = self.matrices.volumes
         return volumes * (self.matrices.divergence(field) + (self.unbalanced * field).sum() / volumes.sum())
 
-    def push(self, pressure: Floats) -> Floats:
-        """B^T p, [N]."""
+    def pressure_forces(self, pressure: Floats) -> Floats:
+        """Return B^T p, the forces of pressure coefficients of shape (n,) [Pa], shape (n, 3) [N]."""
         parts = self.matrices.volumes * pressure
         return self.matrices.divergence_load(parts) + parts.sum() / self.matrices.volumes.sum() * self.unbalanced
 
 
 class SectionStep(IspgStep):
-    """The scheme ispg of a section."""
+    """Step solver of the Galerkin scheme in section."""
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedSectionStep":
-        """Carry the velocity to where the particles are now."""
+        """Move the state to the current positions."""
         prepared = IspgStep.prepare(self, body, physics, neighbours)
         return PreparedSectionStep(*(getattr(prepared, entry.name) for entry in fields(prepared)))
 
 
 class PreparedSectionStep(PreparedIspgStep):
-    """A step from the section's current positions."""
+    """Step from the current positions of a section."""
 
     def equations(self, body: Body, time_step: float, _twists: Mapping[int, Floats] = AT_REST) -> GalerkinEquations:
-        """The equations of a section at other positions, for a time step [s]; its wall rests."""
+        """Assemble the equations of a section at other positions for a time step [s]; its wall is at rest."""
         section, fluid = as_section(body), self.fluid(body.cloud.spacing)
         tensions = [part for part in self.physics.operators if isinstance(part, PolylineTension)]
         space, basis = SectionSpace.of(section), admissible(body)
@@ -120,7 +121,7 @@ class PreparedSectionStep(PreparedIspgStep):
         free_stiffness = sparse.bsr_matrix(basis.T @ stiffness @ basis, blocksize=(1, 1))
         free = (basis.T @ np.repeat(masses, 3), free_stiffness, motions)
         return SectionEquations(
-            space=cast(GalerkinSpace, space),  # what a step asks of either is the same
+            space=cast(GalerkinSpace, space),  # both have the methods that a step uses
             matrices=space,
             admitted=self.projections,
             fluid=fluid,
@@ -137,7 +138,7 @@ class PreparedSectionStep(PreparedIspgStep):
 
 
 def admissible(body: Body) -> sparse.csr_matrix:
-    """Velocities that a section admits, `(3 n, d)` by particle: within its plane, along walls and the axis."""
+    """Return a basis of the velocities within the plane, along walls and along the axis, shape (3 n, d)."""
     free = np.ones((len(body.points), 3), bool)
     free[:, 1] = False
     free[body.cloud.wall >= 0, 2] = False
@@ -147,26 +148,26 @@ def admissible(body: Body) -> sparse.csr_matrix:
 
 
 class SectionFlow(LiquidFlow):
-    """A liquid body that flows in section."""
+    """Liquid flow in section."""
 
     body: Section
     records: ClassVar[tuple[type, ...]] = (*FLOW_RECORDS, Section, Polyline)
 
     def profile(self) -> Profile:
-        """Cross-sections of the body against their height."""
+        """Return the areas of the horizontal cross-sections against height."""
         body = self.body
-        return fit_areas(lambda heights: body.chain.areas(body.line, heights), *body.span())
+        return fit_areas(lambda heights: body.polyline.areas(body.line, heights), *body.span())
 
     def outward(self) -> Floats:
-        """Unit normals of the chain `(s, 3)`."""
-        return self.body.chain.normals(self.body.line)
+        """Return the outward unit normals of the surface, shape (s, 3)."""
+        return self.body.polyline.normals(self.body.line)
 
-    def _follow(self, motion: Motion, evening: MeshSmoothing) -> int:
-        """Move the body along, and space its vertices evenly; nothing is flipped."""
-        body, passes = self.body, evening.passes
+    def _follow(self, motion: Motion, smoothing: MeshSmoothing) -> int:
+        """Move the body and space its vertices evenly; return the number of flipped edges, zero."""
+        body, passes = self.body, smoothing.passes
         body.move(self.time_step.size, motion.transport, motion.twists)
         for done in range(ceil(passes)):
-            offset = body.chain.evening(body.line, EVENING * min(1.0, passes - done))
+            offset = body.polyline.smoothing_offsets(body.line, SMOOTHING * min(1.0, passes - done))
             body.points = body.points + body.on_particles(offset)
         correct_volume(body, self.physics, self.volume)
         return 0

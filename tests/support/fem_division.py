@@ -1,6 +1,7 @@
 """Divisions of meshes for tests: by the parts of the mesh, or as a naive scheme would."""
 
-from reflowshock.fem.division.divide import held, two_steps
+from reflowshock.fem.division.decide import in_two_steps, plan_windows
+from reflowshock.fem.division.divide import held
 from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole
 
@@ -13,4 +14,4 @@ def by_patch(whole: Whole, found: Survey, rules: Rules) -> Division:
 def naive(whole: Whole, found: Survey, rules: Rules) -> Division:
     """Take the window from the macro elements alone, whatever touches the cut."""
     macro = whole.mesh.in_parts("board".__eq__)
-    return two_steps("held_velocity", rules, (macro, ~macro), (macro, found.step))
+    return in_two_steps("held_velocity", macro, ~macro, plan_windows(rules, macro, found.step))

@@ -20,7 +20,7 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     ShockForecast,
     forecast_shock,
     mode_seconds,
-    seconds_around,
+    seconds_outside_windows,
     shorter_than_window,
 )
 from reflowshock.workflow.case.forecast import (
@@ -108,12 +108,12 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
     cooling, seconds = shock_cooling.forecast(case, parts)
     once = seconds + mode_seconds(case)
     modes = {
-        "two_scale": share * shock.two_scale + seconds_around(case, two_scale_parts(case), share),
-        "dns": share * dns + seconds_around(case, parts, share * shock.dns_share),
+        "two_scale": share * shock.two_scale + seconds_outside_windows(case, two_scale_parts(case), share),
+        "dns": share * dns + seconds_outside_windows(case, parts, share * shock.dns_share),
     }
     again = modes["two_scale" if "two_scale" in numerics.modes else "dns"]
     if shock.search:
-        modes["two_scale"] += share * shock.search + seconds_around(case, coarse_parts(case), share)
+        modes["two_scale"] += share * shock.search + seconds_outside_windows(case, coarse_parts(case), share)
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         of_reflow,

@@ -62,8 +62,7 @@ def _expected(shock: ShockForecast, seconds: float) -> str:
 def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     every = case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
-    scheme, why = shock.scheme
-    table.add_row("scheme", scheme.replace("_", " "), why)
+    table.add_row("scheme", shock.scheme.replace("_", " "), shock.reason)
     table.add_row("fine joints", *_fine_joints(case))
     if case.shock.duration == "auto":
         longest, expected = short(longest_duration(case)), short(shock.share * longest_duration(case))

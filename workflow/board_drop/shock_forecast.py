@@ -1,4 +1,8 @@
-"""Scheme, levels, time steps and cost of a shock, from the parameters of its case alone."""
+"""Forecast of a shock: coupling scheme, step levels, time steps and wall time, from the case alone.
+
+``part_forecast`` estimates the parts of the mesh; ``fem.division.decide``, which also divides the mesh of the run,
+chooses scheme, windows and levels; ``fem.estimates`` predicts the wall time of the fastest rank placement.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,20 +23,30 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import short
 
 if TYPE_CHECKING:
+    from reflowshock.fem.division.decide import MeshEstimate
+    from reflowshock.fem.division.division import Division, Rules
     from reflowshock.fem.estimates.estimate import WindowPlan
     from reflowshock.workflow.package.case import BoardDropCase
 
-# Measured on jedec_bga, bga_drop and hu_bga_drop: until ranks have loaded libraries and kernels; set-up and a sample of
-# histories, of any mesh and an element.
-SECONDS_TO_START, SETUP_SECONDS, SAMPLE_SECONDS = 5.0, 5e-5, 2e-7
-SECONDS_OF_SAMPLE = 5e-3
-FIELD_SECONDS = 1.4e-5  # of an element in one sample of fields
-MODE_SOLUTIONS = 20  # solutions by one factor for each natural mode
+# Measured on jedec_bga, bga_drop and hu_bga_drop.
+SECONDS_TO_START = 5.0  # until all ranks have loaded libraries and kernels
+SETUP_SECONDS = 5e-5  # set-up, for each element
+SECONDS_OF_SAMPLE, SAMPLE_SECONDS = 5e-3, 2e-7  # one sample of the histories, and for each element
+FIELD_SECONDS = 1.4e-5  # one sample of the fields, for each element
+MODE_SOLUTIONS = 20  # solutions with one factorisation for each natural mode
 
 
 @dataclass(frozen=True, slots=True)
 class LevelForecast:
-    """Parts that take one step: their names, the step [s], steps a window, elements, cost of an update of all."""
+    """A step level of the two-scale run.
+
+    Attributes:
+        parts: Parts with more than half of their elements in the level.
+        step: Time step [s].
+        count: Steps in a window.
+        elements: Number of elements.
+        cost: Cost of an update of all of them, in updates of an assembled elastic element.
+    """
 
     parts: tuple[str, ...]
     step: float
@@ -42,26 +56,46 @@ class LevelForecast:
 
 
 @dataclass(frozen=True, slots=True)
-class ShockForecast:
-    """Scheme, time steps and wall time of the shock.
+class TwoScaleForecast:
+    """Scheme, step levels and wall time of a two-scale run.
 
     Attributes:
-        scheme: how the models of the two-scale run are coupled, and why.
-        levels: elements by the steps that they take, the window first.
-        window: step of the macro model [s].
-        substeps: m, steps of a DNS per window.
-        windows: number of windows.
-        search: predicted wall time of the windows of the run that finds the critical joints [s], zero where there is
-            none.
-        two_scale: the same of the two-scale run.
-        dns: the same of the DNS in explicit steps.
-        dns_share: of the windows, those that the DNS has.
-        share: of the simulated time, what is expected where the duration is ``auto``; the seconds are for all of it.
-        implicit: the same in implicit steps on one rank, where everything is elastic.
-        updates_per_second: element updates per second and rank that the prediction assumes.
+        scheme: Coupling scheme of the two models.
+        reason: Reason for the scheme.
+        levels: Step levels, the window first.
+        seconds: Predicted wall time of all windows [s].
     """
 
-    scheme: tuple[str, str]
+    scheme: str
+    reason: str
+    levels: tuple[LevelForecast, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShockForecast:
+    """Scheme, time steps and wall time of a shock.
+
+    Attributes:
+        scheme: Coupling scheme of the two-scale run.
+        reason: Reason for the scheme.
+        levels: Step levels of the two-scale run, the window first.
+        window: Step of the macro model [s].
+        substeps: Steps of a DNS in a window, m.
+        windows: Number of windows.
+        search: Predicted wall time of the windows of the coarse run that finds the critical joints [s], zero where
+            there is none.
+        two_scale: Predicted wall time of the windows of the two-scale run [s].
+        dns: Predicted wall time of the windows of the DNS with explicit steps [s].
+        dns_share: Share of the windows that the DNS computes.
+        share: Share of the longest duration that is expected where the duration is ``auto``; the wall times are for
+            the longest duration.
+        implicit: Predicted wall time of the DNS with implicit steps on one rank [s], for elastic materials only.
+        updates_per_second: Element updates per second and rank that the prediction assumes.
+    """
+
+    scheme: str
+    reason: str
     levels: tuple[LevelForecast, ...]
     window: float
     substeps: int
@@ -76,49 +110,52 @@ class ShockForecast:
 
     @property
     def ratio(self) -> float:
-        """Return the wall time of the two-scale run over that of a DNS of all windows."""
+        """Wall time of the two-scale run over that of a DNS of the same duration."""
         return self.two_scale * self.dns_share / self.dns
 
 
 def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> ShockForecast:
-    """Predict the scheme, the time steps and the wall time of the shock.
+    """Predict the scheme, the time steps and the wall time of a shock.
 
     Args:
-        case: the case.
-        parts: of the mesh with all joints fine.
-        share: see ``ShockForecast``.
+        case: Case of a board drop.
+        parts: Parts of the mesh with all joints fine.
+        share: Expected share of the longest duration.
+
+    Raises:
+        CaseError: The critical steps differ by more than ``shock.coupling.levels`` levels allow.
     """
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
     from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
 
     shock = case.shock
-    scheme, levels, seconds = _coupled(case, two_scale_parts(case))
-    search = _coupled(case, coarse_parts(case))[2] if shock.coupling.fine_joints == "critical" else 0.0
-    plan, dns = _direct(case, parts)
-    direct = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
-    of_dns = direct.windows / plan.windows
+    two_scale = _forecast_two_scale(case, two_scale_parts(case))
+    search = _forecast_two_scale(case, coarse_parts(case)).seconds if shock.coupling.fine_joints == "critical" else 0.0
+    plan = _plan(case, parts)
+    dns_plan = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
+    dns_share = dns_plan.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
-    slow = implicit_plan(direct, largest_implicit_step(longest_duration(case), pulses))
+    implicit = implicit_plan(dns_plan, largest_implicit_step(longest_duration(case), pulses))
     elements = sum(part.elements for part in parts.values())
-    implicit = implicit_cost(plate_nodes(elements), slow.windows * slow.substeps).seconds
     return ShockForecast(
-        scheme=scheme,
-        levels=levels,
+        scheme=two_scale.scheme,
+        reason=two_scale.reason,
+        levels=two_scale.levels,
         window=plan.window,
         substeps=plan.substeps,
         windows=plan.windows,
         search=search,
-        two_scale=seconds,
-        dns=of_dns * dns,
-        dns_share=of_dns,
+        two_scale=two_scale.seconds,
+        dns=dns_share * _dns_seconds(case, parts, plan),
+        dns_share=dns_share,
         share=share,
-        implicit=implicit,
+        implicit=implicit_cost(plate_nodes(elements), implicit.windows * implicit.substeps).seconds,
         updates_per_second=UPDATES_PER_SECOND,
     )
 
 
-def seconds_around(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
-    """Predict the wall time [s] of a run outside its windows: start, set-up, samples; ``share`` of all samples."""
+def seconds_outside_windows(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
+    """Predict the wall time [s] of start, set-up and samples of a run that takes ``share`` of all samples."""
     elements, numerics = sum(part.elements for part in parts.values()), case.shock.numerics
     histories, fields = share * numerics.history_samples, share * numerics.field_samples
     shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
@@ -126,7 +163,7 @@ def seconds_around(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> f
 
 
 def mode_seconds(case: "BoardDropCase") -> float:
-    """Predict the wall time [s] of finding the natural modes, where they are asked for."""
+    """Predict the wall time [s] of computing the natural modes; zero where the case asks for none."""
     from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
 
     if not case.shock.modes:
@@ -136,40 +173,23 @@ def mode_seconds(case: "BoardDropCase") -> float:
 
 
 def implicit_seconds(case: "BoardDropCase") -> float | None:
-    """Predict the wall time of the whole shock in implicit steps on one rank; None where something is not linear."""
+    """Predict the wall time [s] of the whole shock with implicit steps on one rank; None for a nonlinear model."""
     parts = forecast_parts(case)
     numerics = case.shock.numerics.model_copy(update={"dns_duration": None})
     whole = case.model_copy(update={"shock": case.shock.model_copy(update={"numerics": numerics})})
     return forecast_shock(whole, parts).implicit if is_linear(parts) else None
 
 
-def _slow(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
-    """Return the parts that the window follows: the board, or all that drives."""
-    driving = coarse_parts(case) if case.shock.coupling.direction == "one_way" else ()
-    return frozenset(driving or (name for name in parts if is_box(name)))
-
-
-def _plan(case: "BoardDropCase", parts: Parts):
-    """Return the windows of a mesh."""
-    from reflowshock.fem.estimates.estimate import damped_critical_step, window_plan
-
-    shock, numerics = case.shock, case.shock.numerics
-    macro = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
-    meso = min(part.scaled_step for part in parts.values())
-    macro, meso = (damped_critical_step(step, shock.damping.coefficients[1]) for step in (macro, meso))
-    return window_plan(macro, meso, numerics.step_fraction, longest_duration(case), numerics.history_samples)
-
-
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
-    """Find a pulse, or a whole shock, that ends within the first window of the two-scale run."""
-    from reflowshock.fem.estimates.estimate import damped_critical_step
+    """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run."""
+    from reflowshock.fem.division.decide import longest_window
 
-    shock, parts = case.shock, two_scale_parts(case)
-    slowest = min(parts[name].critical_step for name in _slow(case, parts) & parts.keys())
-    longest = shock.numerics.step_fraction * damped_critical_step(slowest, shock.damping.coefficients[1])
+    parts = two_scale_parts(case)
+    estimate = estimate_mesh(case, parts)
+    longest = longest_window(estimate, _rules(case, estimate))
     for key, duration, window in (
         ("shock.duration", longest_duration(case), longest),
-        ("shock.pulse_duration", shock.pulse_duration, min(longest, _plan(case, parts).window)),
+        ("shock.pulse_duration", case.shock.pulse_duration, min(longest, _plan(case, parts).window)),
     ):
         if duration is not None and duration < window:
             message = f"is shorter than one coupling window ({short(window)})"
@@ -177,139 +197,120 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
             yield Problem(key, message, short(duration), allowed)
 
 
-def _direct(case: "BoardDropCase", parts: Parts):
-    """Return windows and seconds of the windows of a DNS."""
-    from reflowshock.fem.estimates.estimate import predict_seconds
+def estimate_mesh(case: "BoardDropCase", parts: Parts) -> "MeshEstimate":
+    """Return the estimated mesh that the division needs, from the forecast parts.
 
-    plan, board = _plan(case, parts), parts[MACRO].in_boxes
-    work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
-    return plan, predict_seconds(board, [(work, plan.substeps)], plan, case.shock.ranks, at_once=True)[1]
-
-
-def _coupled(case: "BoardDropCase", parts: Parts) -> tuple[tuple[str, str], tuple[LevelForecast, ...], float]:
-    """Return scheme, levels and seconds of the windows of a two-scale run."""
-    from reflowshock.fem.estimates.estimate import IDLE_COST, predict_seconds
-
-    plan, scheme = _plan(case, parts), forecast_scheme(case, parts)
-    if scheme[0] == "local_steps":
-        ratios, pieces = _levels(case, parts, plan.window)
-    elif scheme[0] == "held_velocity" and _takes_path_levels(case):
-        ratios, pieces = _path_levels(case, parts, plan)
-    else:
-        macro = macro_parts(case, parts)
-        ratios, pieces = (plan.substeps,), [Piece(name, parts[name].elements, int(name not in macro)) for name in parts]
-    levels, count = [], 1
-    for level in range(len(ratios) + 1):
-        count *= ratios[level - 1] if level else 1
-        here = [piece for piece in pieces if piece.level == level]
-        elements = sum(piece.elements for piece in here)
-        cost = sum(piece.elements * parts[piece.part].cost for piece in here)
-        mainly = tuple(piece.part for piece in here if 2 * piece.elements > parts[piece.part].elements)
-        levels.append(LevelForecast(mainly, plan.window / count, count, elements, cost))
-    work, local = [(level.cost, level.count) for level in levels[1:]], scheme[0] == "local_steps"
-    if not local:  # one motion takes all of them, and moves those that do not act, too
-        idle = IDLE_COST * sum(level.elements * (count - level.count) for level in levels[1:])
-        work = [((sum(cost * steps for cost, steps in work) + idle) / count, count)]
-    boxes = sum(parts[name].in_boxes for name in levels[0].parts)
-    seconds = predict_seconds(boxes, work, plan, case.shock.ranks, at_once=not local)[0]
-    return scheme, tuple(levels), seconds
-
-
-def forecast_scheme(case: "BoardDropCase", parts: Parts) -> tuple[str, str]:
-    """Return the scheme of the coupling, and why; layers of board around the joints are taken to be there."""
-    from reflowshock.fem.division.division import choose_scheme
-
-    wanted = case.shock.coupling.scheme
-    if case.shock.coupling.direction == "one_way":
-        return "held_velocity", "shock.coupling.direction = one_way"
-    if wanted != "auto":
-        return wanted, f"shock.coupling.scheme = {wanted}"
-    choice = choose_scheme(is_linear(parts), buffer_possible=True)
-    return choice.scheme, choice.why
-
-
-def macro_parts(case: "BoardDropCase", parts: Parts) -> frozenset[str]:
-    """Return the parts of the macro model where each model takes one step: not the board close to the joints."""
-    return _slow(case, parts) if case.shock.coupling.direction == "one_way" else frozenset({MACRO})
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """Elements of a part that take one step, and its level."""
-
-    part: str
-    elements: int
-    level: int
-
-
-def _levels(case: "BoardDropCase", parts: Parts, window: float) -> tuple[tuple[int, ...], list[Piece]]:
-    """Return the ratios of the levels of local steps, and all parts in them, as if parts did not touch."""
-    import numpy as np
-
-    from reflowshock.fem.division.choose_levels import Pace, choose_levels
-    from reflowshock.fem.errors import LevelError
-    from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
-    from reflowshock.fem.mesh.tie import Tie
-
-    steps = np.array([part.scaled_step for part in parts.values()])
-    box = np.array([is_box(name) for name in parts])
-    cost = np.array([part.elements * part.cost for part in parts.values()]) * np.where(box, 1.0, BOARD_ADVANTAGE)
-    coupling = case.shock.coupling
-    pace = Pace(steps, cost, window, case.shock.numerics.step_fraction)
-    try:
-        level, ratios = choose_levels(
-            np.arange(len(steps), dtype=np.int32)[:, None], Tie.none(), pace, coupling.most_levels
-        )
-    except LevelError as error:
-        raise CaseError(
-            "plan", [Problem("shock.coupling.levels", str(error), coupling.levels, "auto, or more")]
-        ) from error
-    return ratios, [Piece(name, parts[name].elements, own) for name, own in zip(parts, level.tolist(), strict=True)]
-
-
-def _takes_path_levels(case: "BoardDropCase") -> bool:
-    """Whether nothing but elements and body accelerations acts on the joints' side; a large mass is on the board."""
-    springs = any(support.bedding for support in case.supports.values())
-    return not (
-        case.shock.coupling.direction == "one_way" or springs or any(case.shock.damping.coefficients) or case.cooled
-    )
-
-
-def _path_levels(case: "BoardDropCase", parts: Parts, plan: "WindowPlan") -> tuple[tuple[int, ...], list[Piece]]:
-    """Return the ratios of the levels along a path, and the parts in them as ``fem.division.path_levels`` chooses them.
-
-    Copper is next to solder, whose layers at the pads are pieces of their own; other parts do not touch here.
+    Layers of solder at the pads are rows of their own: copper touches the first, which touches the second. Other rows
+    are taken not to touch.
     """
     import numpy as np
 
-    from reflowshock.fem.division.choose_levels import Pace
-    from reflowshock.fem.division.division import Division
-    from reflowshock.fem.division.path_levels import with_path_levels
+    from reflowshock.fem.division.decide import MeshEstimate
     from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE
 
-    chain = _from_copper_on(case, parts)
-    others = [(name, part.elements) for name, part in parts.items() if name not in dict(chain)]
-    names, sizes = zip(*chain, *others, strict=True)
-    near = np.eye(len(names), dtype=bool)
-    for first in range(len(chain) - 1):
-        near[first, first + 1] = near[first + 1, first] = True
-    meso = ~np.isin(names, list(macro_parts(case, parts)))
-    steps = np.array([parts[name].scaled_step for name in names])
-    cost = np.array([BOARD_ADVANTAGE * parts[name].cost * size for name, size in zip(names, sizes, strict=True)])
-    division = with_path_levels(
-        Division("held_velocity", ~meso, meso, meso.astype(np.int32), (plan.substeps,), plan),
-        Pace(steps, cost, plan.window, case.shock.numerics.step_fraction),
-        lambda taken: meso & (near & taken).any(axis=1),
-        case.shock.coupling.most_levels,
+    layers = _pad_layers(case, parts)
+    rows = [*layers, *((name, part.elements) for name, part in parts.items() if name not in dict(layers))]
+    names, elements = [name for name, _ in rows], np.array([count for _, count in rows])
+    touching = np.eye(len(rows), dtype=bool)
+    for row in range(len(layers) - 1):
+        touching[row, row + 1] = touching[row + 1, row] = True
+    shares_matrices = np.array([is_linear(parts) and is_box(name) for name in names])
+    return MeshEstimate(
+        names=names,
+        elements=elements,
+        steps=np.array([parts[name].scaled_step for name in names]),
+        cost=elements
+        * np.array([parts[name].cost for name in names])
+        * np.where(shares_matrices, 1.0, BOARD_ADVANTAGE),
+        linear=is_linear(parts),
+        macro=np.isin(names, [MACRO]),
+        touching=touching,
     )
-    return division.ratios, [Piece(*own) for own in zip(names, sizes, division.level.tolist(), strict=True)]
 
 
-def _from_copper_on(case: "BoardDropCase", parts: Parts) -> list[tuple[str, int]]:
-    """Return the elements of copper, of the first and second layers of solder on it, and of all other solder."""
+def _pad_layers(case: "BoardDropCase", parts: Parts) -> list[tuple[str, int]]:
+    """Return copper, the two layers of solder next to it, and the other solder, each with its number of elements."""
     if "copper" not in parts or "solder" not in parts:
         return []
     solder = parts["solder"].elements
     layer = min(2 * solder // case.package.joint_numerics.layers, solder // 2)  # of all fine joints, at both pads
-    rest = solder - 2 * layer
-    return [("copper", parts["copper"].elements), ("solder", layer), ("solder", layer), ("solder", rest)]
+    return [("copper", parts["copper"].elements), ("solder", layer), ("solder", layer), ("solder", solder - 2 * layer)]
+
+
+def _rules(case: "BoardDropCase", estimate: "MeshEstimate") -> "Rules":
+    """Return the rules of the division of an estimated mesh."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from reflowshock.fem.division.division import Rules
+
+    rules = Rules.of_shock(
+        case.shock,
+        np.array([is_box(name) for name in estimate.names]),
+        longest_duration(case),
+        sprung=any(support.bedding for support in case.supports.values()),
+        cooled=case.cooled,
+    )
+    if case.shock.coupling.direction == "two_way":
+        return rules
+    copy = np.isin(estimate.names, list(coarse_parts(case)))
+    return replace(rules, copied=~copy, copy=copy)
+
+
+def _plan(case: "BoardDropCase", parts: Parts) -> "WindowPlan":
+    """Return the windows of a mesh with these parts."""
+    from reflowshock.fem.division.decide import plan_estimate
+
+    estimate = estimate_mesh(case, parts)
+    return plan_estimate(estimate, _rules(case, estimate))
+
+
+def _dns_seconds(case: "BoardDropCase", parts: Parts, plan: "WindowPlan") -> float:
+    """Return the predicted wall time [s] of all windows of a DNS."""
+    from reflowshock.fem.estimates.estimate import predict_seconds
+
+    work = sum(part.elements * part.cost for name, part in parts.items() if name != MACRO)
+    return predict_seconds(parts[MACRO].in_boxes, [(work, plan.substeps)], plan, case.shock.ranks, at_once=True)[1]
+
+
+def _forecast_two_scale(case: "BoardDropCase", parts: Parts) -> TwoScaleForecast:
+    """Return the forecast of a two-scale run with these parts."""
+    from reflowshock.fem.division.decide import divide_estimate
+    from reflowshock.fem.errors import LevelError
+    from reflowshock.fem.estimates.estimate import IDLE_COST, predict_seconds
+
+    estimate, coupling = estimate_mesh(case, parts), case.shock.coupling
+    try:
+        division = divide_estimate(estimate, _rules(case, estimate))
+    except LevelError as error:
+        problem = Problem("shock.coupling.levels", str(error), coupling.levels, "auto, or more")
+        raise CaseError("plan", [problem]) from error
+    levels = _levels(estimate, division, parts)
+    work = [(level.cost, level.count) for level in levels[1:]]
+    if not division.local:  # one motion takes the steps of all levels and moves the nodes of those at rest, too
+        count = levels[-1].count
+        idle = IDLE_COST * sum(level.elements * (count - level.count) for level in levels[1:])
+        work = [((sum(cost * steps for cost, steps in work) + idle) / count, count)]
+    boxes = sum(parts[name].in_boxes for name in levels[0].parts)
+    seconds = predict_seconds(boxes, work, division.plan, case.shock.ranks, at_once=not division.local)[0]
+    return TwoScaleForecast(division.scheme, division.why, levels, seconds)
+
+
+def _levels(estimate: "MeshEstimate", division: "Division", parts: Parts) -> tuple[LevelForecast, ...]:
+    """Return the step levels of a division."""
+    levels = []
+    for level, count in enumerate(division.counts.tolist()):
+        sizes = dict.fromkeys(parts, 0)
+        for row in (division.level == level).nonzero()[0].tolist():
+            sizes[estimate.names[row]] += int(estimate.elements[row])
+        levels.append(
+            LevelForecast(
+                parts=tuple(name for name, size in sizes.items() if 2 * size > parts[name].elements),
+                step=division.plan.window / count,
+                count=count,
+                elements=sum(sizes.values()),
+                cost=sum(size * parts[name].cost for name, size in sizes.items()),
+            )
+        )
+    return tuple(levels)

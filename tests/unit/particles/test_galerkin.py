@@ -23,6 +23,7 @@ from reflowshock.particles.ispg.rigid_motions import rigid_momenta, rigid_motion
 from reflowshock.particles.ispg.state import centre
 from reflowshock.particles.ispg.stencils import DegenerateStencil
 from reflowshock.particles.ispg.step_kernels import projected
+from reflowshock.particles.ispg.wall_forces import StepSolution, WallForces
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
@@ -54,7 +55,7 @@ def test_linear_velocities_along_the_wall_are_exact(body, space):
     slope = np.array([[0.3, -0.7, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, -0.8]])
     velocity = body.points @ slope.T + [1.0, -2.0, 0.0]
     gradient = space.gradient(velocity)
-    assert space.rough(velocity) == pytest.approx(0.0, abs=1e-9)
+    assert space.unresolved(velocity) == pytest.approx(0.0, abs=1e-9)
     assert gradient == pytest.approx(np.broadcast_to(slope, gradient.shape), abs=1e-9)
     assert space.divergence(body.points @ slope.T) == pytest.approx(0.0, abs=1e-9)
 
@@ -67,7 +68,7 @@ def test_loads_are_the_transposed(body, space):
     stress = factor[:, None, None] * (space.gradient(other) + space.gradient(other).transpose(0, 2, 1))
     viscous = space.resistance(other, np.column_stack((0.0 * factor, 0.0 * factor, factor)))
     assert (viscous * field).sum() == pytest.approx((stress * space.gradient(field)).sum())
-    assert ((force - space.shown(force)) * field).sum() == pytest.approx((force * space.rough(field)).sum())
+    assert ((force - space.distribute(force)) * field).sum() == pytest.approx((force * space.unresolved(field)).sum())
     assert (space.divergence_load(factor) * field).sum() == pytest.approx(factor @ space.divergence(field))
 
 
@@ -97,14 +98,14 @@ def test_particles_of_a_thin_film_keep_their_volumes():
 def test_a_uniform_pressure_pushes_the_surface_only(body):
     """B^T 1 is the gradient of the enclosed volume, whatever nodal integration misses."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
-    assert equations.push(np.ones(len(body.points))) == pytest.approx(body.volume()[1], abs=1e-12)
+    assert equations.pressure_forces(np.ones(len(body.points))) == pytest.approx(body.volume()[1], abs=1e-12)
 
 
 def test_linear_velocities_have_the_energy_of_the_body(body):
     """A stretch: sum of m v v, by the moments, which are soft."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     second = np.diag(body_moments(body)[2])
-    assert equations.kinetic(body.points * [1.0, 1.0, -2.0]) == pytest.approx(
+    assert equations.kinetic_energy(body.points * [1.0, 1.0, -2.0]) == pytest.approx(
         0.5 * (second @ [1.0, 1.0, 4.0]), rel=2e-3
     )
 
@@ -114,14 +115,14 @@ def test_the_projection_keeps_the_volumes(ball):
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 0.1)
     start = np.random.default_rng(4).normal(size=body.points.shape)
-    drive, none = equations.driver(), np.zeros(0)
-    push = equations.push(equations.project(start, 0.0, LaggedCholesky(), drive))
-    change = drive(push, none)
-    scale = np.abs(equations.constraint(start)).max()
-    assert equations.constraint(start + change) == pytest.approx(0.0, abs=1e-4 * scale)
-    resisted = equations.momentum(change) / 0.1 + 0.1 * equations.tension(change)
+    respond, none = equations.response(), np.zeros(0)
+    push = equations.pressure_forces(equations.pressure_correction(start, 0.0, LaggedCholesky(), respond))
+    change = respond(push, none)
+    scale = np.abs(equations.volume_rates(start)).max()
+    assert equations.volume_rates(start + change) == pytest.approx(0.0, abs=1e-4 * scale)
+    resisted = equations.momentum(change) / 0.1 + 0.1 * equations.tension_stiffness(change)
     assert resisted == pytest.approx(push, abs=1e-11 * np.abs(push).max())
-    assert np.abs(0.1 * equations.tension(change)).max() > 0.1 * np.abs(push).max()
+    assert np.abs(0.1 * equations.tension_stiffness(change)).max() > 0.1 * np.abs(push).max()
     lost = rigid_momenta(rigid_motions(body.points), equations.masses, change)
     assert lost == pytest.approx(0.0, abs=1e-10 * np.abs(push).sum())
 
@@ -137,31 +138,37 @@ def between_plates():
 def test_walls_that_move_change_the_volume(between_plates):
     """Rates of volume add up to that of the body; together with the liquid plates change none."""
     joint, twists, equations = between_plates
-    field = equations.given + np.random.default_rng(6).normal(size=joint.points.shape) * (joint.cloud.wall < 0)[:, None]
-    assert equations.constraint(field).sum() == pytest.approx((joint.volume()[1] * field).sum())
+    field = (
+        equations.prescribed
+        + np.random.default_rng(6).normal(size=joint.points.shape) * (joint.cloud.wall < 0)[:, None]
+    )
+    assert equations.volume_rates(field).sum() == pytest.approx((joint.volume()[1] * field).sum())
     together = dict.fromkeys(twists, np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]))
     equations = IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, together)
     uniform = np.broadcast_to(together[0][:3], joint.points.shape).copy()
-    assert equations.constraint(uniform) == pytest.approx(0.0, abs=1e-12)
-    assert equations.losses(uniform, uniform).viscous == pytest.approx(0.0, abs=1e-20)
+    assert equations.volume_rates(uniform) == pytest.approx(0.0, abs=1e-12)
+    assert equations.lost_power(uniform, uniform).viscous == pytest.approx(0.0, abs=1e-20)
 
 
 def test_plates_do_the_work_that_liquid_gains(between_plates):
     """What the momentum of a step takes, less what the surface, viscosity and smoothing do."""
     joint, twists, equations = between_plates
     before = np.random.default_rng(7).normal(size=joint.points.shape)
-    before = projected(equations.admitted, before) + equations.given
+    before = projected(equations.admitted, before) + equations.prescribed
     equations = replace(equations, fluid=LiquidProperties(1.0, 0.1, 3.0))
-    still, drive, none = np.zeros_like(before), equations.driver(), np.zeros(0)
-    rubbed = equations.rubbed(before, still)
-    start = equations.given + drive(equations.beyond_given(equations.momentum(rubbed) / 1e-3), none)
+    still, respond, none = np.zeros_like(before), equations.response(), np.zeros(0)
+    after_friction = equations.velocity_after_friction(before, still)
+    start = equations.prescribed + respond(
+        equations.load_without_prescribed(equations.momentum(after_friction) / 1e-3), none
+    )
     rate = float((joint.volume()[1] * start).sum())
-    pressure = equations.project(start, rate, LaggedCholesky(), drive)
-    now = start + drive(equations.push(pressure), none)
-    power = equations.power(joint, twists, equations.reaction((before, rubbed, now), still, pressure))
-    lost, inertia = equations.losses(rubbed, now), (now * equations.momentum(now - before)).sum() / 1e-3
+    pressure = equations.pressure_correction(start, rate, LaggedCholesky(), respond)
+    now = start + respond(equations.pressure_forces(pressure), none)
+    solution = StepSolution(still, before, after_friction, now, pressure)
+    power = WallForces.of(equations, solution).power(joint, twists)
+    lost, inertia = equations.lost_power(after_friction, now), (now * equations.momentum(now - before)).sum() / 1e-3
     expansion = rate * float(pressure @ equations.space.volumes) / equations.space.volumes.sum()
-    resisted = 1e-3 * float((now * equations.tension(now)).sum())
+    resisted = 1e-3 * float((now * equations.tension_stiffness(now)).sum())
     assert power + expansion == pytest.approx(inertia + resisted + lost.viscous + lost.smoothing, rel=1e-4)
 
 
@@ -170,13 +177,13 @@ def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
     joint, _, equations = between_plates
     free = Floating(1, np.vstack([LIFT, SHIFT]), np.array([0.0, 0.0, -2.0]))
     parts = joint, equations.admitted, equations.masses, equations.space.drift_of
-    riders = FloatingModes.of((free,), *parts)
-    assert riders.twists.shape == (1, 2, 6)
+    modes = FloatingModes.of((free,), *parts)
+    assert modes.twists.shape == (1, 2, 6)
     on_plate = joint.cloud.wall == 1
     lift = 1.0 / np.sqrt(equations.masses[on_plate].sum())
-    assert riders.fields[0] == pytest.approx(np.outer(on_plate, [0.0, 0.0, lift]))
-    assert riders.twists[0, 1] == pytest.approx([0.0, 0.0, lift, 0.0, 0.0, 0.0])
-    assert riders.loads == pytest.approx(-2.0 * lift)
+    assert modes.fields[0] == pytest.approx(np.outer(on_plate, [0.0, 0.0, lift]))
+    assert modes.twists[0, 1] == pytest.approx([0.0, 0.0, lift, 0.0, 0.0, 0.0])
+    assert modes.loads == pytest.approx(-2.0 * lift)
     assert FloatingModes.of((Floating(1, SHIFT, np.zeros(3)),), *parts) is None
 
 
@@ -186,11 +193,11 @@ def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
     physics = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     equations = IspgStep().prepare(joint, physics, NeighbourList(1.0, 0.0)).equations(joint, 1e-3)
     start = np.random.default_rng(9).normal(size=joint.points.shape)
-    start = projected(equations.admitted, start) + equations.space.riders.along(start)
-    drive = equations.driver()
-    pressure = equations.project(start, 0.0, LaggedCholesky(), drive)
-    field = start + drive(equations.push(pressure), equations.on_images(pressure))
-    assert equations.constraint(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.constraint(start)).max())
+    start = projected(equations.admitted, start) + equations.space.floating.along(start)
+    respond = equations.response()
+    pressure = equations.pressure_correction(start, 0.0, LaggedCholesky(), respond)
+    field = start + respond(equations.pressure_forces(pressure), equations.ghost_pressure_forces(pressure))
+    assert equations.volume_rates(field) == pytest.approx(0.0, abs=1e-4 * np.abs(equations.volume_rates(start)).max())
     change = equations.momentum(field - start)
     assert (change * field).sum() == pytest.approx(0.0, abs=1e-4 * np.abs((change * start).sum()))
     assert np.abs(equations.twists(field, [1])[1]).max() > 0.0
@@ -202,10 +209,10 @@ def test_the_pressure_equation_is_that_of_its_parts(body, between_plates):
     lifts = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     for drop, physics in ((body, water()), (joint, lifts)):
         equations = IspgStep().prepare(drop, physics, NeighbourList(1.0, 0.0)).equations(drop, 0.1)
-        pressure, drive = np.random.default_rng(11).normal(size=len(drop.points)), equations.driver()
-        whole = drive(equations.push(pressure), equations.on_images(pressure))
-        operator, _ = equations.pressure_equation(drive)
-        wanted = equations.constraint(whole)
+        pressure, respond = np.random.default_rng(11).normal(size=len(drop.points)), equations.response()
+        whole = respond(equations.pressure_forces(pressure), equations.ghost_pressure_forces(pressure))
+        operator, _ = equations.pressure_equation(respond)
+        wanted = equations.volume_rates(whole)
         assert operator(pressure) == pytest.approx(wanted, abs=1e-10 * np.abs(wanted).max())
 
 
@@ -213,7 +220,7 @@ def test_the_pressure_matrix_is_that_of_its_operator(body, space):
     """In single precision, scaled; walls admit no velocity across them."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-6)
     balanced, count = replace(equations, unbalanced=np.zeros_like(body.points)), len(body.points)
-    operator, matrix = balanced.pressure_equation(balanced.driver())
+    operator, matrix = balanced.pressure_equation(balanced.response())
     band, order = matrix(), space.order
     assert band.rows[:, -1] == pytest.approx(1.0, abs=1e-6)
     width = band.rows.shape[1]
@@ -312,7 +319,7 @@ def test_no_mode_of_the_linearised_scheme_grows(ball):
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     units = np.eye(body.points.size).reshape(-1, *body.points.shape)
     root = np.repeat(equations.masses, 3) ** -0.5
-    free = null_space(np.array([equations.constraint(unit) for unit in units]).T * root, rcond=1e-9)
+    free = null_space(np.array([equations.volume_rates(unit) for unit in units]).T * root, rcond=1e-9)
     squares, modes = np.linalg.eigh(free.T @ (root[:, None] * stiffness(body) * root) @ free)
     assert squares.min() > -1e-8
     shears = [np.eye(3)[:, [k]] * np.eye(3)[k - 1] for k in range(3)]
@@ -357,7 +364,7 @@ def test_a_zigzag_of_the_surface_dies_away(ball):
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     signs = np.linalg.svd(equations.space.shape.toarray()[:count, :count])[2][-1]
     zigzag[:count] = signs[:, None] * normals
-    shown = zigzag - equations.space.rough(zigzag)
+    shown = zigzag - equations.space.unresolved(zigzag)
     assert np.abs((shown[:count] * normals).sum(axis=1)).max() < 0.1 * np.abs(signs).max()
     height = 0.02 * body.cloud.spacing / np.abs(signs).max()
 

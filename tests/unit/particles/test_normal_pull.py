@@ -8,7 +8,7 @@ import pytest
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.ispg.normal_forces import normal_pull, tangential_share
+from reflowshock.particles.ispg.normal_forces import normal_surface_force, tangential_share
 from reflowshock.particles.ispg.rigid_motions import edges_are_coaxial, rigid_momenta, rigid_motions
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import SurfaceTension
@@ -30,7 +30,7 @@ def body():
 def test_net_force_and_moment_stay(body):
     physics, masses = Physics((SurfaceTension(1.0),), (), (), (), (), holds=(NoSlip(),)), np.ones(len(body.points))
     motions, whole = rigid_motions(body.points)[ALONG_WALL], physics.force(body)
-    pull = normal_pull(body, physics, masses)
+    pull = normal_surface_force(body, physics, masses)
     assert rigid_momenta(motions, masses, pull) == pytest.approx(rigid_momenta(motions, masses, whole), abs=1e-12)
     assert np.abs(pull - whole).max() > 0.01 * np.abs(whole).max()
 
@@ -38,7 +38,7 @@ def test_net_force_and_moment_stay(body):
 def test_nothing_pulls_along_the_surface_but_a_swirl(body):
     physics, count = Physics((SurfaceTension(1.0),), (), (), (), ()), body.cloud.surface_count
     masses = np.ones(len(body.points))
-    pull = physics.admit(body, normal_pull(body, physics, masses))
+    pull = physics.admit(body, normal_surface_force(body, physics, masses))
     normal = physics.admit(body, body.volume()[1])[:count]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     swirl = (
@@ -56,7 +56,7 @@ def test_fast_strain_keeps_all_of_the_forces(body):
     still, fast = np.zeros((3, 3, 3)), np.broadcast_to(np.diag([1.0, -1.0, 0.0]), (3, 3, 3))
     assert (tangential_share(still, 1.0), tangential_share(fast, 1.0)) == (0.0, 1.0)
     assert 0.0 < tangential_share(0.01 * fast, 1.0) < 1.0
-    whole = normal_pull(body, physics, np.ones(len(body.points)), kept=1.0)
+    whole = normal_surface_force(body, physics, np.ones(len(body.points)), share=1.0)
     assert whole == pytest.approx(physics.force(body), abs=1e-12)
 
 

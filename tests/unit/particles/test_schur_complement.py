@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from reflowshock.particles.discretisation.effective_mass import EffectiveMass
-from reflowshock.particles.discretisation.schur_complement import SchurComplement, VolumeRateRows
+from reflowshock.particles.discretisation.schur_complement import LowRank, SchurComplement, VolumeRateRows
 
 COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, those of the surface
 
@@ -30,9 +30,10 @@ def test_it_is_the_dense_matrix():
     surface = sparse.bsr_matrix(stiffness[: 3 * MOVED, : 3 * MOVED], blocksize=(3, 3))
     found = SchurComplement.of(
         VolumeRateRows(pairs.indptr.astype(np.int64), pairs.indices, entries),
-        (shares, gradient),
+        shares,
+        gradient,
         EffectiveMass.of(masses, surface, rigid, TIME_STEP),
-        (columns, core),
+        LowRank(columns, core),
     )
     pressures = random.normal(size=COUNT)
     np.testing.assert_allclose(found(pressures), expected @ pressures, rtol=1e-10)

@@ -16,7 +16,7 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     forecast_shock,
     implicit_seconds,
     mode_seconds,
-    seconds_around,
+    seconds_outside_windows,
 )
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
@@ -51,7 +51,7 @@ def test_linear_elements_take_local_steps_from_the_window_down():
 
 def test_copper_at_its_true_mass_takes_a_level_of_its_own():
     shock = predicted("shock.numerics.mass_scaled=[]")
-    assert shock.scheme[0] == "local_steps"
+    assert shock.scheme == "local_steps"
     assert shock.levels[-1].parts == ("copper",)
     assert shock.levels[-1].step <= 0.9 * forecast_parts(read_case(SMALL_CASE))["copper"].critical_step
 
@@ -73,7 +73,7 @@ def test_one_level_is_one_ratio():
 @pytest.mark.parametrize("setting", ["shock.numerics.plasticity=on", "shock.numerics.kinematics=finite"])
 def test_what_has_a_path_is_driven_by_held_velocity(setting):
     shock = predicted(setting)
-    assert shock.scheme[0] == "held_velocity"
+    assert shock.scheme == "held_velocity"
     assert shock.levels[0].parts == ("board",)
     assert shock.levels[-1].count >= shock.substeps
     assert implicit_seconds(read_case(SMALL_CASE, [setting])) is None
@@ -128,7 +128,7 @@ def test_no_more_levels_than_the_kernels_have_paces():
 
 
 def test_the_wanted_scheme_is_taken():
-    assert predicted("shock.coupling.scheme=held_velocity").scheme[0] == "held_velocity"
+    assert predicted("shock.coupling.scheme=held_velocity").scheme == "held_velocity"
 
 
 def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
@@ -143,7 +143,7 @@ def test_an_elastic_drop_has_an_implicit_cost_to_compare_with():
 def test_one_way_the_coarse_model_takes_the_window_of_all_its_parts():
     shock = predicted("shock.coupling.direction=one_way", "shock.coupling.fine_joints=['A4']")
     macro, meso = shock.levels
-    assert shock.scheme[0] == "held_velocity"
+    assert shock.scheme == "held_velocity"
     assert "die" in macro.parts
     assert meso.parts == ("solder", "copper")
     assert macro.step < predicted().window
@@ -153,7 +153,7 @@ def test_what_lies_around_windows_counts():
     """Start-up, set-up and samples: a run of few windows takes seconds all the same."""
     case = read_case(SMALL_CASE)
     parts = forecast_parts(case)
-    assert seconds_around(case, parts) > seconds_around(case, parts, share=0.1) > SECONDS_TO_START
+    assert seconds_outside_windows(case, parts) > seconds_outside_windows(case, parts, share=0.1) > SECONDS_TO_START
     assert forecast(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
 
 

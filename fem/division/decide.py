@@ -1,0 +1,158 @@
+"""Decisions on scheme, windows and step levels, from critical steps and costs of cells alone.
+
+``divide`` decides for the cells of a mesh. ``divide_estimate`` decides for a mesh that is not built yet, in which each
+part, or each layer of a part, counts as one cell. The module loads no compiled code, so that ``plan`` can ask it.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
+from reflowshock.fem.division.choose_levels import Pace, choose_levels
+from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
+from reflowshock.fem.division.path_levels import Around, with_path_levels
+from reflowshock.fem.errors import CouplingError
+from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
+from reflowshock.fem.mesh.tie import Tie
+
+
+@dataclass(frozen=True, slots=True)
+class MeshEstimate:
+    """Parts of a mesh that is not built yet; the layers of a part may be rows of their own.
+
+    Attributes:
+        names: Part of each row.
+        elements: Elements of each row, shape (n,).
+        steps: Critical step of each row with mass scaling, shape (n,) [s].
+        cost: Cost of an update of all elements of each row, in updates of a box, shape (n,).
+        linear: Whether all forces are linear in the displacement.
+        macro: Rows of the macro model where each model takes one step, shape (n,).
+        touching: Which rows share nodes, shape (n, n).
+    """
+
+    names: Sequence[str]
+    elements: NDArray[np.int64]
+    steps: NDArray[np.float64]
+    cost: NDArray[np.float64]
+    linear: bool
+    macro: NDArray[np.bool_]
+    touching: NDArray[np.bool_]
+
+
+def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_buffer: Callable[[], bool]) -> Choice:
+    """Return the coupling scheme that the user sets or that the problem calls for, with the reason.
+
+    Args:
+        rules: Rules of the division.
+        steps: Critical steps of all cells, shape (ne,) [s].
+        linear: Whether all forces are linear in the displacement.
+        has_buffer: Returns whether layers of board fit between the joints and the macro model.
+
+    Raises:
+        CouplingError: Local steps are set, and supports have springs.
+    """
+    setting = rules.coupling.scheme
+    if setting == "local_steps" and rules.sprung:
+        raise CouplingError(
+            "coupling.scheme = local_steps does not support springs at supports; use held_velocity or impulse"
+        )
+    if rules.copied is not None:
+        return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
+    if setting != "auto":
+        return Choice(setting, f"coupling.scheme = {setting}")
+    board_step = float(steps[rules.coarse].min(initial=np.inf))
+    lightly_damped = rules.stiffness <= LARGEST_DAMPING * rules.fraction * board_step
+    choice = choose_scheme(linear and lightly_damped and not rules.sprung, has_buffer())
+    if linear and rules.sprung:
+        return Choice(choice.scheme, "local steps do not support springs at supports")
+    if linear and not lightly_damped:
+        return Choice(
+            choice.scheme, f"stiffness-proportional damping of {rules.stiffness:.3g} s is too large for local steps"
+        )
+    return choice
+
+
+def plan_windows(rules: Rules, slow: NDArray[np.bool_], steps: NDArray[np.float64]) -> WindowPlan:
+    """Return windows and substeps of two models that take one step each.
+
+    Args:
+        rules: Rules of the division.
+        slow: Cells that take the window, shape (ne,); all cells where there are none.
+        steps: Critical steps of all cells, shape (ne,) [s].
+    """
+    damped = damped_critical_step(steps, rules.stiffness)
+    return rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
+
+
+def in_two_steps(scheme: SchemeName, macro: NDArray[np.bool_], meso: NDArray[np.bool_], plan: WindowPlan) -> Division:
+    """Return the division of a scheme whose models, masks of shape (ne,), take one step each."""
+    return Division(scheme, macro, meso, meso.astype(np.int32), (plan.substeps,), plan)
+
+
+def in_local_steps(cells: NDArray[np.int32], tie: Tie, pace: Pace, plan: WindowPlan, most_levels: int) -> Division:
+    """Return the division in levels of least cost inside a window.
+
+    Args:
+        cells: Nodes of the cells, shape (ne, k).
+        tie: Tied nodes.
+        pace: Critical steps and costs of the cells.
+        plan: Windows; the substeps follow from the levels.
+        most_levels: Largest number of levels below the window.
+
+    Raises:
+        LevelError: The critical steps differ by more than the levels allow.
+    """
+    level, ratios = choose_levels(cells, tie, pace, most_levels)
+    return Division("local_steps", level == 0, level > 0, level, ratios, replace(plan, substeps=math.prod(ratios)))
+
+
+def in_path_levels(division: Division, rules: Rules, pace: Pace, around: Around) -> Division:
+    """Return a division of held velocity with step levels in its meso model; arguments as ``with_path_levels``."""
+    return with_path_levels(division, pace, around, rules.coupling.most_levels)
+
+
+def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
+    """Return the division of an estimated mesh, whose masks and levels have shape (n,), one for each row.
+
+    Layers of board are taken to fit around the joints. The window of local steps is that of the board's elements;
+    ``divide`` also tries shorter ones.
+
+    Args:
+        estimate: Parts of the mesh.
+        rules: Rules of the division, whose masks have shape (n,).
+
+    Raises:
+        CouplingError: Local steps are set, and supports have springs.
+        LevelError: The critical steps differ by more than the levels allow.
+    """
+    choice = decide_scheme(rules, estimate.steps, estimate.linear, lambda: True)
+    macro = estimate.macro if rules.copied is None else ~rules.copied
+    plan = plan_estimate(estimate, rules)
+    pace = Pace(estimate.steps, estimate.cost, plan.window, rules.fraction)  # damping changes the levels little
+    division = in_two_steps(choice.scheme, macro, ~macro, plan)
+    if choice.scheme == "local_steps":
+        cells = np.arange(len(estimate.names), dtype=np.int32)[:, None]
+        division = in_local_steps(cells, Tie.none(), pace, plan, rules.coupling.most_levels)
+    elif choice.scheme == "held_velocity" and rules.copied is None and not rules.pushed:
+        division = in_path_levels(division, rules, pace, lambda cells: ~macro & (estimate.touching & cells).any(axis=1))
+    return replace(division, why=choice.why)
+
+
+def slow_rows(rules: Rules) -> NDArray[np.bool_]:
+    """Return the rows of an estimated mesh that take the window, shape (n,): the board, one way all that drives."""
+    return rules.coarse if rules.copied is None else ~rules.copied
+
+
+def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
+    """Return windows and substeps of an estimated mesh; the substeps are those of a DNS."""
+    return plan_windows(rules, slow_rows(rules), estimate.steps)
+
+
+def longest_window(estimate: MeshEstimate, rules: Rules) -> float:
+    """Return the longest window [s] that the elements of an estimated mesh allow, for runs of any duration."""
+    slow = damped_critical_step(estimate.steps[slow_rows(rules)], rules.stiffness)
+    return rules.fraction * float(slow.min())
