@@ -166,7 +166,7 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    if any(len(line.held_pads()) > 1 for line in lines):
+    if any(len(line.wetted_pads()) > 1 for line in lines):
         return "bridged"
     with_edge = [line for line in lines if line.has_edge]
     if any((line.state == ON_MASK).any() for line in with_edge):
