@@ -15,8 +15,8 @@ from reflowshock.fem.forces.force import Kinematics, force_terms
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Constant, HalfSine
-from reflowshock.fem.materials.library import FR4, SAC305
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.library import FR4, SAC305
+from reflowshock.materials.parameters import Material
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.particles.parameters.solder import Solder

@@ -29,7 +29,6 @@ from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.modal import natural_modes
 from reflowshock.fem.elements.element import critical_steps
 from reflowshock.fem.forces.force import Kinematics
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
@@ -37,6 +36,7 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.parameters import Isotropic
 
 NAME = "element_accuracy"
 NAMES = {

@@ -22,7 +22,7 @@ from benchmarks.support import results
 from benchmarks.support.drop_scene import CASES, DropScene
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.workflow.convergence.errors import richardson
-from reflowshock.workflow.convergence.packages import package_study
+from reflowshock.workflow.convergence.packages import board_drop_study
 from reflowshock.workflow.pipeline.reader import read_case
 
 RESULTS = "halved_drop"
@@ -46,7 +46,7 @@ Measures = dict[str, float]
 
 def scene_at(size: float, folder: Path) -> DropScene:
     """Mesh the scene with elements so many times as long."""
-    run = package_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].at(size)
+    run = board_drop_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].run_at(size)
     sized = (f"{key}={value}" for key, value in run.settings.items() if key.startswith(("board.", "package.")))
     return DropScene.write(folder, (*SCENE, *sized), NAME)
 

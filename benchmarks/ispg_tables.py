@@ -208,16 +208,16 @@ def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]
     match case:
         case DropCase():
             found = drop_to_rest(case.drop, case.molten)
-            findings = stages.of_drop(found.shape.metrics, found.shape.verdict, found.effects)
+            findings = stages.judge_drop(found.shape.metrics, found.shape.verdict, found.effects)
         case JointCase():
             found = joint_to_rest(case.joint, case.molten)
-            findings = stages.of_joint(found.shape.metrics, found.shape.verdict, found.effects)
+            findings = stages.judge_joint(found.shape.metrics, found.shape.verdict, found.effects)
         case DropsCase():
             found = pair_to_rest(case.drops, case.molten)
-            findings = stages.of_drops(found.shape.metrics, 1, found.effects)
+            findings = stages.judge_drops(found.shape.metrics, 1, found.effects)
         case OscillationCase():
             found = solve_oscillation(case.oscillation, case.molten)
-            findings = stages.of_oscillation(found.metrics, {})
+            findings = stages.judge_oscillation(found.metrics, {})
     return findings.metrics, findings.health
 
 

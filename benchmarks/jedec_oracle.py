@@ -28,7 +28,6 @@ from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.estimates.solver_cost import box_factor, forecast_solvers
-from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.compare_structures import solver_differences
@@ -36,6 +35,7 @@ from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
 from reflowshock.fem.run.dynamics import make_history, make_participants
 from reflowshock.fem.run.structure import StructureDynamics
+from reflowshock.materials.library import FR4
 from reflowshock.meshing.board.box import write_box
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 

@@ -58,10 +58,10 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
-from reflowshock.fem.materials.parameters import JohnsonCook, Material
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, make_body
 from reflowshock.fem.output.compare import compare_histories
+from reflowshock.materials.parameters import JohnsonCook, Material
 from tests.support.fem_tangent import flowing_pair
 
 BUILD = results.FOLDER.parents[1] / "build"

@@ -25,8 +25,8 @@ from benchmarks.support.cube import STEEL, cube, elements_of
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.materials.parameters import Isotropic
 
 FOLDER = Path(__file__).parents[1] / "build" / "peers"
 PYTHON = FOLDER / "venv" / "bin" / "python"

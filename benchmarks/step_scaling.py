@@ -28,10 +28,10 @@ from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import Load, half_sine_drop
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.materials.roles import Materials
 from reflowshock.workflow.process.launch import mpi_command
 
 ROUNDS, CALLS = 40, 10

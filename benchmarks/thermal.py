@@ -26,9 +26,6 @@ from petsc4py import PETSc
 from benchmarks.support import results
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem import dolfinx_api
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SILICON
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.problem.thermal import Thermal
@@ -37,6 +34,9 @@ from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.fem.statics.thermal_tables import thermal_tables
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SILICON
+from reflowshock.materials.roles import ELASTIC
 from reflowshock.meshing.board.assembly import write_assembly, write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.workflow.pipeline.reader import read_case

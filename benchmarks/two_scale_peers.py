@@ -27,14 +27,14 @@ from benchmarks.peers import FOLDER, Peer, install, model_arrays
 from benchmarks.support import results, turns
 from benchmarks.support.conforming_package import MATERIALS, conforming_package
 from benchmarks.support.program_run import ProgramRun
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.parameters import JohnsonCook
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.mesh.watch_table import centre_nodes
 from reflowshock.fem.output.compare import relative_error
 from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.parameters import JohnsonCook
+from reflowshock.materials.roles import Materials
 from tests.support.fem_models import write_msh
 
 PULSE, DURATION, SAMPLES = 1e-5, 2e-5, 200  # [s]

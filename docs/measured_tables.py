@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.convergence.measured import read_accuracy
+from reflowshock.workflow.convergence.accuracy_file import read_accuracy
 from reflowshock.workflow.convergence.page import PICTURE, markdown
 
 ROOT = Path(__file__).resolve().parent.parent

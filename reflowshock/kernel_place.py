@@ -22,7 +22,7 @@ from reflowshock.sources import digest_of_sources
 VARIABLE = "NUMBA_CACHE_DIR"
 CACHING = "numba.core.caching"
 ROOT = Path(__file__).parent
-PACKAGES = ("fem", "particles")  # those with kernels
+PACKAGES = ("fem", "materials", "particles")  # packages whose functions are compiled
 OWN = tuple(f"{__package__}.{name}." for name in PACKAGES)
 
 

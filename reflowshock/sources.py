@@ -3,6 +3,8 @@
 import hashlib
 from pathlib import Path
 
+MATERIALS = Path(__file__).parent / "materials"  # laws that solvers compile
+
 
 def digest_of_sources(*folders: Path) -> bytes:
     """Return a digest of all Python files below some folders: constants and decorators of a kernel are anywhere."""

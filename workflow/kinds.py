@@ -23,7 +23,7 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STAGE, Size
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import StageFunction
-from reflowshock.workflow.convergence.series import ConvergenceStudy
+from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy
 from reflowshock.workflow.flows.flow_kind import STAGE as FLOW_STAGE
 from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
 from reflowshock.workflow.flows.forecast import flow_size, flow_tables, forecast_flow
@@ -34,7 +34,7 @@ from reflowshock.workflow.reflow.stage import reflow
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.solder import case as solder_case
 from reflowshock.workflow.solder import stages as solder_stages
-from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase
+from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SolderCase
 from reflowshock.workflow.solder.forecast import forecast_solder, solder_size, solder_tables
 from reflowshock.workflow.structure import forecast as structure_forecast
 from reflowshock.workflow.structure import stages as structure_stages
@@ -117,17 +117,30 @@ def _structure_report(run_folder: Path, case: StructureCase, context: dict, summ
     add_structure(run_folder, case, context, summary["metrics"])
 
 
-def _solder_report(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
+def _solder_report(run_folder: Path, case: SolderCase, context: dict, summary: dict) -> None:
     if (run_folder / "reflow/shape.h5").exists():
         from reflowshock.workflow.solder.report import add_solder
 
         add_solder(run_folder, case, context, summary)
 
 
+def _oscillation_report(run_folder: Path, case: OscillationCase, context: dict, summary: dict) -> None:
+    if (run_folder / "reflow/shape.h5").exists():
+        from reflowshock.workflow.solder.report import add_oscillation
+
+        add_oscillation(run_folder, case, context, summary)
+
+
 def _package_study(case: PackageCase) -> ConvergenceStudy:
     from reflowshock.workflow.convergence.packages import package_study
 
     return package_study(case)
+
+
+def _board_drop_study(case: BoardDropCase) -> ConvergenceStudy:
+    from reflowshock.workflow.convergence.packages import board_drop_study
+
+    return board_drop_study(case)
 
 
 def _structure_study(case: StructureCase) -> ConvergenceStudy:
@@ -211,6 +224,7 @@ BOARD_DROP = replace(
     stages={**PACKAGE.stages, "shock": package_stages.shock},
     acts="reflow and shock",
     report=_board_drop_report,
+    study=_board_drop_study,
     effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
     conclude=_conclude_drop,
 )
@@ -232,10 +246,13 @@ STRUCTURE = Kind(
 )
 KINDS = (
     BOARD_DROP,
-    _solder_kind(DropCase, solder_case.of_drop, solder_stages.reflow_drop),
-    _solder_kind(JointCase, solder_case.of_joint, solder_stages.reflow_joint),
-    _solder_kind(DropsCase, solder_case.of_drops, solder_stages.reflow_drops),
-    _solder_kind(OscillationCase, solder_case.of_oscillation, solder_stages.reflow_oscillation),
+    _solder_kind(DropCase, solder_case.check_drop, solder_stages.reflow_drop),
+    _solder_kind(JointCase, solder_case.check_joint, solder_stages.reflow_joint),
+    _solder_kind(DropsCase, solder_case.check_drops, solder_stages.reflow_drops),
+    replace(
+        _solder_kind(OscillationCase, solder_case.check_oscillation, solder_stages.reflow_oscillation),
+        report=_oscillation_report,
+    ),
     STRUCTURE,
     *map(_flow_kind, FLOWS),
     PACKAGE,

@@ -119,15 +119,15 @@ class PredictedCost:
 
 def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> dict[str, PredictedCost]:
     """Correct predicted wall times [s] of stages by what accuracy measured of the case here, or else by former runs."""
-    from reflowshock.workflow.convergence.calibration import Calibration, calibration_in, calibration_of
+    from reflowshock.workflow.convergence.calibration import Calibration, calibration_from_store, calibration_from_study
 
-    study, former = calibration_of(case) or Calibration({}, 0), calibration_in(store, seconds)
+    study, former = calibration_from_study(case) or Calibration({}, 0), calibration_from_store(store, seconds)
     costs = {}
     for stage, forecast in seconds.items():
         known, source = former, FORMER
-        if study.knows(stage):
+        if study.covers(stage):
             known, source = study, f" (measured: accuracy, {study.points} points)"
-        costs[stage] = PredictedCost(known.seconds(stage, forecast), source if known.knows(stage) else "")
+        costs[stage] = PredictedCost(known.corrected(stage, forecast), source if known.covers(stage) else "")
     return costs
 
 

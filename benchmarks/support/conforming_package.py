@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from reflowshock.cases.hard.trials.grids import CYCLIC, grid, mesh_of, on
-from reflowshock.fem.materials.library import COPPER, SAC405, SILICON
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets, without_unused_nodes
+from reflowshock.materials.library import COPPER, SAC405, SILICON
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 
 # Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.
 BOARD = Isotropic(density=1910.0, young_modulus=27.9e9, poisson_ratio=0.11)

@@ -7,8 +7,8 @@ from reflowshock.cases.hard.trials.boxes import elements_of as material_elements
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.elements.box_step import diagonal_tetrahedra
 from reflowshock.fem.elements.element import Elements
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
 EDGE = 40
 LENGTH = 0.04  # [m]

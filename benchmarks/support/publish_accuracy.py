@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from reflowshock.workflow.convergence.measured import FILE
+from reflowshock.workflow.convergence.accuracy_file import FILE
 from reflowshock.workflow.convergence.page import PICTURE
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,11 +17,11 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.forces.force_ufl import Law
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic
 
 MM, MS, G = 1e-3, 1e-3, 9.81
 SHEAR, BULK = 2e6, 40e6  # of the potting, slow [Pa]

@@ -33,13 +33,13 @@ from reflowshock.fem.estimates.placement import (
     model_seconds,
     shared,
 )
-from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.setup.models import Divided
+from reflowshock.materials.roles import materials_of_parts
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
 KEPT = "speeds.json"

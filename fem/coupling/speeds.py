@@ -18,9 +18,9 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.forces.force import ForceTerm, force_terms
 from reflowshock.fem.forces.force_congruent import is_box
 from reflowshock.fem.kernels.motion import advance
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData, without_unused_nodes
+from reflowshock.fem.problem.kinematics import Kinematics
+from reflowshock.materials.parameters import Material
 
 FAMILIES = ("box", "assembled", "path", "turning_box", "turning")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share

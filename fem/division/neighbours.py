@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.mesh.column import CYCLIC
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets, without_unused_nodes
 from reflowshock.fem.problem.fittings import Neighbour
+from reflowshock.materials.roles import role_of_part
 
 CLOSE = 0.2  # of the pitch: lines that are as close would make elements too small
 ROUNDING = 1e-9  # of a neighbour: closer than that is the same place

@@ -14,15 +14,14 @@ from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, UPDATES_PER_SECOND
 from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 from reflowshock.fem.forces.force_congruent import is_box
-from reflowshock.fem.materials.elasticity import materials_of_parts, role_of_part
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.column import COLUMN
 from reflowshock.fem.mesh.facet import spring_rates
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.problem.fittings import Support
+from reflowshock.fem.problem.kinematics import Kinematics
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.roles import Materials, materials_of_parts, role_of_part
 
 IN_COLUMN = "column"  # what of board and substrate stands in the columns of fine joints
 

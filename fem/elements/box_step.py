@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry, element_kind
 from reflowshock.fem.elements.tetrahedron import EDGES
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.parameters import Material
 
 CORNERS = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)], dtype=float)  # tensor order
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import Elements, element_kind
 from reflowshock.fem.elements.hexahedron import HEXAHEDRON
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.parameters import Material
 
 
 def elements_of(

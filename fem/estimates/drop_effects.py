@@ -13,11 +13,11 @@ from reflowshock.fem.estimates.material_effects import (
     plastic_laws,
     yields,
 )
-from reflowshock.fem.materials.kinematics import Kinematics, finite_rotation
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.failure import Failure
+from reflowshock.fem.problem.kinematics import Kinematics, finite_rotation
 from reflowshock.fem.problem.shock import Shock
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.parameters import Material
 from reflowshock.parameters import changed
 
 NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.estimates.placement import ModelCost, WindowCost, least_seconds
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.shock import Ranks
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.parameters import Material
 
 # Element updates per second and core of a whole substep (force, update, tie) of elements whose matrix is assembled, as
 # those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.

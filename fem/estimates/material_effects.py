@@ -5,7 +5,7 @@ from math import log
 from typing import Protocol
 
 from reflowshock.effect import Decision, Effect, decision
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
 RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
 
@@ -62,7 +62,7 @@ class StrainRate(MaterialEffect):
     number = "C"
     threshold = 0.0
     influence = f"C ln(p' / p0') of the yield stress at p' = {RATE_OF_DROPS:g} 1/s"
-    place = "reflowshock.fem.kernels.plasticity.plastic_increment"
+    place = "reflowshock.materials.plasticity.plastic_increment"
     switch = "materials.*.plasticity.C"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
@@ -84,7 +84,7 @@ class ThermalSoftening(MaterialEffect):
     number = "T*^m"
     threshold = 0.0
     influence = "T*^m of the yield stress"
-    place = "reflowshock.fem.materials.parameters.JohnsonCook"
+    place = "reflowshock.materials.parameters.JohnsonCook"
     switch = "materials.*.temperature"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from reflowshock.effect import Decision, Effect, Toggle, decided, decision
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
-from reflowshock.fem.materials.kinematics import finite_rotation
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.problem.kinematics import finite_rotation
 from reflowshock.fem.problem.structure import KINDS, Pulsed, StructureProblem
+from reflowshock.materials.parameters import Material
 
 
 @dataclass(frozen=True, slots=True)

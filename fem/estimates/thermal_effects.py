@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import pi
 
 from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.thermal import KELVIN, Thermal
+from reflowshock.materials.parameters import Material
 
 NEGLIGIBLE = 1e-3  # of the gap, or of the pad's radius across it: below it an effect is left out
 MARGIN = 1.25  # on the bow: a ring of substrate around the die, which the die holds back, bends it by up to that much

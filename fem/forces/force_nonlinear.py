@@ -35,8 +35,8 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
-from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
 from reflowshock.fem.parallel.portable import Rows
+from reflowshock.materials.plasticity import NEVER_YIELDS
 
 AnyBlocks = Blocks | OnePointBlocks | HexahedronBlocks
 HISTORY = {  # name in checkpoints -> array of blocks that have it
@@ -82,7 +82,7 @@ class NonlinearElements:
         Args:
             everything: The elements of a rank.
             chosen: ``(ne,)`` which of them.
-            plastic: ``(nm, 6)`` rows of ``kernels.plasticity.plastic_constants``.
+            plastic: ``(nm, 6)`` rows of ``materials.plasticity.plastic_constants``.
             path: Kinematics and step.
         """
         elements = everything.subset(chosen)

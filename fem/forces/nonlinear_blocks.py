@@ -85,7 +85,7 @@ def alike(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, N
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
-    """Return tetrahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
+    """Return tetrahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
     gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
     weight = determinant / (6.0 * determinant.shape[1])
@@ -100,7 +100,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return one-point hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
+    """Return one-point hexahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     shapes = elements.subset(lanes.shape)
     volume = element_geometry(shapes.points, shapes.cells).volume
     return OnePointBlocks(
@@ -145,7 +145,7 @@ def in_modes(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> HexahedronBlocks:
-    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``kernels.plasticity``."""
+    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
     weight = np.linalg.det(np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True))

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.hexahedron import add_product, condense, copy_square, new_strain_bench, write_strains
 from reflowshock.fem.kernels.nonlinear_one_point import carried
-from reflowshock.fem.kernels.plasticity import FIRST_YIELD, plastic_increment, yield_stress
+from reflowshock.fem.kernels.plasticity import plastic_increment, yield_stress
+from reflowshock.materials.plasticity import FIRST_YIELD
 
 NODAL, ALL = 24, 33  # components of a hexahedron at its nodes, and with its incompatible modes
 MODE_ITERATIONS = 60
@@ -250,7 +251,7 @@ def hourglass_share(points, stress, laws, share):
     Args:
         points: ``(ne, 1, 7)`` stress [Pa] and plastic strain of the centres.
         stress: ``(ne,)`` [Pa] elastic hourglass stress.
-        laws: ``(ne, 6)``, see ``kernels.plasticity.plastic_constants``.
+        laws: ``(ne, 6)``, see ``materials.plasticity.plastic_constants``.
         share: Result.
     """
     for e in range(len(stress)):

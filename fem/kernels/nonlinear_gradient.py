@@ -38,7 +38,7 @@ class Blocks(NamedTuple):
         pattern: ``(nb,)`` int32 index into the arrays that depend on the shape.
         material: ``(nb,)`` int32, one material a block.
         elastic: ``(nm, 9)`` [Pa], see ``kernels.nonlinear.elastic_stress``.
-        plastic: ``(nm, 6)``, see ``kernels.plasticity.plastic_constants``.
+        plastic: ``(nm, 6)``, see ``materials.plasticity.plastic_constants``.
         gradient: ``(np, m, 48 k)`` [1/m] gradients of the shape functions.
         weight: ``(np, m, 16)`` [m^3] volume of each point.
         state: ``(nb, m, 16 * 13)``, see ``kernels.nonlinear``.

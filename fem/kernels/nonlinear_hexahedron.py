@@ -59,7 +59,7 @@ from reflowshock.fem.kernels.nonlinear_modes import (
 )
 from reflowshock.fem.kernels.nonlinear_parent import EDGES, places, write_edges, write_fit, write_modes
 from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
-from reflowshock.fem.kernels.plasticity import FIRST_YIELD
+from reflowshock.materials.plasticity import FIRST_YIELD
 
 CORNERS = 21 * LANES  # entries of positions but for their mean
 MODES = 24 * LANES

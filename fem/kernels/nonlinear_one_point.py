@@ -44,7 +44,7 @@ from reflowshock.fem.kernels.nonlinear import (
 )
 from reflowshock.fem.kernels.nonlinear_gradient import FINE
 from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
-from reflowshock.fem.kernels.plasticity import FIRST_YIELD, yield_stress
+from reflowshock.fem.kernels.plasticity import yield_stress
 from reflowshock.fem.kernels.turned_hexahedron import (
     SHIFT,
     SLOTS,
@@ -57,6 +57,7 @@ from reflowshock.fem.kernels.turned_hexahedron import (
     write_mean_deformation,
     write_resistance,
 )
+from reflowshock.materials.plasticity import FIRST_YIELD
 
 AMPLITUDES = 12 * LANES
 BENDING_STRENGTH = np.sqrt(0.75)  # 3/2 of the yield stress at the faces of a section, as a root mean square

@@ -14,14 +14,8 @@ from numba.extending import intrinsic
 
 from reflowshock.fem.kernels.lanes import LANE_OPTIONS, LANES, put_six_of, six, six_of
 from reflowshock.fem.kernels.nonlinear import INCREMENT, MISES, NOMINAL, PLASTIC
-from reflowshock.fem.kernels.plasticity import (
-    CONVERGED,
-    FIRST_YIELD,
-    ITERATIONS,
-    LARGEST_EXPONENT,
-    SMALL_GROWTH,
-    small_power,
-)
+from reflowshock.fem.kernels.plasticity import small_power
+from reflowshock.materials.plasticity import CONVERGED, FIRST_YIELD, ITERATIONS, LARGEST_EXPONENT, SMALL_GROWTH
 
 TINY = 1e-300  # in the place of zero under a logarithm
 ABOVE = 1e-3  # of a ceiling over its rough logarithm: it only keeps steps from going far beyond
@@ -211,7 +205,7 @@ def finish_flow(w, state, g, stiffness):
 
 @njit(**LANE_OPTIONS)
 def law_of(plastic, material, step):
-    """Return the row of ``kernels.plasticity.plastic_constants`` of a material, and the step dt [s]."""
+    """Return the row of ``materials.plasticity.plastic_constants`` of a material, and the step dt [s]."""
     k = plastic[material]
     return k[0], k[1], k[2], k[3], k[4], k[5], step
 

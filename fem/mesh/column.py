@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree
 
 from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets, cells_of_facets, merge_nodes, selected_cells
 from reflowshock.fem.mesh.tie import TOLERANCE, closest_facets
+from reflowshock.materials.roles import role_of_part
 
 COLUMN, COPY = "_column@", "_coarse@"  # ends of the names of parts: what is fine, what a driving model has in its place
 FACES = ("column_board@", "column_package@")

@@ -16,15 +16,14 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.errors import LevelError, MassError, RankError
 from reflowshock.fem.forces.force import ForceTerm, force_terms, linear_terms, terms_of
 from reflowshock.fem.forces.force_ufl import Law, tangent_at_rest
-from reflowshock.fem.materials.elasticity import materials_of_parts
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.body import Body, paces_of_nodes
 from reflowshock.fem.model.step_levels import Levels, SubsteppedElements, check_elastic
 from reflowshock.fem.parallel.exchange import SharedNodes
 from reflowshock.fem.parallel.local_mesh import LocalMesh
+from reflowshock.fem.problem.kinematics import Kinematics
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.roles import Materials, materials_of_parts
 
 MASS_TOLERANCE = 1e-10
 

@@ -9,10 +9,10 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.forces.force_corotational import Corotational
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, PointValues
 from reflowshock.fem.kernels.nonlinear import Path
-from reflowshock.fem.kernels.plasticity import NEVER_YIELDS
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
 from reflowshock.fem.parallel.local_mesh import positions
+from reflowshock.materials.plasticity import NEVER_YIELDS
 
 
 class ElasticHexahedra:

@@ -28,12 +28,12 @@ from reflowshock.fem.forces.force import ForceTerm, linear_terms
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
 from reflowshock.fem.kernels.levels import begin_substeps, end_substeps, run_levels, take_substep
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.exchange import SharedNodes
 from reflowshock.fem.parallel.local_mesh import positions
+from reflowshock.fem.problem.kinematics import Kinematics
+from reflowshock.materials.parameters import Material
 
 
 @dataclass(frozen=True, slots=True)

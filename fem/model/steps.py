@@ -21,11 +21,11 @@ from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.estimates.solver_cost import implicit_step
 from reflowshock.fem.forces.bedding import BeddedFacets
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import Pieces, make_body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.problem.structure import Dynamics
+from reflowshock.materials.roles import Materials
 
 LONGEST_WINDOW = 250  # steps: after each window a run can be judged, stopped and continued
 STEP_LIMIT = 0.99  # of the critical step

@@ -35,7 +35,7 @@ from reflowshock.fem.parallel.checkpoint_files import (
 )
 from reflowshock.fem.parallel.portable import ENTRIES, State
 from reflowshock.fem.parallel.whereabouts import HERE
-from reflowshock.sources import digest_of_sources
+from reflowshock.sources import MATERIALS, digest_of_sources
 
 LIBRARIES = ("numpy", "scipy", "numba")
 GENERATIONS = 2
@@ -213,4 +213,4 @@ def remove_others(own: Path) -> None:
 def _code() -> bytes:
     """Return a digest of this package's source and of the libraries: other code may continue a state differently."""
     libraries = " ".join(version(name) for name in LIBRARIES)
-    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1], MATERIALS)

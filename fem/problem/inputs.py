@@ -5,12 +5,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.fittings import BoardFittings
+from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.fem.problem.shock import Ranks, Shock, ShockNumerics
 from reflowshock.fem.problem.structure import DynamicsNumerics, LayerCoupling, SolverName, StructureProblem
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.roles import Materials
 from reflowshock.parameters import Parameters
 
 UNRELATED = {"checkpoint_seconds", "watchdog_seconds"}  # numerics that results do not depend on

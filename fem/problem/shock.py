@@ -10,9 +10,9 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.effect import Switch
-from reflowshock.fem.materials.kinematics import TURNING, Kinematics
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.filters import LowPass
+from reflowshock.fem.problem.kinematics import TURNING, Kinematics
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from reflowshock.fem.materials.kinematics import TURNING
 from reflowshock.fem.problem.attachment_checks import filter_problems
+from reflowshock.fem.problem.kinematics import TURNING
 from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
 from reflowshock.problem import Problem
 

@@ -10,9 +10,6 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
-from reflowshock.fem.materials.kinematics import Kinematics
-from reflowshock.fem.materials.library import LIBRARY
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.fittings import (
     AXES,
@@ -24,7 +21,10 @@ from reflowshock.fem.problem.fittings import (
     Support,
     WatchPoint,
 )
+from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
+from reflowshock.materials.library import LIBRARY
+from reflowshock.materials.parameters import Material
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 

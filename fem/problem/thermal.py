@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.effect import Switch
-from reflowshock.fem.materials.parameters import Material, Temperature
+from reflowshock.materials.parameters import Material, Temperature
 from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem
 from reflowshock.quantity import Quantity

@@ -21,7 +21,6 @@ from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.participant import Alone, Participant, explicit_motion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
-from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.model.steps import Steps
@@ -35,6 +34,7 @@ from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.run.time_loop import Outputs, Pictures, run_time_loop
 from reflowshock.fem.setup.models import Divided, Model
+from reflowshock.materials.roles import materials_of_parts
 
 Models = Mapping[Role, Model[Any]]
 

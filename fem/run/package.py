@@ -19,7 +19,6 @@ from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.shock_loads import shock_loads
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.loads.structure_pulses import pulse_durations
-from reflowshock.fem.materials.kinematics import TURNING
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.joint_interface import JointInterfaceStress, picture_windows
@@ -31,6 +30,7 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.whereabouts import HERE
 from reflowshock.fem.problem.inputs import RunInput
+from reflowshock.fem.problem.kinematics import TURNING
 from reflowshock.fem.run.dynamics import place, run_dynamics
 from reflowshock.fem.setup.models import Divided, Model
 from reflowshock.fem.setup.package_models import build_package, divided_package, elastic_package

@@ -15,7 +15,6 @@ from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
-from reflowshock.fem.materials.kinematics import TURNING
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.structure_modes import ModeTable, find_modes
 from reflowshock.fem.output.structure_result import StructureReport
@@ -23,6 +22,7 @@ from reflowshock.fem.output.watch_points import PointWatch
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import StructureInput
+from reflowshock.fem.problem.kinematics import TURNING
 from reflowshock.fem.run.dynamics import place, run_dynamics
 from reflowshock.fem.run.time_loop import Pictures
 from reflowshock.fem.setup.models import Divided

@@ -12,7 +12,6 @@ from reflowshock.fem import dolfinx_api
 from reflowshock.fem.division.division import Rules, SchemeName
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.division.whole import Treatment
-from reflowshock.fem.materials.kinematics import Kinematics
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
@@ -21,6 +20,7 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
+from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.fem.statics.initial_state import InitialState
 
 

@@ -17,7 +17,6 @@ from reflowshock.fem.division.record import coupling_record
 from reflowshock.fem.division.tables import JointTables, joined, model_inputs
 from reflowshock.fem.division.whole import Whole, on_springs, survey
 from reflowshock.fem.loads.shock_loads import check_shaken
-from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.mesh.column import COPY
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
 from reflowshock.fem.model.assembly import make_body, make_pieces
@@ -29,6 +28,7 @@ from reflowshock.fem.problem.fittings import AXES, Fittings
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.setup.models import Divided, Model, assembled, distributed, divided_on_root, treatment_of
 from reflowshock.fem.statics.initial_state import Cooling, InitialState
+from reflowshock.materials.roles import role_of_part
 
 COARSE = "board"  # role of the boxes that velocities are held in
 

@@ -17,12 +17,12 @@ from reflowshock.fem.elements.kind import strain_matrix
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.forces.energy import InternalForce
 from reflowshock.fem.forces.force import linear_terms
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.statics.hencky import HenckyElements, free_expansion
+from reflowshock.materials.parameters import Material
 
 CONVERGED = 1e-11  # force out of balance over the forces that hold free expansion back
 ITERATIONS, PRODUCTS, LINE_SEARCHES = 50, 500, 12

@@ -13,8 +13,8 @@ from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks
 from reflowshock.fem.kernels.hencky import ElementState, Shape, hexahedra, hourglass_share, one_point
-from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.plasticity import plastic_constants
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class HenckyElements:
 
     Attributes:
         elements: The elements.
-        laws: ``(nm, 6)`` rows of ``kernels.plasticity.plastic_constants``.
+        laws: ``(nm, 6)`` rows of ``materials.plasticity.plastic_constants``.
         expansion: ``(nm, 3)`` strain along x, y, z at which each material is free of stress.
     """
 

@@ -22,10 +22,10 @@ from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements, by_lane
 from reflowshock.fem.forces.nonlinear_blocks import in_modes
 from reflowshock.fem.loads.pretension import Pretension
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.statics.equilibrium import thermal_force
 from reflowshock.fem.statics.hencky import HenckyElements, free_expansion
+from reflowshock.materials.parameters import Material
 
 SAME = 1e-9  # of the size of a mesh: how far nodes of the file may be from its own
 

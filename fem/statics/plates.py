@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import element_geometry, lumped_mass
 from reflowshock.fem.elements.mesh_elements import elements_of
-from reflowshock.fem.materials.elasticity import materials_of_parts
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.statics.pads import pad_matrix
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
 from reflowshock.fem.statics.thermal_tables import connected, die_corners, thermal_tables
+from reflowshock.materials.roles import materials_of_parts
 
 
 class RigidPlates:

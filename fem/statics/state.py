@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
+from reflowshock.materials.roles import Materials
 
 
 @dataclass(frozen=True, slots=True)

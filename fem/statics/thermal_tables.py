@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.tables import Tables
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.errors import MeshError
-from reflowshock.fem.materials.elasticity import role_of_part
 from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
 from reflowshock.fem.mesh.supports import SYMMETRY, held_components
 from reflowshock.fem.mesh.tie import Tie
+from reflowshock.materials.roles import role_of_part
 
 MOTIONS = ("x", "y", "z", "turn_x", "turn_y", "turn_z")
 BLOCKED = 1e-9  # of the body's size: a motion that moves a held component less is free

@@ -18,8 +18,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.elements.stress import symmetric
-from reflowshock.fem.materials.elasticity import materials_of_parts
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.model.body import Body
@@ -28,6 +26,7 @@ from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.statics.thermal_tables import ThermalTables
+from reflowshock.materials.roles import Materials, materials_of_parts
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any
 
 from reflowshock.data_file import NotData, read_data, read_header, write_data
-from reflowshock.sources import digest_of_sources
+from reflowshock.sources import MATERIALS, digest_of_sources
 
 logger = logging.getLogger(__name__)
 
@@ -78,4 +78,4 @@ class Checkpoint:
 def _code() -> bytes:
     """Return a digest of this package's source and of the library versions, with which results may differ."""
     libraries = " ".join(version(name) for name in LIBRARIES)
-    return libraries.encode() + digest_of_sources(Path(__file__).parents[1])
+    return libraries.encode() + digest_of_sources(Path(__file__).parents[1], MATERIALS)

@@ -1,1 +1,1 @@
-"""Operators on tetrahedra of the particles, and the linear systems of a step."""
+"""Tetrahedra between particles, and solvers of the linear systems of a step; start with ``incompressibility.py``."""

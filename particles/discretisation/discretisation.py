@@ -1,11 +1,11 @@
-"""What a step needs of space, and how tetrahedra of the particles give it: linear velocity and linear pressure.
+"""Spatial operators of a step, and their form on tetrahedra with linear velocity and linear pressure.
 
-The rows of the constraint are the gradients of the dual volumes, a quarter of the tetrahedra around a particle. They
-add up to the gradient of the enclosed volume, so a uniform pressure balances the surface exactly as in the statics, and
-no force on a free body has a resultant. The mass is consistent: exact for linear velocities, to which the second mode
-of a drop belongs; lumped, it is 4 % too heavy at four shells. Equal order needs a stabilisation, here the part of the
-pressure gradient that the particles do not resolve (orthogonal subscales, Codina 2000): it vanishes for linear
-pressures and hardly damps.
+The rows of the constraint are gradients of the dual volumes, a quarter of the tetrahedra around each particle. They sum
+to the gradient of the enclosed volume, so that a uniform pressure balances the surface exactly and forces on a free
+body have no resultant. The mass matrix is consistent, hence exact for linear velocities, to which the second mode of a
+drop belongs; lumped, it is 4 % too heavy with four shells. Equal order of velocity and pressure needs a stabilisation:
+the part of the pressure gradient that the particles do not resolve (orthogonal subscales, Codina 2000), which vanishes
+for linear pressures and hardly damps.
 """
 
 from dataclasses import dataclass
@@ -19,22 +19,22 @@ from reflowshock.particles.core.tetrahedra import SMALLEST_VOLUME, cell_volumes,
 
 STABILISATION = 0.05
 DIFFUSION = 4.0
-# Share of its first volume below which a tetrahedron is worn out.
+# Share of its initial volume below which a tetrahedron counts as degenerate.
 WORN = 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class Discretisation:
-    """Sparse operators at the current positions of n particles, with m points of integration and k pressures.
+    """Sparse operators at the current positions of n particles, with m integration points and k pressures.
 
     Attributes:
-        gradient: three `(m, n)` matrices, d/dx, d/dy, d/dz at the points of integration [1/m].
-        weights: `(m,)` volumes of these points [m^3].
-        mass: `(n, n)` symmetric; the kinetic energy is rho/2 v . mass v [m^3].
-        constraint: `(k, 3 n)` rate of the volume that each pressure controls [m^2].
-        volume_share: `(k,)` these rates where the whole volume grows evenly at the rate one.
-        stabilisation: `(k, k)` symmetric, positive semidefinite, over the time step [m^3/(Pa s^2)], or None.
-        diffusion_rate: at which viscosity carries momentum across a spacing; it weakens the stabilisation [1/s].
+        gradient: Derivatives by x, y and z at the integration points, shape (m, n) each [1/m].
+        weights: Volumes of the integration points, shape (m,) [m^3].
+        mass: Symmetric mass matrix over the density, shape (n, n) [m^3].
+        constraint: Rate of the volume that each pressure controls, shape (k, 3 n) [m^2].
+        volume_share: Share of each of these volumes in a uniform expansion, shape (k,).
+        stabilisation: Symmetric positive semidefinite matrix over the time step, shape (k, k) [m^3/(Pa s^2)], or None.
+        diffusion_rate: Rate of viscous diffusion across a spacing, which weakens the stabilisation [1/s].
     """
 
     gradient: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]
@@ -51,11 +51,11 @@ class LinearTetrahedra:
     """Tetrahedra that move with their particles.
 
     Attributes:
-        cells: `(t, 4)`, whose boundary is the tracked surface.
-        mass: `(n, n)` volumes that the particles carried when the tetrahedra were made [m^3].
-        density: of the liquid [kg/m^3].
-        viscosity: of the liquid [Pa s].
-        volumes: `(t,)` of the tetrahedra when they were made [m^3].
+        cells: Corners, shape (t, 4); the boundary is the tracked surface.
+        mass: Mass matrix of the particles over the density when the tetrahedra were made, shape (n, n) [m^3].
+        density: Density [kg/m^3].
+        viscosity: Dynamic viscosity [Pa s].
+        volumes: Volumes of the tetrahedra when they were made, shape (t,) [m^3].
     """
 
     cells: Indices
@@ -66,23 +66,23 @@ class LinearTetrahedra:
 
     @classmethod
     def start(cls, points: Floats, cells: Indices, density: float, viscosity: float = 0.0) -> "LinearTetrahedra":
-        """Give the particles the volumes of the tetrahedra at these points."""
+        """Return tetrahedra with corners ``cells`` and the mass matrix of their volumes at these points."""
         volumes = cell_volumes(points, cells)
         return cls(cells, particle_mass(cells, volumes, len(points)), density, viscosity, volumes)
 
     def is_worn(self, points: Floats) -> bool:
-        """Whether a tetrahedron has been squeezed flat on the way to these points `(n, 3)` [m]."""
+        """Return whether a tetrahedron is nearly flat or inverted at these points, shape (n, 3) [m]."""
         thick = thick_cells(self.volumes)
         return bool((cell_volumes(points, self.cells[thick]) < WORN * self.volumes[thick]).any())
 
     def __call__(self, body: Body) -> Discretisation:
-        """Build the operators at the current positions."""
+        """Assemble the operators at the current positions of a body."""
         count, cells = len(body.points), self.cells
         volumes = cell_volumes(body.points, cells)
         average = _matrix(cells, np.full((len(cells), 4), 0.25), count).T.tocsr()
         slopes = volume_gradients(body.points, cells)
         scaled = [_matrix(cells, slopes[:, :, d], count) for d in range(3)]
-        # Flat tetrahedra enter volumes and mass, but neither strain nor stabilisation.
+        # Flat tetrahedra contribute to volumes and mass, but not to strain and stabilisation.
         thick = thick_cells(volumes)
         weights = volumes[thick]
         inverse = sparse.diags(1.0 / weights)
@@ -100,15 +100,27 @@ class LinearTetrahedra:
 
 
 def particle_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:
-    """Volumes `(n, n)` [m^3] that `count` particles have of tetrahedra with some volumes `(t,)` [m^3]."""
-    # Inverted tetrahedra mend the boundary of others. Only flat ones count, so that the mass stays definite.
+    """Return the mass matrix over the density, definite with inverted tetrahedra, too, shape (n, n) [m^3].
+
+    Args:
+        cells: Corners of the tetrahedra, shape (t, 4).
+        volumes: Their volumes, shape (t,) [m^3].
+        count: Number n of particles.
+    """
+    # Inverted tetrahedra correct the boundary of others. They are left out, so that the mass stays definite.
     counted = np.where(volumes > -SMALLEST_VOLUME * volumes.mean(), volumes, 0.0)
     counted *= volumes.sum() / counted.sum()
     return consistent_mass(cells, counted, count)
 
 
 def consistent_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:
-    """Integrals of products of linear shape functions, `(n, n)` [m^3]: volume / 20 (1 + delta)."""
+    """Return integrals of products of linear shape functions, volume / 20 (1 + delta), shape (n, n) [m^3].
+
+    Args:
+        cells: Corners of the tetrahedra, shape (t, 4).
+        volumes: Their volumes, shape (t,) [m^3].
+        count: Number n of particles.
+    """
     rows, columns = np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, (1, 4)).ravel()
     values = volumes[:, None] / 20.0 * (1.0 + np.eye(4).ravel())
     return sparse.csr_matrix((values.ravel(), (rows, columns)), shape=(count, count))
@@ -117,7 +129,7 @@ def consistent_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_m
 def _unresolved(
     gradient: tuple[sparse.csr_matrix, ...], weights: Floats, average: sparse.csr_matrix
 ) -> sparse.csr_matrix:
-    """Integral of the squared pressure gradient less that of its mean at the particles, `(n, n)` [m]."""
+    """Return the integral of the squared pressure gradient less that of its mean at the particles, shape (n, n) [m]."""
     share = average @ sparse.diags(weights)
     volumes = np.asarray(share.sum(axis=1)).ravel()
     inverse = sparse.diags(np.divide(1.0, volumes, out=np.zeros_like(volumes), where=volumes > 0.0))
@@ -127,6 +139,6 @@ def _unresolved(
 
 
 def _matrix(cells: Indices, values: Floats, count: int) -> sparse.csr_matrix:
-    """Values `(t, 4)` at the corners of the cells as a matrix `(t, n)`."""
+    """Return values at the corners of the cells, shape (t, 4), as a sparse matrix, shape (t, n)."""
     starts = np.arange(0, 4 * len(cells) + 1, 4)
     return sparse.csr_matrix((values.ravel(), cells.ravel(), starts), shape=(len(cells), count))

@@ -1,7 +1,7 @@
-"""Velocity of particles that were put elsewhere: read off the tetrahedra, momentum kept, kinetic energy not raised.
+"""Velocity of shifted particles: interpolated in the tetrahedra, with momentum kept and no gain of kinetic energy.
 
-A particle that is shifted is another material point. It takes the velocity there, linear in the tetrahedron that lies
-in the direction of the shift: a mean of old values, so that repeated shifts stay bounded.
+A shifted particle is another material point. It takes the velocity at its new position, linear in the tetrahedron that
+lies in the direction of the shift: a mean of old values, so that repeated shifts stay bounded.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,15 @@ from reflowshock.particles.core.tetrahedra import cell_volumes, thick_cells, vol
 
 
 def interpolation(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_matrix:
-    """Values at `points + offset` of what is linear in the tetrahedra, `(n, n)`; rows add up to one.
+    """Return the interpolation at ``points + offset`` of fields linear in the tetrahedra; rows sum to one.
 
     Args:
-        points: `(n, 3)` corners of the tetrahedra [m].
-        cells: `(t, 4)`.
-        offset: `(n, 3)` from the corners, short against the tetrahedra [m].
+        points: Corners of the tetrahedra, shape (n, 3) [m].
+        cells: Tetrahedra, shape (t, 4).
+        offset: Offsets from the corners, short compared with the tetrahedra, shape (n, 3) [m].
+
+    Returns:
+        Sparse matrix, shape (n, n).
     """
     count, volumes = len(points), cell_volumes(points, cells)
     thick = thick_cells(volumes)
@@ -38,12 +41,13 @@ def interpolation(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """From particles and their masses before to those after a shift.
+    """Transfer of velocities from particles before a shift to particles and masses after it.
 
     Attributes:
-        values: `(n, n)` interpolation.
-        before, after: mass matrices `(n, n)` [m^3].
-        translations: three `(n, 3)` fields, the translations that walls and edges admit.
+        values: Interpolation, shape (n, n).
+        before: Mass matrix before the shift over the density, shape (n, n) [m^3].
+        after: Mass matrix after the shift over the density, shape (n, n) [m^3].
+        translations: Translations that walls and edges admit, at most three fields of shape (n, 3).
     """
 
     values: sparse.csr_matrix
@@ -52,18 +56,18 @@ class Transfer:
     translations: Sequence[Floats]
 
     def __call__(self, velocity: Floats) -> Floats:
-        """Velocities `(n, 3)` with the old momentum along the translations, and no more energy than before."""
+        """Transfer velocities, shape (n, 3) [m/s], with the old momentum and no gain of energy."""
         new = self.values @ velocity
         weighted = [self.after @ field for field in self.translations]
         masses = np.array([[float((a * b).sum()) for b in self.translations] for a in weighted])
         momentum = self.before @ velocity
-        wanted = np.array([float((field * momentum).sum()) for field in self.translations])
-        found = np.array([float((a * new).sum()) for a in weighted])
+        required = np.array([float((field * momentum).sum()) for field in self.translations])
+        interpolated = np.array([float((a * new).sum()) for a in weighted])
 
         def translation(amount: Floats) -> Floats:
             return sum(c * field for c, field in zip(np.linalg.solve(masses, amount), self.translations, strict=True))
 
-        mean, fluctuation = translation(wanted), new - translation(found)
+        mean, fluctuation = translation(required), new - translation(interpolated)
         available = float((velocity * momentum).sum()) - float((mean * (self.after @ mean)).sum())
         energy = float((fluctuation * (self.after @ fluctuation)).sum())
         if energy > available:

@@ -1,11 +1,11 @@
-"""Velocity and pressure of one implicit step: a saddle-point problem with incompressible particles and body.
+"""Saddle-point problem of an implicit step: velocity and pressure of an incompressible liquid.
 
     A v - C^T p = f,     C v + S p = g
 
 A is the mass over the time step plus implicit viscosity and surface tension, symmetric and positive definite. The rows
-of C are gradients of volumes, which add up to the gradient a of the enclosed volume: of the particles' dual volumes, or
-of the whole body alone. The unknowns p are pressures; at rest they equal the capillary pressure, and f = -p a makes the
-discrete energy stationary.
+of C are gradients of volumes that sum to the gradient a of the enclosed volume: the dual volumes of the particles, or
+the volume of the whole body alone. The unknowns p are pressures; at rest they equal the capillary pressure, and
+f = -p a makes the discrete energy stationary.
 """
 
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ MAX_ITERATIONS = 200
 
 
 class SolveFailed(RuntimeError):
-    """A linear solve did not reach its tolerance."""
+    """Error of a linear solve that did not reach its tolerance."""
 
 
 @dataclass(frozen=True, slots=True)
 class SaddlePoint:
-    """The reduced problem: fixed degrees of freedom are left out.
+    """Saddle-point problem without fixed degrees of freedom.
 
     Attributes:
-        operator: A, `(d, d)` [kg/s].
-        constraint: C, `(m, d)` [m^2].
-        load: f, `(d,)` [N].
-        rate: g, `(m,)` [m^3/s].
-        stabilisation: S, `(m, m)` symmetric, positive semidefinite [m^3/(Pa s)]; None where C needs none.
-        guess: `(m,)` pressure to start from [Pa], None for zero.
+        operator: A, shape (d, d) [kg/s].
+        constraint: C, shape (m, d) [m^2].
+        load: f, shape (d,) [N].
+        rate: g, shape (m,) [m^3/s].
+        stabilisation: S, symmetric positive semidefinite, shape (m, m) [m^3/(Pa s)]; None if C needs none.
+        guess: Initial guess of the pressure, shape (m,) [Pa]; None for zero.
     """
 
     operator: sparse.csr_matrix
@@ -51,9 +51,9 @@ class Solution:
     """Solution of a saddle-point problem.
 
     Attributes:
-        velocity: `(d,)` [m/s].
-        pressure: `(m,)` [Pa].
-        iterations: conjugate gradient steps on the pressure.
+        velocity: Velocity of the degrees of freedom, shape (d,) [m/s].
+        pressure: Pressures, shape (m,) [Pa].
+        iterations: Number of conjugate gradient iterations on the pressure.
     """
 
     velocity: Floats
@@ -62,25 +62,25 @@ class Solution:
 
 
 def to_petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """Copy a matrix to PETSc."""
+    """Copy a sparse matrix to PETSc."""
     matrix.sort_indices()
-    # petsc4py delays the destruction of what went out of scope: without this each step would leak its factors.
+    # petsc4py delays the destruction of objects that went out of scope; without this each step would leak its factors.
     PETSc.garbage_cleanup(PETSc.COMM_SELF)
     parts = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
     return PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
 
 
-def petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """Copy a symmetric positive definite matrix to PETSc."""
+def to_petsc_spd(matrix: sparse.csr_matrix) -> PETSc.Mat:
+    """Copy a symmetric positive definite sparse matrix to PETSc."""
     result = to_petsc(matrix)
     result.setOption(PETSc.Mat.Option.SPD, True)
     return result
 
 
 def cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
-    """Factor a symmetric positive definite matrix with MUMPS."""
+    """Return a solver with the Cholesky factors of a symmetric positive definite matrix, by MUMPS."""
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
-    solver.setOperators(petsc(matrix))
+    solver.setOperators(to_petsc_spd(matrix))
     solver.setType(PETSc.KSP.Type.PREONLY)
     solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
     solver.getPC().setFactorSolverType("mumps")
@@ -89,7 +89,7 @@ def cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
 
 
 class _FactoredInverse:
-    """x -> A^-1 x on NumPy vectors; only the rows that A couples are factored."""
+    """Inverse A^-1 on NumPy vectors; only the coupled rows of A are factored."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
         matrix.eliminate_zeros()
@@ -101,7 +101,7 @@ class _FactoredInverse:
             self._solution, self._right = self._solver.getOperators()[0].createVecs()
 
     def __call__(self, right: Floats) -> Floats:
-        """A^-1 x."""
+        """Return A^-1 x."""
         result = right / self._diagonal
         if self._solver is not None:
             self._right.setArray(right[self._coupled])
@@ -111,7 +111,7 @@ class _FactoredInverse:
 
 
 class _Schur:
-    """PETSc shell of C A^-1 C^T + S."""
+    """PETSc shell matrix of C A^-1 C^T + S."""
 
     def __init__(self, problem: SaddlePoint, inverse: _FactoredInverse) -> None:
         self._problem, self._transposed, self._inverse = problem, problem.constraint.T.tocsr(), inverse
@@ -123,15 +123,18 @@ class _Schur:
 
 
 def _leak(problem: SaddlePoint, pressure: Floats) -> Floats | float:
-    """S p, `(m,)` [m^3/s]."""
+    """Return S p, shape (m,) [m^3/s]."""
     return 0.0 if problem.stabilisation is None else problem.stabilisation @ pressure
 
 
 def solve(problem: SaddlePoint) -> Solution:
     """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T + S.
 
+    Args:
+        problem: Saddle-point problem.
+
     Raises:
-        SolveFailed: the true residual of either equation stays above the limit.
+        SolveFailed: The true residual of either equation exceeds the limit.
     """
     operator, constraint = problem.operator, problem.constraint
     inverse = _FactoredInverse(operator)
@@ -141,7 +144,7 @@ def solve(problem: SaddlePoint) -> Solution:
     count = constraint.shape[0]
     shell = PETSc.Mat().createPython([count, count], _Schur(problem, inverse), comm=PETSc.COMM_SELF)
     shell.setUp()
-    solver = _conjugate_gradients(shell, petsc(lumped.tocsr()))
+    solver = _conjugate_gradients(shell, to_petsc_spd(lumped.tocsr()))
     solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
     solver.getPC().setFactorSolverType("mumps")
     unconstrained = inverse(problem.load)
@@ -154,12 +157,12 @@ def solve(problem: SaddlePoint) -> Solution:
     velocity = inverse(problem.load + constraint.T @ pressure.getArray())
     solution = Solution(velocity, pressure.getArray().copy(), solver.getIterationNumber())
     scale = float(np.linalg.norm(right.getArray()))
-    check_residuals(problem, solution, solver.getConvergedReason(), (scale, _leak(problem, solution.pressure)))
+    check_residuals(problem, solution, solver.getConvergedReason(), scale, _leak(problem, solution.pressure))
     return solution
 
 
 def _conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETSc.KSP:
-    """Set up conjugate gradients on the pressure."""
+    """Return a conjugate gradient solver for the pressure."""
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(operator, preconditioner)
     solver.setType(PETSc.KSP.Type.CG)
@@ -167,21 +170,21 @@ def _conjugate_gradients(operator: PETSc.Mat, preconditioner: PETSc.Mat) -> PETS
     return solver
 
 
-def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, rates: tuple[float, Floats | float]) -> None:
-    """Compare the true residuals, not the solver's word, with the limit.
+def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, scale: float, leak: Floats | float) -> None:
+    """Check the true residuals of a solution.
 
     Args:
-        problem: what was to be solved.
-        solution: what was found.
-        reason: of PETSc, positive where it converged.
-        rates: norm of the rates that the pressure had to supply, and S p, both [m^3/s].
+        problem: Saddle-point problem.
+        solution: Its approximate solution.
+        reason: Convergence reason of PETSc, positive if it converged.
+        scale: Norm of the rates of volume that the pressure had to supply [m^3/s].
+        leak: S p, shape (m,) [m^3/s].
 
     Raises:
-        SolveFailed: a residual is above the limit.
+        SolveFailed: A relative residual exceeds the limit.
     """
-    scale, leak = rates
     inner, push = problem.operator @ solution.velocity, problem.constraint.T @ solution.pressure
-    # Where the load is tiny, the forces in balance are those of the pressure and of the operator.
+    # If the load is tiny, the pressure balances the operator.
     force = max(float(np.linalg.norm(part)) for part in (inner, push, problem.load)) or 1.0
     momentum = inner - push - problem.load
     continuity = problem.constraint @ solution.velocity + leak - problem.rate

@@ -1,9 +1,9 @@
 """Tetrahedra that fill a body of any shape; their boundary off the walls is the tracked surface, face by face.
 
-Delaunay tetrahedra of all particles, less those outside the surface (winding number), have a boundary that differs from
-the surface where this is not Delaunay itself. The difference is a closed surface, or ends on a wall: its cone,
-tetrahedra from one of its vertices, is added. Some of these are inverted and count negatively, so that the volume and
-its gradient are exactly those of the surface.
+The boundary of the Delaunay tetrahedra of all particles, less those outside the surface (by winding number), differs
+from the surface where that is not Delaunay itself. The difference is a closed surface, or ends on a wall. Its cone is
+added: tetrahedra from one of its vertices. Some of these are inverted and count negatively, so that the volume and its
+gradient are exactly those of the surface.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 
 
 def fill(body: Body) -> Indices:
-    """Tetrahedra between the particles of a body, `(t, 4)`."""
+    """Return tetrahedra between the particles of a body whose boundary is its surface, shape (t, 4)."""
     cells = tetrahedralise(body.points, body.cloud.spacing)
     wall = body.cloud.wall
     cells = cells[~_on_one_wall(wall, cells)]
@@ -33,15 +33,15 @@ def fill(body: Body) -> Indices:
 
 
 def _on_one_wall(wall: NDArray[np.int8], simplices: Indices) -> Mask:
-    """Whether all corners lie on the same wall."""
+    """Return whether all corners of each simplex lie on the same wall."""
     walls = wall[simplices]
     return (walls[:, 0] >= 0) & (walls == walls[:, :1]).all(axis=1)
 
 
 def _inside(body: Body, cells: Indices) -> Mask:
-    """Whether tetrahedra lie inside the surface; only those whose corners all lie on the boundary may not.
+    """Return whether tetrahedra lie inside the surface; only those with all corners on the boundary may lie outside.
 
-    Flat ones among these count as outside: where one is inside, it is a cone.
+    Flat ones among these count as outside; where one is inside, a cone replaces it.
     """
     cloud, points = body.cloud, body.points
     bounding = (np.arange(len(points)) < cloud.surface_count) | (cloud.wall >= 0)
@@ -56,22 +56,22 @@ def _inside(body: Body, cells: Indices) -> Mask:
 
 
 def _oriented(triangles: Indices) -> Indices:
-    """The same triangles, each from its smallest vertex."""
+    """Rotate the vertices of each triangle so that the smallest comes first."""
     first = np.argmin(triangles, axis=1)[:, None]
     return np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
 
 
 def _difference(triangles: Indices, others: Indices) -> tuple[Indices, int]:
-    """Triangles that are not among the others, then the others not among them, turned over; and where these start."""
+    """Return triangles not among the others, then reversed others not among them, and the start of the latter."""
     both = np.concatenate((_oriented(triangles), _oriented(others)))
     _, first, count = np.unique(both, axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
-    own = alone < len(triangles)
-    return np.concatenate((both[alone[own]], both[alone[~own]][:, ::-1])), int(own.sum())
+    is_first = alone < len(triangles)
+    return np.concatenate((both[alone[is_first]], both[alone[~is_first]][:, ::-1])), int(is_first.sum())
 
 
 def _components(numbers: Indices, joins: Mask) -> Indices:
-    """Components of triangles, given the numbers of their edges `(t, 3)`, that are connected by the edges that join."""
+    """Return the connected components of triangles with edges (t, 3), connected by edges in the mask ``joins``."""
     triangle, number = np.repeat(np.arange(len(numbers)), 3), numbers.ravel()
     keep = joins[number]
     shares = sparse.csr_matrix((np.ones(keep.sum()), (triangle[keep], number[keep])), (len(numbers), len(joins)))
@@ -79,28 +79,30 @@ def _components(numbers: Indices, joins: Mask) -> Indices:
 
 
 def _parts(triangles: Indices, start: int) -> Indices:
-    """The closed part that each triangle of a difference belongs to, `(t,)`.
+    """Return the closed part that each triangle of a difference belongs to, shape (t,).
 
-    Two patches of the same corners, one of each surface, are a flipped edge or a few: a part of its own. So neighbours
-    that flip, as on a lattice, do not make one large part. What is left is parted where it is not connected.
+    Two patches with the same corners, one of each surface, are one or a few flipped edges and form a separate part, so
+    that adjacent flips, as on a lattice, do not make one large part. The remainder is split by connectivity.
     """
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     numbers = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    own, other = (np.bincount(side.ravel(), minlength=numbers.max() + 1) for side in (numbers[:start], numbers[start:]))
-    patch = _components(numbers, (own == 0) | (other == 0))
+    first, second = (
+        np.bincount(side.ravel(), minlength=numbers.max() + 1) for side in (numbers[:start], numbers[start:])
+    )
+    patch = _components(numbers, (first == 0) | (second == 0))
     mate = _mates(triangles, numbers, patch)
     part, left = mate[patch], mate[patch] < 0
-    part[left] = len(triangles) + _components(numbers[left], np.ones(len(own), bool))
+    part[left] = len(triangles) + _components(numbers[left], np.ones(len(first), bool))
     return np.unique(part, return_inverse=True)[1].reshape(-1)
 
 
 def _mates(triangles: Indices, numbers: Indices, patch: Indices) -> Indices:
-    """For each patch the smaller number of itself and the patch that closes it, -1 if no patch of its corners does."""
+    """Return the smaller number of each patch and the patch with the same corners that closes it, -1 without one."""
     order = np.argsort(patch, kind="stable")
     members = np.split(order, np.cumsum(np.bincount(patch))[:-1])
-    mate, known = np.full(len(members), -1), dict[bytes, int]()
+    mate, patches_by_corners = np.full(len(members), -1), dict[bytes, int]()
     for number, member in enumerate(members):
-        first = known.setdefault(np.unique(triangles[member]).tobytes(), number)
+        first = patches_by_corners.setdefault(np.unique(triangles[member]).tobytes(), number)
         pair = numbers[np.concatenate((member, members[first]))]
         if first != number and mate[first] < 0 and (np.unique(pair, return_counts=True)[1] == 2).all():
             mate[number] = mate[first] = first
@@ -108,7 +110,7 @@ def _mates(triangles: Indices, numbers: Indices, patch: Indices) -> Indices:
 
 
 def _cones(triangles: Indices, start: int, wall: NDArray[np.int8]) -> Indices:
-    """Tetrahedra between each part and its apex: the vertex of most of its triangles, on a wall if it can."""
+    """Return tetrahedra between each part and its apex: the vertex of most of its triangles, preferably on a wall."""
     part = _parts(triangles, start)
     triangle = np.repeat(np.arange(len(triangles)), 3)
     shape = (int(part.max()) + 1, len(wall))

@@ -1,4 +1,4 @@
-"""Conjugate gradients without a matrix, and preconditioned with the factors of an earlier step's matrix."""
+"""Matrix-free conjugate gradients, preconditioned by the banded Cholesky factors of an earlier step's matrix."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -14,21 +14,28 @@ from reflowshock.particles.discretisation.incompressibility import SolveFailed
 Apply = Callable[[Floats], Floats]
 Singles = NDArray[np.float32]
 MAX_ITERATIONS = 500
-# Of the norm of the right-hand side: more than this is no solution.
+# Relative residual above which a solve has failed.
 RESIDUAL_LIMIT = 1e-4
-# A step takes six with new factors, twelve with the last step's and twice as many with those before; new ones cost as
-# much as fifteen of 1331 pressures.
+# Number of iterations above which the factors are renewed. A step takes six iterations with new factors, twelve with
+# those of the last step and twice as many with older ones; new factors cost fifteen iterations with 1331 pressures.
 MANY_ITERATIONS = 8
-# With factors of another matrix: where these do not do, new ones cost less than to go on.
+# Number of iterations with old factors after which new ones cost less than to continue.
 TOO_MANY_ITERATIONS = 30
-# Added to the diagonal, which is about one, in the factors only: pressures from particle to particle hardly show.
+# Added to the diagonal of one in the factors only: pressures that alternate from particle to particle are nearly
+# singular.
 SHIFT = 1e-6
 SAVED = ("root", "scale", "order", "iterations")
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """When a solve ends: at this share of the norm of the right-hand side, or at this residual; it fails at `most`."""
+    """Tolerance of a solve.
+
+    Attributes:
+        relative: Residual over the norm of the right-hand side at which the solve ends.
+        absolute: Residual at which the solve ends.
+        most: Number of iterations after which it fails.
+    """
 
     relative: float
     absolute: float
@@ -38,20 +45,20 @@ class Tolerance:
 def conjugate_gradients(
     operator: Apply, right: Floats, start: Floats, precondition: Apply, tolerance: Tolerance
 ) -> tuple[Floats, int]:
-    """Solve A x = b for a symmetric positive semidefinite A, b in its range.
+    """Solve A x = b for a symmetric positive semidefinite A with b in its range.
 
     Args:
-        operator: x -> A x.
-        right: b, `(d,)`, or of another shape.
-        start: x to start with, shaped as b.
-        precondition: r -> P^-1 r.
-        tolerance: when it ends.
+        operator: Function x -> A x.
+        right: Right-hand side b, of any shape.
+        start: Initial guess of x, shaped as b.
+        precondition: Function r -> P^-1 r.
+        tolerance: Tolerance of the residual.
 
     Returns:
-        x, and the iterations.
+        x and the number of iterations.
 
     Raises:
-        SolveFailed: the true residual stays above the limit.
+        SolveFailed: The true residual exceeds the limit.
     """
     norm = _length(right)
     enough = max(tolerance.relative * norm, tolerance.absolute)
@@ -79,12 +86,12 @@ def _length(values: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A symmetric matrix A, scaled and in an order in which its entries lie next to the diagonal.
+    """Symmetric matrix A, scaled and ordered so that its entries lie near the diagonal.
 
     Attributes:
-        rows: of S A S, from b places before the diagonal to it, `(n, b + 1)`.
-        scale: S, `(n,)`.
-        order: `(n,)` which row of A each row is.
+        rows: Lower band of S A S, from b entries before the diagonal to it, shape (n, b + 1).
+        scale: Diagonal of S, shape (n,).
+        order: Row of A of each row of the band, shape (n,).
     """
 
     rows: Singles
@@ -93,7 +100,7 @@ class Band:
 
     @classmethod
     def of(cls, matrix: Floats) -> "Band":
-        """Of a matrix `(n, n)` without zeros, scaled to a diagonal of one."""
+        """Return the full band of a dense symmetric matrix, shape (n, n), scaled to a unit diagonal."""
         count, scale = len(matrix), 1.0 / np.sqrt(matrix.diagonal())
         rows = np.zeros((count, count), np.float32)
         for i, row in enumerate(scale[:, None] * matrix * scale):
@@ -103,16 +110,16 @@ class Band:
 
 @dataclass(slots=True)
 class LaggedCholesky:
-    """Factors of an earlier matrix, made anew when their last use took many iterations.
+    """Conjugate gradients with the Cholesky factors of an earlier matrix, renewed after a solve with many iterations.
 
-    They fill a band: particles push on those two supports away. Single precision is enough to precondition with, and
-    half the memory twice as fast.
+    The factors are banded, because particles interact up to two supports away. Single precision is sufficient for a
+    preconditioner and twice as fast.
 
     Attributes:
-        root: R of R^T R = S A S, by diagonals as LAPACK has them, `(b + 1, n)`.
-        scale: S, `(n,)`, by row of R.
-        order: `(n,)` which row of A each row of R is.
-        iterations: of the last solve.
+        root: R of R^T R = S A S, by diagonals in LAPACK's layout, shape (b + 1, n).
+        scale: Diagonal of S by row of R, shape (n,).
+        order: Row of A of each row of R, shape (n,).
+        iterations: Number of iterations of the last solve.
     """
 
     root: Singles | None = None
@@ -121,10 +128,19 @@ class LaggedCholesky:
     iterations: int = 0
 
     def solve(self, operator: Apply, matrix: Callable[[], Band], right: Floats, tolerance: Tolerance) -> Floats:
-        """Solve A x = b from zero; `matrix` makes A where new factors are needed.
+        """Solve A x = b with a zero initial guess.
+
+        Args:
+            operator: Function x -> A x.
+            matrix: Function that assembles A or an approximation of it when new factors are needed.
+            right: Right-hand side b, shape (n,).
+            tolerance: Tolerance of the residual.
+
+        Returns:
+            x, shape (n,).
 
         Raises:
-            SolveFailed: the true residual stays above the limit, or A has no factors.
+            SolveFailed: The true residual exceeds the limit, or A has no Cholesky factors.
         """
         fresh = self.scale is None or self.iterations > MANY_ITERATIONS or len(self.scale) != len(right)
         if fresh:
@@ -139,7 +155,7 @@ class LaggedCholesky:
         return self._solved(operator, right, tolerance)
 
     def _factor(self, matrix: Band) -> None:
-        """Factor a matrix, whose rows are overwritten."""
+        """Factor a matrix; its rows are overwritten."""
         matrix.rows[:, -1] += SHIFT
         root, failed = lapack.spbtrf(matrix.rows.T, lower=0, overwrite_ab=1)
         if failed:
@@ -147,26 +163,26 @@ class LaggedCholesky:
         self.root, self.scale, self.order = root, matrix.scale[matrix.order], matrix.order
 
     def _solved(self, operator: Apply, right: Floats, tolerance: Tolerance) -> Floats:
-        """Solve with the factors that are kept."""
+        """Solve with the current factors."""
         root, scale, order = self.root, self.scale, self.order
         assert scale is not None
 
         def precondition(residual: Floats) -> Floats:
-            found = np.empty_like(residual)
+            result = np.empty_like(residual)
             scaled = (scale * residual[order]).astype(np.float32)
-            found[order] = scale * lapack.spbtrs(root, scaled, lower=0, overwrite_b=1)[0]
-            return found
+            result[order] = scale * lapack.spbtrs(root, scaled, lower=0, overwrite_b=1)[0]
+            return result
 
         start = np.zeros_like(right)
         solution, self.iterations = conjugate_gradients(operator, right, start, precondition, tolerance)
         return solution
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the data that a checkpoint keeps."""
         return {name: getattr(self, name) for name in SAVED}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         for name in SAVED:
             setattr(self, name, saved[name])
         if self.root is not None:

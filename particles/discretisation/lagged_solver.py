@@ -1,4 +1,4 @@
-"""What solvers keep that are set up anew only when their last use took many iterations."""
+"""Base of solvers whose preconditioner is reused until a solve takes many iterations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,13 +9,13 @@ from scipy import sparse
 
 @dataclass(slots=True)
 class LaggedSolver:
-    """A solver that was set up for an earlier matrix.
+    """Solver with the preconditioner of an earlier matrix.
 
-    It keeps that matrix, so that a run from a checkpoint continues with the same bits.
+    It keeps that matrix, so that a run restarted from a checkpoint continues with the same bits.
 
     Attributes:
-        origin: the matrix that it was set up for.
-        iterations: of the last solve.
+        origin: Matrix that the preconditioner was built for.
+        iterations: Number of iterations of the last solve.
     """
 
     origin: sparse.csr_matrix | None = None
@@ -23,13 +23,13 @@ class LaggedSolver:
     _solver: Any = field(default=None, repr=False)
 
     def saved(self) -> dict[str, Any]:
-        """All but what follows from the matrix, for a checkpoint."""
+        """Return the data that a checkpoint keeps; the preconditioner follows from the matrix."""
         origin = self.origin
         rows = None if origin is None else {name: getattr(origin, name) for name in ("data", "indices", "indptr")}
         return {"origin": rows, "iterations": self.iterations}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         rows, self.iterations, self._solver, self.origin = saved["origin"], saved["iterations"], None, None
         if rows is not None:
             count = len(rows["indptr"]) - 1

@@ -1,4 +1,4 @@
-"""A symmetric positive definite system bordered by one constraint: the surface of a body that keeps its volume."""
+"""Symmetric positive definite system with the enclosed volume as its only constraint."""
 
 import numpy as np
 from petsc4py import PETSc
@@ -10,7 +10,7 @@ from reflowshock.particles.discretisation.incompressibility import (
     Solution,
     SolveFailed,
     check_residuals,
-    petsc,
+    to_petsc_spd,
 )
 
 RELATIVE_TOLERANCE = 1e-10
@@ -18,11 +18,11 @@ MAX_ITERATIONS = 2000
 
 
 class _IterativeInverse:
-    """x -> A^-1 x by conjugate gradients and an incomplete factorisation."""
+    """Inverse A^-1 by conjugate gradients with an incomplete Cholesky factorisation."""
 
     def __init__(self, matrix: sparse.csr_matrix) -> None:
         self._solver = PETSc.KSP().create(PETSc.COMM_SELF)
-        self._solver.setOperators(petsc(_held(matrix)))
+        self._solver.setOperators(to_petsc_spd(_with_unit_rows(matrix)))
         self._solver.setType(PETSc.KSP.Type.CG)
         self._solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._solver.setTolerances(rtol=RELATIVE_TOLERANCE, max_it=MAX_ITERATIONS)
@@ -31,41 +31,44 @@ class _IterativeInverse:
 
     @property
     def reason(self) -> int:
-        """PETSc's reason to stop, positive where it converged."""
+        """Convergence reason of PETSc, positive if it converged."""
         return self._solver.getConvergedReason()
 
     def __call__(self, right: Floats) -> Floats:
-        """A^-1 x.
+        """Return A^-1 x.
 
         Raises:
-            SolveFailed: no factorisation, which a sound surface always has.
+            SolveFailed: The factorisation failed; a sound surface always has one.
         """
         self._right.setArray(right)
         try:
             self._solver.solve(self._right, self._solution)
         except PETSc.Error as error:
-            raise SolveFailed(f"PETSc cannot factor the surface's matrix (error {error.ierr})") from error
+            raise SolveFailed(f"PETSc cannot factor the matrix of the surface (error {error.ierr})") from error
         return self._solution.getArray().copy()
 
 
-def _held(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The matrix with ones for what nothing moves, such as the shift of a plate whose edges hold no particle."""
+def _with_unit_rows(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Set a unit diagonal in zero rows, such as the shift of a plate whose edges pin no particle."""
     idle = matrix.diagonal() == 0.0
     return (matrix + sparse.diags(idle.astype(float))).tocsr() if idle.any() else matrix
 
 
 def solve_volume(problem: SaddlePoint) -> Solution:
-    """Solve a problem whose only constraint is the volume, by its Schur complement, which is a number.
+    """Solve a problem whose only constraint is the volume; its Schur complement is a number.
+
+    Args:
+        problem: Saddle-point problem with one constraint.
 
     Raises:
-        SolveFailed: the true residual of either equation stays above the limit.
+        SolveFailed: The true residual of either equation exceeds the limit.
     """
     inverse, slope = _IterativeInverse(problem.operator), problem.constraint.toarray().ravel()
     loaded = inverse(problem.load)
     reason = inverse.reason
     pressed = inverse(slope)
-    wanted = problem.rate - slope @ loaded
-    pressure = wanted / (slope @ pressed)
+    missing_rate = problem.rate - slope @ loaded
+    pressure = missing_rate / (slope @ pressed)
     solution = Solution(loaded + pressure * pressed, pressure, 0)
-    check_residuals(problem, solution, min(reason, inverse.reason), (float(np.linalg.norm(wanted)), 0.0))
+    check_residuals(problem, solution, min(reason, inverse.reason), float(np.linalg.norm(missing_rate)), 0.0)
     return solution

@@ -1,9 +1,8 @@
-"""Strong-form operators at all particles by moving least squares, walls mirrored: what Hu et al. build eqs 12-28 from.
+"""Collocated (strong-form) operators by moving least squares with mirrored walls, for eqs 12 to 28 of Hu et al.
 
-With the linear basis values are those of the MLS shape functions, derivatives theirs (as printed); with the quadratic
-basis particles carry their own values, and derivatives are those of a fitted Taylor expansion. A stencil next to a wall
-sees images of the particles behind it: a scalar is even there and has no slope along the normal; of a velocity the
-component along the wall is even, the other one odd (free slip).
+With the linear basis, values and derivatives are those of the MLS shape functions (as printed). With the quadratic
+basis particles carry their own values, and derivatives are those of a fitted Taylor expansion. At a wall a scalar is
+even; of a velocity the tangential components are even and the normal one is odd (free slip).
 """
 
 from collections.abc import Sequence
@@ -29,14 +28,14 @@ class Operators:
     Velocities are stored by component: all x, all y, all z.
 
     Attributes:
-        values: `(n, n)` approximated scalar at the particles, from their coefficients.
-        gradient: three `(n, n)` matrices [1/m].
-        laplacian: `(n, n)` [1/m^2].
-        velocity_values: `(3 n, 3 n)` as `values`, of a velocity.
-        velocity_gradient: three `(3 n, 3 n)`, d/dx, d/dy, d/dz of each component [1/m].
-        velocity_laplacian: `(3 n, 3 n)` [1/m^2].
-        divergence: `(n, 3 n)` [1/m].
-        smoothing: `(3 n, 3 n)` linear MLS approximation of a velocity, in either basis.
+        values: Scalar values from coefficients, shape (n, n).
+        gradient: Derivatives by x, y and z, shape (n, n) each [1/m].
+        laplacian: Laplacian, shape (n, n) [1/m^2].
+        velocity_values: Velocity values from coefficients, shape (3 n, 3 n).
+        velocity_gradient: Derivatives of each component by x, y and z, shape (3 n, 3 n) each [1/m].
+        velocity_laplacian: Laplacian of each component, shape (3 n, 3 n) [1/m^2].
+        divergence: Divergence, shape (n, 3 n) [1/m].
+        smoothing: Linear MLS approximation of a velocity, in either basis, shape (3 n, 3 n).
     """
 
     values: Matrix
@@ -50,16 +49,16 @@ class Operators:
 
 
 def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: str) -> Operators:
-    """Fit the operators at the particles `(n, 3)` [m].
+    """Fit the operators at the particles.
 
     Args:
-        points: particles.
-        plates: walls, mirrored.
-        spacing: of the particles [m].
+        points: Particle positions, shape (n, 3) [m].
+        plates: Walls, mirrored.
+        spacing: Particle spacing [m].
         basis: "linear" or "quadratic".
 
     Raises:
-        DegenerateStencil: the derivatives at a particle cannot be fitted.
+        DegenerateStencil: The derivatives at a particle cannot be fitted.
     """
     count, rows = len(points), np.arange(len(points), dtype=np.int32)
     ghosts = mirror(points, plates, SUPPORT[basis] * spacing)
@@ -67,21 +66,21 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
     even, vector = ghosts.even(count), ghosts.vector(count)
 
     def neighbours(kind: str) -> NeighbourList:
-        found = NeighbourList(SUPPORT[kind] * spacing, 0.0)
-        found.update(everything)
-        return found
+        lists = NeighbourList(SUPPORT[kind] * spacing, 0.0)
+        lists.update(everything)
+        return lists
 
     fitted = derivatives(everything, rows, neighbours(basis), basis)
     shape = shape_functions(everything, rows, neighbours("linear"))
     values = shape if basis == "linear" else sparse.eye(*shape.shape, format="csr")
-    three = sparse.identity(3)
+    components = sparse.identity(3)
     return Operators(
         values=(values @ even).tocsr(),
         gradient=tuple((component @ even).tocsr() for component in fitted.gradient),
         laplacian=(fitted.laplacian @ even).tocsr(),
-        velocity_values=(sparse.kron(three, values) @ vector).tocsr(),
-        velocity_gradient=tuple((sparse.kron(three, component) @ vector).tocsr() for component in fitted.gradient),
-        velocity_laplacian=(sparse.kron(three, fitted.laplacian) @ vector).tocsr(),
+        velocity_values=(sparse.kron(components, values) @ vector).tocsr(),
+        velocity_gradient=tuple((sparse.kron(components, component) @ vector).tocsr() for component in fitted.gradient),
+        velocity_laplacian=(sparse.kron(components, fitted.laplacian) @ vector).tocsr(),
         divergence=(sparse.hstack(fitted.gradient) @ vector).tocsr(),
-        smoothing=(sparse.kron(three, shape) @ vector).tocsr(),
+        smoothing=(sparse.kron(components, shape) @ vector).tocsr(),
     )

@@ -1,9 +1,9 @@
-"""Moving least squares: sparse operators of the gradient and of the Laplacian at particles, in two bases.
+"""Moving least squares: sparse operators of the gradient and the Laplacian at particles, in two bases.
 
-Linear (Hu et al., eqs 11, 21-23): the shape functions average, they do not interpolate; the gradient converges, the
-Laplacian does not (its relative error stays at every spacing). Quadratic: a Taylor expansion to second order about the
-particle, fitted to differences (generalised finite differences); the gradient is of order 2, the Laplacian of order 1
-(2 on symmetric stencils). The small dense systems of a stencil are solved by Cholesky factors.
+Linear (Hu et al., eqs 11 and 21 to 23): the shape functions average instead of interpolating; the gradient converges,
+the Laplacian does not (its relative error is the same at every spacing). Quadratic: a second-order Taylor expansion
+about the particle, fitted to differences (generalised finite differences); the gradient is of order 2, the Laplacian of
+order 1, or 2 on symmetric stencils.
 """
 
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.ispg.stencils import DegenerateStencil, factor_spd, substitute
 
-# Support radius in spacings: the quadratic fit needs at least 9 well placed neighbours at a wall, too.
+# Support radius in spacings; the quadratic fit needs at least 9 well distributed neighbours, at a wall, too.
 SUPPORT = {"linear": 2.0, "quadratic": 2.4}
 
 
 @dataclass(frozen=True, slots=True)
 class Derivatives:
-    """Sparse derivative operators at some particles, one row a particle.
+    """Sparse derivative operators at some particles, one row per particle.
 
     Attributes:
-        rows: `(m,)` the particles.
-        gradient: three `(m, n)` matrices, d/dx, d/dy, d/dz [1/m].
-        laplacian: `(m, n)` [1/m^2]; zero in rows of order 1 of the quadratic basis.
-        order: `(m,)` order of the polynomial that each row reproduces.
+        rows: Particles, shape (m,).
+        gradient: Derivatives by x, y and z, shape (m, n) each [1/m].
+        laplacian: Laplacian, zero in rows of order 1 of the quadratic basis, shape (m, n) [1/m^2].
+        order: Order of the polynomials that each row reproduces, shape (m,).
     """
 
     rows: NDArray[np.int32]
@@ -42,32 +42,38 @@ def derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourLi
     """Fit the derivative operators at some particles.
 
     Args:
-        points: `(n, 3)` [m].
-        rows: `(m,)` particles at which the derivatives are wanted.
-        neighbours: a list whose radius is the support of the weights.
+        points: Positions, shape (n, 3) [m].
+        rows: Particles at which to fit, shape (m,).
+        neighbours: Neighbour list whose radius is the support of the weights.
         basis: "linear" or "quadratic".
 
     Raises:
-        DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
+        DegenerateStencil: A particle has too few neighbours, or they lie in a plane.
     """
     kernel = {"linear": linear_weights, "quadratic": quadratic_weights}[basis]
-    pair, own, order = kernel(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
+    pair, diagonal, order = kernel(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
     _check_order(order, points, rows, neighbours)
-    first, second, third, laplacian = _assemble(len(points), rows, neighbours, (pair, own))
+    first, second, third, laplacian = _assemble(len(points), rows, neighbours, pair, diagonal)
     return Derivatives(rows, (first, second, third), laplacian, order)
 
 
 def shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> sparse.csr_matrix:
-    """Values psi_J of the linear MLS shape functions at some particles (Hu et al., eq 11), `(m, n)`; rows add up to 1.
+    """Return the linear MLS shape functions psi_J at some particles (Hu et al., eq 11); rows sum to 1.
 
-    Args: as `derivatives`.
+    Args:
+        points: Positions, shape (n, 3) [m].
+        rows: Particles at which to fit, shape (m,).
+        neighbours: Neighbour list whose radius is the support of the weights.
+
+    Returns:
+        Sparse matrix, shape (m, n).
 
     Raises:
-        DegenerateStencil: a particle has too few neighbours, or they lie in a plane.
+        DegenerateStencil: A particle has too few neighbours, or they lie in a plane.
     """
-    pair, own, order = shape_weights(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
+    pair, diagonal, order = shape_weights(rows, points, neighbours.offsets, neighbours.indices, neighbours.radius)
     _check_order(order, points, rows, neighbours)
-    return _assemble(len(points), rows, neighbours, (pair, own))[0]
+    return _assemble(len(points), rows, neighbours, pair, diagonal)[0]
 
 
 def _check_order(order: NDArray[np.int8], points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> None:
@@ -80,31 +86,30 @@ def _check_order(order: NDArray[np.int8], points: Floats, rows: NDArray[np.int32
 
 
 def _assemble(
-    count: int, rows: NDArray[np.int32], neighbours: NeighbourList, weights: tuple[Floats, Floats]
+    count: int, rows: NDArray[np.int32], neighbours: NeighbourList, pair: Floats, diagonal: Floats
 ) -> list[sparse.csr_matrix]:
-    """One matrix `(m, count)` for each column of the weights per pair and at the particle."""
-    pair, own = weights
+    """Assemble one matrix, shape (m, count), for each column of the weights of pairs and of the particle itself."""
     lengths = np.diff(neighbours.offsets)[rows]
     starts = np.concatenate(([0], np.cumsum(lengths + 1)))
     first = np.cumsum(lengths) - lengths
     slot = np.repeat(neighbours.offsets[rows] - first, lengths) + np.arange(lengths.sum())
     columns = np.empty(starts[-1], np.int32)
-    is_own = np.zeros(starts[-1], bool)
-    is_own[starts[1:] - 1] = True
-    columns[is_own] = rows
-    columns[~is_own] = neighbours.indices[slot]
+    is_diagonal = np.zeros(starts[-1], bool)
+    is_diagonal[starts[1:] - 1] = True
+    columns[is_diagonal] = rows
+    columns[~is_diagonal] = neighbours.indices[slot]
     matrices = []
     for c in range(pair.shape[1]):
         values = np.empty(starts[-1])
-        values[is_own] = own[:, c]
-        values[~is_own] = pair[slot, c]
+        values[is_diagonal] = diagonal[:, c]
+        values[~is_diagonal] = pair[slot, c]
         matrices.append(sparse.csr_matrix((values, columns, starts), shape=(len(rows), count)))
     return matrices
 
 
 @njit(cache=True)
 def _basis_and_weight(points, pair, support, basis):
-    """Linear basis (written) and weight (1 - q^2)^3 at the offset of a pair, in units of the support radius."""
+    """Write the linear basis at the offset of a pair over the support radius; return the weight (1 - q^2)^3."""
     i, j = pair
     basis[0] = 1.0
     square = 0.0
@@ -116,12 +121,21 @@ def _basis_and_weight(points, pair, support, basis):
 
 @njit(cache=True)
 def shape_weights(rows, points, offsets, indices, support):
-    """Weights psi_J = w_J p_J . M^-1 (1, 0, 0, 0) of pairs and of the particle itself, one column.
+    """Return the shape functions psi_J = w_J p_J . M^-1 (1, 0, 0, 0) of pairs and of the particle itself.
 
-    The order of a row is zero where the moment matrix M is singular.
+    Args:
+        rows: Particles, shape (m,).
+        points: Positions, shape (n, 3) [m].
+        offsets: Start of each particle's neighbours, shape (n + 1,).
+        indices: Neighbours, shape (k,).
+        support: Support radius [m].
+
+    Returns:
+        Weights of pairs, shape (k, 1), and of the particle itself, shape (m, 1); order of each row, 0 where M is
+        singular, shape (m,).
     """
     pair = np.zeros((indices.shape[0], 1))
-    own = np.zeros((rows.shape[0], 1))
+    diagonal = np.zeros((rows.shape[0], 1))
     order = np.zeros(rows.shape[0], np.int8)
     basis, moment, right = np.empty(4), np.empty((4, 4)), np.empty((4, 1))
     for r in range(rows.shape[0]):
@@ -143,19 +157,23 @@ def shape_weights(rows, points, offsets, indices, support):
             weight = _basis_and_weight(points, (i, indices[k]), support, basis)
             value = right[0, 0] + basis[1] * right[1, 0] + basis[2] * right[2, 0] + basis[3] * right[3, 0]
             pair[k, 0] = weight * value
-        own[r, 0] = right[0, 0]
-    return pair, own, order
+        diagonal[r, 0] = right[0, 0]
+    return pair, diagonal, order
 
 
 @njit(cache=True)
 def linear_weights(rows, points, offsets, indices, support):
-    """First and second derivatives of the linear MLS shape functions at the particle; columns as below.
+    """Return first derivatives and the Laplacian of the linear MLS shape functions; arguments as ``shape_weights``.
 
     psi_J = b . p_J w_J with M b = p; derivatives of b from M b,i = p,i - M,i b and
     M b,ii = -2 M,i b,i - M,ii b (Belytschko et al. 1996). Offsets are in units of the support radius.
+
+    Returns:
+        Weights of pairs, shape (k, 4), and of the particle itself, shape (m, 4), in the columns d/dx, d/dy, d/dz and
+        Laplacian; order, 0 where M is singular, shape (m,).
     """
     pair = np.zeros((indices.shape[0], 4))
-    own = np.zeros((rows.shape[0], 4))
+    diagonal = np.zeros((rows.shape[0], 4))
     order = np.zeros(rows.shape[0], np.int8)
     for r in range(rows.shape[0]):
         i = rows[r]
@@ -175,7 +193,7 @@ def linear_weights(rows, points, offsets, indices, support):
         for k in range(offsets[i], offsets[i + 1] + 1):
             j = indices[k] if k < offsets[i + 1] else i
             _weight_derivatives(points, (i, j), support, basis, derivative)
-            target = pair[k] if k < offsets[i + 1] else own[r]
+            target = pair[k] if k < offsets[i + 1] else diagonal[r]
             for c in range(3):
                 first, value = _product(coefficients, 1 + c, basis), _product(coefficients, 0, basis)
                 target[c] = (first * derivative[0] + value * derivative[1 + c]) / support
@@ -183,12 +201,12 @@ def linear_weights(rows, points, offsets, indices, support):
                 target[3] += (
                     second * derivative[0] + 2.0 * first * derivative[1 + c] + value * derivative[4 + c]
                 ) / support**2
-    return pair, own, order
+    return pair, diagonal, order
 
 
 @njit(cache=True)
 def _product(matrix, row, vector):
-    """A row of a matrix `(., 4)` times a vector `(4,)`."""
+    """Return the product of a row of a matrix with four columns and a vector."""
     total = 0.0
     for a in range(4):
         total += matrix[row, a] * vector[a]
@@ -197,9 +215,9 @@ def _product(matrix, row, vector):
 
 @njit(cache=True)
 def _weight_derivatives(points, pair, support, basis, derivative):
-    """Weight (1 - q^2)^3 and its derivatives with respect to the position of i: w, w,x w,y w,z, w,xx w,yy w,zz.
+    """Write the weight (1 - q^2)^3 and its derivatives by the position of i: w, w,x w,y w,z, w,xx w,yy w,zz.
 
-    And the offset, in the linear basis (1, x, y, z).
+    The offset is written to the linear basis (1, x, y, z).
     """
     i, j = pair
     square = 0.0
@@ -215,7 +233,7 @@ def _weight_derivatives(points, pair, support, basis, derivative):
 
 @njit(cache=True)
 def _linear_coefficients(moments):
-    """b, b,x b,y b,z, b,xx b,yy b,zz as rows (7, 4); no rows where the moment matrix is singular.
+    """Return b, b,x b,y b,z, b,xx b,yy b,zz as rows (7, 4), or no rows if the moment matrix is singular.
 
     The origin of the basis stays at the particle, so p = (1, 0, 0, 0), p,c = e_c and p_J is constant.
     """
@@ -241,7 +259,7 @@ def _linear_coefficients(moments):
 
 @njit(cache=True)
 def _solve_into(result, row, factor, right):
-    """Write the solution of four equations with a Cholesky factor, whose right-hand side is overwritten, to a row."""
+    """Solve four equations with a Cholesky factor and write the solution to a row; ``right`` is overwritten."""
     substitute(factor, right, 4)
     for a in range(4):
         result[row, a] = right[a, 0]
@@ -249,7 +267,7 @@ def _solve_into(result, row, factor, right):
 
 @njit(cache=True)
 def _offset_and_weight(points, i, j, support, offset):
-    """Scaled offset (written) and weight (1 - q^2)^3 of a pair, zero from the support radius on."""
+    """Write the scaled offset of a pair; return its weight (1 - q^2)^3, zero from the support radius on."""
     square = 0.0
     for d in range(3):
         offset[d] = (points[j, d] - points[i, d]) / support
@@ -259,7 +277,7 @@ def _offset_and_weight(points, i, j, support, offset):
 
 @njit(cache=True)
 def _taylor(d, basis):
-    """Taylor monomials of an offset d (3,), without the constant: linear terms, then second-order ones."""
+    """Write the Taylor monomials of an offset d (3,) without the constant: linear, then second-order terms."""
     basis[0], basis[1], basis[2] = d[0], d[1], d[2]
     basis[3], basis[4], basis[5] = 0.5 * d[0] * d[0], 0.5 * d[1] * d[1], 0.5 * d[2] * d[2]
     basis[6], basis[7], basis[8] = d[0] * d[1], d[0] * d[2], d[1] * d[2]
@@ -267,7 +285,7 @@ def _taylor(d, basis):
 
 @njit(cache=True)
 def _taylor_moment(points, row, support, size, moment):
-    """Sum of weight times outer product of the first monomials over a row of neighbours (lower triangle)."""
+    """Write the lower triangle of the weighted sum of outer products of the first monomials over a row."""
     i, neighbours = row
     basis, offset = np.empty(9), np.empty(3)
     moment[:, :] = 0.0
@@ -280,8 +298,8 @@ def _taylor_moment(points, row, support, size, moment):
 
 
 @njit(cache=True)
-def _wanted(support, size, right):
-    """Right-hand sides: the coefficients of d/dx, d/dy, d/dz and the Laplacian; the latter needs all nine."""
+def _write_targets(support, size, right):
+    """Write the right-hand sides that select d/dx, d/dy, d/dz and the Laplacian, which needs all nine monomials."""
     right[:, :] = 0.0
     for c in range(3):
         right[c, c] = 1.0 / support
@@ -291,12 +309,16 @@ def _wanted(support, size, right):
 
 @njit(cache=True)
 def quadratic_weights(rows, points, offsets, indices, support):
-    """Difference weights per pair and their negative sum at the particle; columns: d/dx, d/dy, d/dz, Laplacian.
+    """Return the weights of a fitted second-order Taylor expansion; arguments as ``shape_weights``.
 
-    A row whose neighbours do not determine the quadratic terms falls back to the linear ones; its order says so.
+    A row whose neighbours do not determine the quadratic terms falls back to a linear fit.
+
+    Returns:
+        Weights of pairs, shape (k, 4), and their negative sums at the particle, shape (m, 4), in the columns d/dx,
+        d/dy, d/dz and Laplacian; order 2, 1 or 0 of each row, shape (m,).
     """
     pair = np.zeros((indices.shape[0], 4))
-    own = np.zeros((rows.shape[0], 4))
+    diagonal = np.zeros((rows.shape[0], 4))
     order = np.zeros(rows.shape[0], np.int8)
     basis, offset = np.empty(9), np.empty(3)
     moment, right = np.empty((9, 9)), np.empty((9, 4))
@@ -306,7 +328,7 @@ def quadratic_weights(rows, points, offsets, indices, support):
             _taylor_moment(points, (i, indices[offsets[i] : offsets[i + 1]]), support, size, moment)
             if factor_spd(moment, size):
                 order[r] = 2 if size == 9 else 1
-                _wanted(support, size, right)
+                _write_targets(support, size, right)
                 substitute(moment, right, size)
                 break
         if order[r] == 0:
@@ -319,5 +341,5 @@ def quadratic_weights(rows, points, offsets, indices, support):
                 for a in range(9):
                     value += basis[a] * right[a, c]
                 pair[k, c] = weight * value
-                own[r, c] -= pair[k, c]
-    return pair, own, order
+                diagonal[r, c] -= pair[k, c]
+    return pair, diagonal, order

@@ -1,7 +1,7 @@
-"""The projection of the paper's ISPG scheme, in strong form.
+"""Projection of the printed ISPG scheme, in strong form.
 
-Velocity prediction (Hu et al., eqs 3 and 12-17), rotational pressure correction (eqs 5-7 and 20-24), and the
-momentum-consistent smoothing of velocities (eqs 27-29), which dissipates what the approximation cannot show.
+Velocity prediction (Hu et al., eqs 3 and 12 to 17), rotational pressure correction (eqs 5 to 7 and 20 to 24), and the
+momentum-consistent smoothing of velocities (eqs 27 to 29), which dissipates what the approximation cannot resolve.
 """
 
 from dataclasses import dataclass
@@ -21,46 +21,56 @@ from reflowshock.particles.discretisation.incompressibility import (
 )
 from reflowshock.particles.gripc.collocation import Operators
 
-# Shape functions of the linear basis average: fast oscillating coefficients hardly show in values or derivatives, so
-# that multigrid and incomplete factors stall (200 iterations leave a residual above 1e-3 at 1728 particles).
+# The linear basis averages fast oscillating coefficients away, so that multigrid and incomplete factors stall (residual
+# above 1e-3 after 200 iterations with 1728 particles).
 PRECONDITIONER = {"quadratic": (PETSc.PC.Type.HYPRE, None), "linear": (PETSc.PC.Type.LU, "mumps")}
 RELAXATION = 0.5
 
 
-def predict_velocity(
-    operators: Operators, fluid: tuple[float, float], velocity: Floats, slope: Floats, basis: str
-) -> Floats:
-    """Return coefficients v* `(3 n,)` [m/s] of rho/dt (v* - v) = mu lap v* - grad p at the particles.
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Coefficients of the momentum equation.
 
-    The printed weak form tests this with as many functions as it has points of integration (direct nodal
-    integration): a square matrix N^T m on both sides, which is left out. Nothing is said of the stress on the free
-    surface; it enters by the pressure there.
+    Attributes:
+        inertia: Density over the time step [kg/(m^3 s)].
+        viscosity: Dynamic viscosity [Pa s].
+    """
+
+    inertia: float
+    viscosity: float
+
+
+def predict_velocity(operators: Operators, material: Material, velocity: Floats, slope: Floats, basis: str) -> Floats:
+    """Solve rho/dt (v* - v) = mu lap v* - grad p at the particles for the coefficients of v*, shape (3 n,) [m/s].
+
+    The printed weak form tests this with as many functions as it has integration points (direct nodal integration), so
+    that a square matrix N^T m on both sides cancels. The stress on the free surface enters by its pressure only.
 
     Args:
-        operators: at the particles.
-        fluid: density over the time step [kg/(m^3 s)] and viscosity [Pa s].
-        velocity: v, unsmoothed velocities `(3 n,)` before the step [m/s].
-        slope: grad p `(3 n,)` of the last pressure [Pa/m].
+        operators: Operators at the particles.
+        material: Density over the time step, and viscosity.
+        velocity: Unsmoothed velocity v before the step, shape (3 n,) [m/s].
+        slope: Gradient of the last pressure, shape (3 n,) [Pa/m].
         basis: "linear" or "quadratic".
 
     Raises:
-        SolveFailed: the linear solve failed.
+        SolveFailed: The linear solve failed.
     """
-    inertia, viscosity = fluid
+    inertia, viscosity = material.inertia, material.viscosity
     matrix = inertia * operators.velocity_values - viscosity * operators.velocity_laplacian
     return solve_gmres(matrix.tocsr(), inertia * velocity - slope, basis)[0]
 
 
 @dataclass(frozen=True, slots=True)
 class Poisson:
-    """Laplacian below the free surface, value on it.
+    """Poisson problem with the Laplacian below the free surface and prescribed values on it.
 
-    The slope along the normal of a wall vanishes because the operators are mirrored there: rows of eq 23, with the
-    derivative along the normal alone, would take the Laplacian from the particles on the walls.
+    The normal derivative at walls vanishes, because the operators are mirrored there. The rows of eq 23, with only the
+    normal derivative, would take the Laplacian from the particles on the walls.
 
     Attributes:
-        operators: at the particles.
-        surface: `(n,)` whether a particle lies on the free surface.
+        operators: Operators at the particles.
+        surface: Whether each particle lies on the free surface, shape (n,).
         basis: "linear" or "quadratic".
     """
 
@@ -69,14 +79,17 @@ class Poisson:
     basis: str
 
     def solve(self, source: Floats, boundary: Floats) -> tuple[Floats, int]:
-        """Return coefficients `(n,)` of f with lap f = source below the surface and f = boundary on it; iterations.
+        """Solve lap f = source below the surface and f = boundary on it.
 
         Args:
-            source: `(n,)`, read below the surface.
-            boundary: `(n,)`, read on the surface.
+            source: Source, read below the surface, shape (n,).
+            boundary: Boundary values, read on the surface, shape (n,).
+
+        Returns:
+            Coefficients of f, shape (n,), and the number of iterations.
 
         Raises:
-            SolveFailed: the linear solve failed.
+            SolveFailed: The linear solve failed.
         """
         on, below = (sparse.diags(mask.astype(float)) for mask in (self.surface, ~self.surface))
         matrix = on @ self.operators.values + below @ self.operators.laplacian
@@ -85,12 +98,12 @@ class Poisson:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What the projection of a velocity gives.
+    """Result of a pressure correction.
 
     Attributes:
-        potential: `(n,)` coefficients of phi [Pa].
-        pressure: `(n,)` at the end of the step [Pa].
-        iterations: of the solve.
+        potential: Coefficients of phi, shape (n,) [Pa].
+        pressure: Pressure at the end of the step, shape (n,) [Pa].
+        iterations: Number of iterations of the solve.
     """
 
     potential: Floats
@@ -99,33 +112,33 @@ class Correction:
 
 
 def correct_pressure(
-    poisson: Poisson, fluid: tuple[float, float], divergence: Floats, pressure: Floats, given: Floats
+    poisson: Poisson, material: Material, divergence: Floats, pressure: Floats, boundary: Floats
 ) -> Correction:
-    """Rotational incremental pressure correction: phi = p_new - p + mu div v* (eqs 21, 22 and 24).
+    """Correct the pressure in rotational incremental form: phi = p_new - p + mu div v* (eqs 21, 22 and 24).
 
     Args:
-        poisson: Laplacian and boundary.
-        fluid: density over the time step [kg/(m^3 s)] and viscosity [Pa s].
-        divergence: `(n,)` of the predicted velocity [1/s].
-        pressure: `(n,)` coefficients of the last pressure [Pa].
-        given: `(n,)` pressure that the free surface has, read there [Pa].
+        poisson: Poisson problem.
+        material: Density over the time step, and viscosity.
+        divergence: Divergence of the predicted velocity, shape (n,) [1/s].
+        pressure: Coefficients of the last pressure, shape (n,) [Pa].
+        boundary: Pressure of the free surface, read there, shape (n,) [Pa].
 
     Raises:
-        SolveFailed: the linear solve failed.
+        SolveFailed: The linear solve failed.
     """
-    inertia, viscosity = fluid
+    inertia, viscosity = material.inertia, material.viscosity
     last = poisson.operators.values @ pressure - viscosity * divergence
-    potential, iterations = poisson.solve(inertia * divergence, given - last)
+    potential, iterations = poisson.solve(inertia * divergence, boundary - last)
     return Correction(potential, poisson.operators.values @ potential + last, iterations)
 
 
 @dataclass(frozen=True, slots=True)
 class Velocities:
-    """What the smoothing keeps from step to step, `(3 n,)` each, by component [m/s].
+    """Velocities that the smoothing hands to the next step, by component, shape (3 n,) each [m/s].
 
     Attributes:
-        coefficients: V of the approximation.
-        unsmoothed: u of the particles, which carry the momentum.
+        coefficients: Coefficients V of the approximation.
+        unsmoothed: Velocities u of the particles, which carry the momentum.
     """
 
     coefficients: Floats
@@ -133,30 +146,32 @@ class Velocities:
 
 
 def smooth(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
-    """Velocities after a step, eq 28: u_new = (1 - a) (u + S (V_new - V)) + a S V_new, a = 0.5.
+    """Return the velocities after a step, u_new = (1 - a) (u + S (V_new - V)) + a S V_new with a = 0.5 (eq 28).
 
     Args:
-        last: velocities before the step.
-        coefficients: V_new `(3 n,)` [m/s].
-        smoothing: S, `(3 n, 3 n)`.
+        last: Velocities before the step.
+        coefficients: New coefficients V_new, shape (3 n,) [m/s].
+        smoothing: Smoothing operator S, shape (3 n, 3 n).
     """
-    kept = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
-    return Velocities(coefficients, (1.0 - RELAXATION) * kept + RELAXATION * (smoothing @ coefficients))
+    carried = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
+    return Velocities(coefficients, (1.0 - RELAXATION) * carried + RELAXATION * (smoothing @ coefficients))
 
 
 def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[Floats, int]:
-    """Solve A x = b, each row scaled by its largest entry: algebraic multigrid, with the linear basis exact factors.
+    """Solve A x = b by GMRES with rows scaled by their largest entry.
+
+    The preconditioner is algebraic multigrid, or an LU factorisation for the linear basis.
 
     Args:
-        matrix: `(d, d)`.
-        right: `(d,)`.
-        basis: that the matrix is made with.
+        matrix: A, shape (d, d).
+        right: b, shape (d,).
+        basis: Basis of the operators in A, "linear" or "quadratic".
 
     Returns:
-        x `(d,)` and the number of iterations.
+        x, shape (d,), and the number of iterations.
 
     Raises:
-        SolveFailed: the true residual of the scaled system stays above the limit.
+        SolveFailed: The true residual of the scaled system exceeds the limit.
     """
     scale = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
     scaled, load = (sparse.diags(scale) @ matrix).tocsr(), scale * right
@@ -170,14 +185,14 @@ def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[F
     solver.getPC().setType(kind)
     if package is not None:
         solver.getPC().setFactorSolverType(package)
-    solution, known = solver.getOperators()[0].createVecs()
-    known.setArray(load)
-    solver.solve(known, solution)
-    found, iterations = solution.getArray().copy(), solver.getIterationNumber()
-    residual = float(np.linalg.norm(scaled @ found - load)) / (float(np.linalg.norm(load)) or 1.0)
+    unknowns, load_vector = solver.getOperators()[0].createVecs()
+    load_vector.setArray(load)
+    solver.solve(load_vector, unknowns)
+    solution, iterations = unknowns.getArray().copy(), solver.getIterationNumber()
+    residual = float(np.linalg.norm(scaled @ solution - load)) / (float(np.linalg.norm(load)) or 1.0)
     if not residual < RESIDUAL_LIMIT:
         raise SolveFailed(
             f"GMRES: relative residual {residual:.2e} above {RESIDUAL_LIMIT:g} after {iterations} iterations "
             f"(PETSc reason {solver.getConvergedReason()})"
         )
-    return found, iterations
+    return solution, iterations

@@ -1,11 +1,11 @@
-"""Particles that come and go with the room: on the surface by its edges, below it by distance.
+"""Insertion and removal of particles: on the surface by edge length, below it by distance.
 
-An event before a step. Edges of the surface longer than 1.6 spacings are split, those shorter than 0.4 collapse. Below
-the surface a particle is put midway between two that are more than 1.5 spacings apart with nothing in between, and one
-of two nearer than 0.2 goes. Each new particle is the mean of two old ones, in place, velocity and pressure.
+An event before a step. Surface edges longer than 1.6 spacings are split, those shorter than 0.4 collapse. Below the
+surface a particle is inserted midway between two that are more than 1.5 spacings apart with nothing in between, and
+one of two nearer than 0.2 is removed. Position, velocity and pressure of a new particle are the mean of two old ones.
 
-The surface keeps its volume and centre: vertices move along it where a collapse has changed them. Momenta are kept by
-the step, which gives particles new masses and makes up for what is missing. What this takes of the energy is counted.
+The surface keeps its volume and centre: where a collapse changes them, vertices move along the normals. The next step
+restores the momenta with the new masses. The change of energy is a remeshing loss.
 """
 
 from collections.abc import Sequence
@@ -25,27 +25,28 @@ from reflowshock.particles.ispg.state import GalerkinState
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, extreme_edges, split_long
 
-# The halves of a split edge are far from collapsing. The diagonals of a cube's faces, 1.41, are left.
+# In spacings. Halves of a split edge are far from collapsing, and diagonals of a cube's faces, 1.41, are not split.
 LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
 GAP, NEAREST = 1.5, 0.2
-# In a cubic lattice the middle of a cell is 0.87 spacings from the corners, which are 1.7 apart: no gap.
+# Radius without a particle that makes a gap. The centre of a cubic lattice cell, 0.87 from the corners, is no gap.
 EMPTY = 0.95
-# Of twice that, how far apart the particles beside a gap are at most.
+# Largest distance of the particles on either side of a gap, over twice ``EMPTY``.
 WIDEST_GAP = 1.2
-# What is nearer to the surface than this would be pushed back at once.
+# Particle shifting would push back particles nearer to the surface than this.
 DEPTH = 0.6
 MOMENT_PASSES, ROUNDING = 16, 1e-15
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """New particles made of old ones.
+    """Replacement of old particles by new ones.
 
     Attributes:
-        first, second: `(n,)` old particles whose mean each one is.
-        surface_count: how many of them are vertices of the surface.
-        triangles: `(t, 3)` of the surface.
-        rings: contact lines.
+        first: First old particle whose mean with the second each new particle is, shape (n,).
+        second: Second old particle, equal to the first for particles that stay, shape (n,).
+        surface_count: Number of new particles that are vertices of the surface.
+        triangles: Triangles of the new surface, shape (t, 3).
+        rings: Contact lines.
     """
 
     first: Indices
@@ -55,29 +56,29 @@ class Change:
     rings: tuple[Indices, ...]
 
     def mean(self, field: Floats) -> Floats:
-        """A field `(n, ...)` of the old particles at the new ones."""
+        """Return a field of the old particles, shape (m, ...), at the new ones, shape (n, ...)."""
         return 0.5 * (field[self.first] + field[self.second])
 
 
 @dataclass(frozen=True, slots=True)
 class Adaptation:
-    """The event.
+    """Event that inserts and removes particles before a step.
 
     Attributes:
-        solver: whose memory of the last step follows.
-        physics: what acts on the body.
+        solver: Step solver whose state follows the change.
+        physics: Effects that act on the body.
     """
 
     solver: IspgStep
     physics: Physics
 
     def update(self, body: Body) -> None:
-        """Change the particles where they are too far apart or too near."""
+        """Insert and remove particles that are too far apart or too close."""
         if self.solver.state is None:
             return
         on_rings = not any(line.has_edge for line in self.physics.lines)
-        for find in (_longer, _shorter):
-            surface = find(body, on_rings)
+        for remesh in (_split_edges, _collapse_edges):
+            surface = remesh(body, on_rings)
             if surface is not None:
                 self._apply(body, _with_inner(body, surface))
         inner = _inner_change(body)
@@ -85,37 +86,43 @@ class Adaptation:
             self._apply(body, inner)
 
     def attempt(self, _body: Body) -> bool:
-        """Nothing."""
+        """Return False: the event tries nothing that a step may reject."""
         return False
 
     def _apply(self, body: Body, change: Change) -> None:
         state = self.solver.state
         if state is None:
-            raise ValueError("only a body that has moved changes its particles")
+            raise ValueError("particles can be inserted or removed after the first step only")
         volume, first, _ = body_moments(body)
         before = self.physics.energy(body)
         for line in self.physics.lines:
             line.follow(body.cloud.rings[line.wall], change.first[change.rings[line.wall]])
         changed = not np.array_equal(change.triangles, body.triangles)
-        _take(body, change)
+        _apply_to_body(body, change)
         if changed:
             restore_moments(body, self.physics, volume, first)
         after = self.physics.energy(body)
         losses = replace(state.losses, rebuilding=state.losses.rebuilding + before - after)
-        state = replace(_taken(state, change), potential=state.potential + after - before, losses=losses)
+        state = replace(_applied_to_state(state, change), potential=state.potential + after - before, losses=losses)
         self.solver.state = state
 
 
 def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) -> None:
-    """Move a surface, as walls and edges admit, to a volume [m^3] and its integral of x `(3,)` [m^4].
+    """Move a surface to a given volume and first moment, as walls and edges admit.
 
-    Along its normal, by amounts that are linear in space: the least motions that change one of the four.
+    Vertices move along their normals by amounts that are linear in space.
+
+    Args:
+        body: Liquid body; moved in place.
+        physics: Effects that act on the body.
+        volume: Enclosed volume [m^3].
+        first: Integral of x over the body, shape (3,) [m^4].
     """
     length = np.cbrt(volume)
     for _ in range(MOMENT_PASSES):
-        found, moments, _ = body_moments(body)
+        enclosed, moments, _ = body_moments(body)
         centre = first / volume
-        missing = np.append(volume - found, (first - moments - (volume - found) * centre) / length)
+        missing = np.append(volume - enclosed, (first - moments - (volume - enclosed) * centre) / length)
         if np.abs(missing).max() <= ROUNDING * volume:
             return
         slope = body.volume()[1]
@@ -127,14 +134,14 @@ def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) 
         body.points = body.points + (powers @ amount)[:, None] * normal
 
 
-def _longer(body: Body, on_rings: bool) -> NewSurface | None:
+def _split_edges(body: Body, on_rings: bool) -> NewSurface | None:
     longest = LONGEST_EDGE * body.cloud.spacing
     if extreme_edges(body.points, body.triangles)[1] <= longest:
         return None
     return _if_changed(body, split_long(*_surface(body), longest, on_rings))
 
 
-def _shorter(body: Body, on_rings: bool) -> NewSurface | None:
+def _collapse_edges(body: Body, on_rings: bool) -> NewSurface | None:
     shortest = SHORTEST_EDGE * body.cloud.spacing
     if extreme_edges(body.points, body.triangles)[0] >= shortest:
         return None
@@ -146,37 +153,38 @@ def _surface(body: Body) -> tuple[Floats, Indices, Sequence[Indices]]:
 
 
 def _if_changed(body: Body, surface: NewSurface) -> NewSurface | None:
-    kept = np.arange(body.cloud.surface_count)
-    return None if np.array_equal(surface.first, kept) and np.array_equal(surface.second, kept) else surface
+    vertices = np.arange(body.cloud.surface_count)
+    is_same = np.array_equal(surface.first, vertices) and np.array_equal(surface.second, vertices)
+    return None if is_same else surface
 
 
 def _with_inner(body: Body, surface: NewSurface) -> Change:
-    """A new surface around the old particles below it."""
+    """Return the change to a new surface with the old particles below it."""
     inner = body.interior
     first, second = np.concatenate((surface.first, inner)), np.concatenate((surface.second, inner))
     return Change(first, second, len(surface.first), surface.triangles, surface.rings)
 
 
 def _inner_change(body: Body) -> Change | None:
-    """What comes and goes below the surface, None where nothing does."""
-    lists = find_neighbours(body.points, 2.0 * EMPTY * WIDEST_GAP * body.cloud.spacing)
-    gone, pairs = _too_near(body, lists), _gaps(body, lists)
-    if not len(gone) and not len(pairs):
+    """Return the insertions and removals below the surface, or None without any."""
+    offsets, indices = find_neighbours(body.points, 2.0 * EMPTY * WIDEST_GAP * body.cloud.spacing)
+    removed, pairs = _too_close(body, offsets, indices), _gaps(body, offsets, indices)
+    if not len(removed) and not len(pairs):
         return None
-    kept = np.setdiff1d(np.arange(len(body.points), dtype=np.int32), gone)
-    first, second = np.concatenate((kept, pairs[:, 0])), np.concatenate((kept, pairs[:, 1]))
+    remaining = np.setdiff1d(np.arange(len(body.points), dtype=np.int32), removed)
+    first, second = np.concatenate((remaining, pairs[:, 0])), np.concatenate((remaining, pairs[:, 1]))
     return Change(first, second, body.cloud.surface_count, body.triangles, body.cloud.rings)
 
 
-def _too_near(body: Body, lists: tuple[Indices, Indices]) -> Indices:
-    """Particles below the surface to leave out: one of two that are too near."""
-    crowded = _crowded(body.points, *lists, NEAREST * body.cloud.spacing)
+def _too_close(body: Body, offsets: Indices, indices: Indices) -> Indices:
+    """Return the particles below the surface to remove: one of two that are too close."""
+    crowded = _crowded(body.points, offsets, indices, NEAREST * body.cloud.spacing)
     return crowded[crowded >= body.cloud.surface_count]
 
 
 @njit(cache=True)
 def _crowded(points, offsets, indices, nearest):
-    """The later ones of pairs not farther apart than the nearest may be, `(m,)`, ascending."""
+    """Return the larger index of each pair of particles closer than ``nearest``, shape (m,), ascending."""
     crowded, count = np.empty(points.shape[0], np.int32), 0
     for i in range(points.shape[0]):
         for k in range(offsets[i], offsets[i + 1]):
@@ -188,10 +196,10 @@ def _crowded(points, offsets, indices, nearest):
     return crowded[:count]
 
 
-def _gaps(body: Body, lists: tuple[Indices, Indices]) -> Indices:
-    """Pairs of particles `(m, 2)` in the middle of which there is room for another one."""
+def _gaps(body: Body, offsets: Indices, indices: Indices) -> Indices:
+    """Return pairs of particles with room for another one in the middle, shape (m, 2)."""
     spacing, points = body.cloud.spacing, body.points
-    pairs, room = _open_pairs(points, *lists, GAP * spacing, EMPTY * spacing)
+    pairs, room = _open_pairs(points, offsets, indices, GAP * spacing, EMPTY * spacing)
     if not len(pairs):
         return pairs
     middle = 0.5 * (points[pairs[:, 0]] + points[pairs[:, 1]])
@@ -200,19 +208,19 @@ def _gaps(body: Body, lists: tuple[Indices, Indices]) -> Indices:
     inside &= (wall[:, 0] == wall[:, 1]) | (_height(body, middle) > DEPTH * spacing)
     chosen: list[int] = []
     for candidate in np.argsort(-room, kind="stable"):
-        near = [np.linalg.norm(middle[candidate] - middle[one]) for one in chosen]
-        if inside[candidate] and min(near, default=np.inf) > EMPTY * spacing:
+        distances = [np.linalg.norm(middle[candidate] - middle[other]) for other in chosen]
+        if inside[candidate] and min(distances, default=np.inf) > EMPTY * spacing:
             chosen.append(int(candidate))
     return pairs[chosen].reshape(-1, 2)
 
 
 @njit(cache=True)
 def _open_pairs(points, offsets, indices, gap, empty):
-    """Pairs `(m, 2)` more than a gap apart with no particle nearer to their middle than `empty`, and how far apart."""
+    """Return pairs more than ``gap`` apart with no particle within ``empty`` of their middle, and their distances."""
     pairs, apart, count = np.empty((indices.shape[0] // 2 + 1, 2), np.int32), np.empty(indices.shape[0] // 2 + 1), 0
     least, limit = max(gap, 2.0 * empty) ** 2, empty**2
     for i in range(points.shape[0]):
-        last = i  # what was in the middle of the pair before is likely to be in that of this one, too
+        last = i  # the particle in the middle of the last pair is likely to be in this one, too
         for a in range(offsets[i], offsets[i + 1]):
             j = indices[a]
             if j < i:
@@ -237,13 +245,13 @@ def _open_pairs(points, offsets, indices, gap, empty):
 
 @njit(cache=True)
 def _square(points, j, x, y, z):
-    """Square of the distance of a point from a place."""
+    """Return the squared distance of point j from (x, y, z)."""
     dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
     return dx * dx + dy * dy + dz * dz
 
 
 def _depth(body: Body, points: Floats) -> Floats:
-    """Depth of points `(m, 3)` below the tangent plane of the nearest vertex of the surface [m]."""
+    """Return the depth of points of shape (m, 3) below the tangent plane of the nearest vertex, shape (m,) [m]."""
     surface, slope = body.points[: body.cloud.surface_count], body.volume()[1][: body.cloud.surface_count]
     nearest = cKDTree(surface).query(points)[1]
     normal = slope[nearest] / np.linalg.norm(slope[nearest], axis=1)[:, None]
@@ -251,13 +259,13 @@ def _depth(body: Body, points: Floats) -> Floats:
 
 
 def _height(body: Body, points: Floats) -> Floats:
-    """Distance of points `(m, 3)` from the nearest wall [m]."""
+    """Return the distance of points of shape (m, 3) from the nearest wall, shape (m,) [m]."""
     heights = [-plate.side * plate.local(points)[:, 2] for plate in body.plates]
     return np.min([np.full(len(points), np.inf), *heights], axis=0)
 
 
-def _take(body: Body, change: Change) -> None:
-    """Give a body its new particles."""
+def _apply_to_body(body: Body, change: Change) -> None:
+    """Replace the particles of a body in place."""
     wall: NDArray[np.int8] = body.cloud.wall
     walls = np.where(wall[change.first] == wall[change.second], wall[change.first], -1).astype(np.int8)
     body.points = change.mean(body.points)
@@ -273,8 +281,8 @@ def _take(body: Body, change: Change) -> None:
     )
 
 
-def _taken(state: GalerkinState, change: Change) -> GalerkinState:
-    """What the last step left, at the new particles."""
+def _applied_to_state(state: GalerkinState, change: Change) -> GalerkinState:
+    """Return the state of the last step at the new particles."""
     last = state.history
     displacement, change_of_velocity = change.mean(last.displacement), change.mean(last.velocity_change)
     return replace(

@@ -1,8 +1,8 @@
-"""Kernels of the Galerkin scheme: linear MLS shape functions with their derivatives, and what is summed over them.
+"""Kernels of the Galerkin space: linear MLS shape functions with their derivatives, and sums over their rows.
 
-Columns are particles and, after them, their images at the walls. A row has its weights side by side, (psi, psi,x psi,y
-psi,z) of a pair: sums over a row or, transposed, over a column touch each pair once. Sums run in one order whatever the
-number of threads.
+Columns are particles, followed by their ghosts. A row stores the weights (psi, psi,x psi,y psi,z) of each pair side by
+side, so that sums over a row, or over a column for transposes, visit each pair once. The order of summation does not
+depend on the number of threads.
 """
 
 import numpy as np
@@ -10,31 +10,38 @@ from numba import njit, prange
 
 from reflowshock.particles.ispg.stencils import factor_spd, substitute
 
-# Support radius in spacings; but the 16th neighbour lies within 1 / 1.2 of it: four must not lie in a plane.
+# Support radius in spacings; it is extended until the 16th neighbour lies within 1 / 1.2 of it.
 SUPPORT, FEWEST, WIDER = 2.0, 16, 1.2
-ROWS = 64  # that share their room for stencils
+ROWS = 64  # rows that share work arrays
 
 
 @njit(cache=True, parallel=True)
 def supports(rows, points, lists, spacing):
-    """Square of the support radius of some particles `(m,)`, and the number of points within it.
+    """Return the squared support radius of some particles, and the number of points within it.
 
-    The radius is zero where the lists, which reach `lists[2]`, do not hold enough points.
+    Args:
+        rows: Particles, shape (m,).
+        points: Particles and ghosts, shape (n + g, 3) [m].
+        lists: Offsets and indices of the neighbours, and the radius of the search [m].
+        spacing: Particle spacing [m].
+
+    Returns:
+        Squared radii, zero where the search found too few points, shape (m,) [m^2], and numbers of points, shape (m,).
     """
     offsets, indices, reach = lists
     squares, lengths = np.zeros(rows.shape[0]), np.ones(rows.shape[0], np.int64)
     for r in prange(rows.shape[0]):
         i, support = np.int64(rows[r]), (SUPPORT * spacing) ** 2
-        own, limit = indices[offsets[i] : offsets[i + 1]], support / WIDER**2
+        neighbours, limit = indices[offsets[i] : offsets[i + 1]], support / WIDER**2
         near, within = 0, 0
-        for j in own:
+        for j in neighbours:
             square = _square(points, i, j)
             near += square < limit
             within += square < support
-        if near < FEWEST and len(own) >= FEWEST:
-            support = max(support, WIDER**2 * _square_of_the_fewest(points, i, own))
-            within = _count_within(points, i, own, support)
-        if max(near, len(own)) >= FEWEST and support <= reach**2:
+        if near < FEWEST and len(neighbours) >= FEWEST:
+            support = max(support, WIDER**2 * _square_of_the_fewest(points, i, neighbours))
+            within = _count_within(points, i, neighbours, support)
+        if max(near, len(neighbours)) >= FEWEST and support <= reach**2:
             squares[r] = support
             lengths[r] += within
     return squares, lengths
@@ -42,14 +49,14 @@ def supports(rows, points, lists, spacing):
 
 @njit(cache=True)
 def _square(points, i, j):
-    """Square of the distance of two points."""
+    """Return the squared distance of two points."""
     x, y, z = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
     return x * x + y * y + z * z
 
 
 @njit(cache=True)
 def _count_within(points, i, neighbours, limit):
-    """How many neighbours of a point are nearer than a limit, the square of a distance."""
+    """Return the number of neighbours of a point within a squared distance."""
     count = 0
     for j in neighbours:
         count += _square(points, i, j) < limit
@@ -58,7 +65,7 @@ def _count_within(points, i, neighbours, limit):
 
 @njit(cache=True)
 def _square_of_the_fewest(points, i, neighbours):
-    """Square of the distance within which are just enough neighbours of a point."""
+    """Return the squared distance of the 16th neighbour of a point."""
     nearest = np.full(FEWEST, np.inf)  # ascending
     for j in neighbours:
         square, at = _square(points, i, j), FEWEST - 1
@@ -72,16 +79,16 @@ def _square_of_the_fewest(points, i, neighbours):
 
 @njit(cache=True)
 def with_rows(lists, rows, others):
-    """Lists of neighbours in which some rows are others, which list the point itself, too."""
-    (offsets, indices), (starts, found) = lists, others
+    """Return neighbour lists with some rows replaced; the new rows may contain the particle itself."""
+    (offsets, indices), (starts, replacements) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
     for r in range(rows.shape[0]):
         number[rows[r]] = r
-    result, ends = np.empty(indices.shape[0] + found.shape[0], np.int32), np.zeros_like(offsets)
+    result, ends = np.empty(indices.shape[0] + replacements.shape[0], np.int32), np.zeros_like(offsets)
     at = 0
     for i in range(number.shape[0]):
         n = number[i]
-        for j in indices[offsets[i] : offsets[i + 1]] if n < 0 else found[starts[n] : starts[n + 1]]:
+        for j in indices[offsets[i] : offsets[i + 1]] if n < 0 else replacements[starts[n] : starts[n + 1]]:
             if j != i:
                 result[at] = j
                 at += 1
@@ -91,7 +98,7 @@ def with_rows(lists, rows, others):
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
 def _stencil(points, row, support, places):
-    """Offsets of a row's points in units of the support and, after them, 1 - their squares, `places (4, m)`."""
+    """Write the offsets of a row's points over the support radius and 1 - their squares to ``places`` (4, m)."""
     i, columns = row
     x, y, z, scale = points[i, 0], points[i, 1], points[i, 2], 1.0 / support
     for k in range(columns.shape[0]):
@@ -104,7 +111,7 @@ def _stencil(points, row, support, places):
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
 def _moments(places, count, moments):
-    """Moment matrix of the linear basis (1, x, y, z), lower triangle: M = sum of w p p^T, w = rest^3."""
+    """Write the lower triangle of the moment matrix M = sum of w p p^T, p = (1, x, y, z), w = (1 - r^2)^3."""
     m0 = mx = my = mz = xx = xy = xz = yy = yz = zz = 0.0
     for k in range(count):
         x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
@@ -119,7 +126,7 @@ def _moments(places, count, moments):
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
 def _slope_loads(places, count, first, loads):
-    """Right-hand sides e_c - M,c b, columns of `loads (4, 3)`, by the position of the row's particle; b is `first`."""
+    """Write the right-hand sides e_c - M,c b to the columns of ``loads`` (4, 3); b is ``first``."""
     sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0
     b0, b1, b2, b3 = first[0, 0], first[1, 0], first[2, 0], first[3, 0]
     for k in range(count):
@@ -136,25 +143,35 @@ def _slope_loads(places, count, first, loads):
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
 def _weights(places, count, solved, result):
-    """Weights `(m, 4)` of a row by b `(4, 1)` and its slopes `(4, 3)`, in `solved`; the support is one."""
+    """Write the weights of a row to ``result`` (m, 4) from b (4, 1) and its derivatives (4, 3); the support is one."""
     first, slopes = solved
     for k in range(count):
         x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
         square = rest * rest
         value = first[0, 0] + first[1, 0] * x + first[2, 0] * y + first[3, 0] * z
-        steep, cube = 6.0 * value * square, square * rest
+        gradient, cube = 6.0 * value * square, square * rest
         result[k, 0] = value * cube
-        result[k, 1] = (slopes[0, 0] + slopes[1, 0] * x + slopes[2, 0] * y + slopes[3, 0] * z) * cube + steep * x
-        result[k, 2] = (slopes[0, 1] + slopes[1, 1] * x + slopes[2, 1] * y + slopes[3, 1] * z) * cube + steep * y
-        result[k, 3] = (slopes[0, 2] + slopes[1, 2] * x + slopes[2, 2] * y + slopes[3, 2] * z) * cube + steep * z
+        result[k, 1] = (slopes[0, 0] + slopes[1, 0] * x + slopes[2, 0] * y + slopes[3, 0] * z) * cube + gradient * x
+        result[k, 2] = (slopes[0, 1] + slopes[1, 1] * x + slopes[2, 1] * y + slopes[3, 1] * z) * cube + gradient * y
+        result[k, 3] = (slopes[0, 2] + slopes[1, 2] * x + slopes[2, 2] * y + slopes[3, 2] * z) * cube + gradient * z
 
 
 @njit(cache=True, parallel=True)
 def shape_rows(points, lists, squares, starts, shares):
-    """Columns and weights `(k, 4)` of all rows, and the density of particles `(count,)` [1/m^3].
+    """Return the columns and weights of all rows, and the particle densities.
 
-    psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b. The
-    density counts each point by its share `(n + g,)`, without a constant factor; it is zero where M is singular.
+    psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b.
+
+    Args:
+        points: Particles and ghosts, shape (n + g, 3) [m].
+        lists: Offsets and indices of the neighbours.
+        squares: Squared support radii, shape (n,) [m^2].
+        starts: Start of each row, shape (n + 1,).
+        shares: Share with which each point counts in the density, shape (n + g,).
+
+    Returns:
+        Columns, shape (k,), weights, shape (k, 4), and densities up to a constant factor, zero where M is singular,
+        shape (n,) [1/m^3].
     """
     offsets, indices = lists
     count, longest = squares.shape[0], np.diff(starts).max()
@@ -162,7 +179,7 @@ def shape_rows(points, lists, squares, starts, shares):
     density = np.zeros(count)
     for part in prange((count + ROWS - 1) // ROWS):
         places, moments, first, slopes = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 1)), np.empty((4, 3))
-        begin = ROWS * np.int64(part)  # unsigned, as of prange, all that is called would be compiled twice
+        begin = ROWS * np.int64(part)  # a signed index, or numba compiles every callee twice
         for i in range(begin, min(count, begin + ROWS)):
             support, at = np.sqrt(squares[i]), starts[i]
             columns[at] = i
@@ -170,28 +187,28 @@ def shape_rows(points, lists, squares, starts, shares):
                 if _square(points, i, indices[k]) < squares[i]:
                     at += 1
                     columns[at] = indices[k]
-            own, result = columns[starts[i] : at + 1], weights[starts[i] : at + 1]
-            _stencil(points, (i, own), support, places)
-            _moments(places, len(own), moments)
+            stencil, result = columns[starts[i] : at + 1], weights[starts[i] : at + 1]
+            _stencil(points, (i, stencil), support, places)
+            _moments(places, len(stencil), moments)
             if not factor_spd(moments, 4):
                 continue
             first[:], first[0] = 0.0, 1.0
             substitute(moments, first, 4)
-            _slope_loads(places, len(own), first, slopes)
+            _slope_loads(places, len(stencil), first, slopes)
             substitute(moments, slopes, 4)
-            _weights(places, len(own), (first, slopes), result)
-            found = 0.0
-            for k in range(len(own)):
-                found += shares[own[k]] * places[3, k] ** 3
+            _weights(places, len(stencil), (first, slopes), result)
+            total = 0.0
+            for k in range(len(stencil)):
+                total += shares[stencil[k]] * places[3, k] ** 3
                 for c in range(1, 4):
                     result[k, c] /= support
-            density[i] = found / support**3
+            density[i] = total / support**3
     return columns, weights, density
 
 
 @njit(cache=True)
 def values(starts, columns, weights, field):
-    """Fields `(n + g, d)` as the shape functions show them at the particles, `(n, d)`."""
+    """Return N f at the particles, shape (n, d), of a field with ghosts, shape (n + g, d)."""
     result = np.zeros((starts.shape[0] - 1, field.shape[1]))
     for i in range(result.shape[0]):
         for k in range(starts[i], starts[i + 1]):
@@ -202,7 +219,7 @@ def values(starts, columns, weights, field):
 
 @njit(cache=True)
 def spread(starts, columns, weights, parts, source):
-    """The transposed of `values` of a scalar that is even at the walls, from `(n,)` to `(n,)`."""
+    """Apply the transpose of ``values`` for a scalar that is even at the walls; shapes (n,)."""
     count = starts.shape[0] - 1
     result = np.zeros(count)
     for i in range(count):
@@ -214,9 +231,16 @@ def spread(starts, columns, weights, parts, source):
 
 @njit(cache=True, fastmath={"contract"})
 def lost_power(rows, fields, factors, walls):
-    """Power [W] of the forces of `resistance` of a first velocity in a second one, both with images `(n + g, 3)`.
+    """Return the power in one velocity field of the forces that resist another one.
 
-    By smoothing, walls, whose velocities are `(n, 3)`, and viscosity.
+    Args:
+        rows: Starts, columns and weights.
+        fields: Velocity that causes the forces and velocity in which they act, with ghosts, shape (n + g, 3) [m/s].
+        factors: Coefficients of ``resistance``, shape (n, 3).
+        walls: Wall velocities, shape (n, 3) [m/s].
+
+    Returns:
+        Power of smoothing, of wall drag and of viscosity [W].
     """
     (starts, columns, weights), (first, second) = rows, fields
     smoothing = sliding = viscous = 0.0
@@ -239,7 +263,7 @@ def lost_power(rows, fields, factors, walls):
 
 @njit(cache=True)
 def velocity_gradient(starts, columns, weights, field):
-    """Velocity gradient `(n, 3, 3)`, [i, c, d] = d v_c / d x_d, of velocities `(n + g, 3)`."""
+    """Return the gradient d v_c / d x_d, shape (n, 3, 3) [1/s], of velocities with ghosts, shape (n + g, 3) [m/s]."""
     count = starts.shape[0] - 1
     gradient = np.empty((count, 3, 3))
     for i in range(count):
@@ -265,10 +289,17 @@ def velocity_gradient(starts, columns, weights, field):
 
 @njit(cache=True, fastmath={"contract"})
 def resistance(starts, columns, weights, field, factors):
-    """Forces `(n + g, 3)` that resist velocities `(n + g, 3)`, in one pass over the rows.
+    """Return the forces of smoothing, wall drag and viscosity that resist a velocity field, in one pass over the rows.
 
-    Factors `(n, 3)` of each particle: of v - N v, with the same on v - N v [kg/s]; of N v, on N v [kg/s]; of the strain
-    rate, twice which is the stress times volume [N m s].
+    Args:
+        starts: Start of each row, shape (n + 1,).
+        columns: Columns, shape (k,).
+        weights: Weights, shape (k, 4).
+        field: Velocities with ghosts, shape (n + g, 3) [m/s].
+        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
+
+    Returns:
+        Forces on particles and ghosts, shape (n + g, 3) [N].
     """
     result = np.zeros(field.shape)
     for i in range(starts.shape[0] - 1):
@@ -280,12 +311,12 @@ def resistance(starts, columns, weights, field, factors):
             x0, x1, x2, x3 = x0 + w0 * x, x1 + w1 * x, x2 + w2 * x, x3 + w3 * x
             y0, y1, y2, y3 = y0 + w0 * y, y1 + w1 * y, y2 + w2 * y, y3 + w3 * y
             z0, z1, z2, z3 = z0 + w0 * z, z1 + w1 * z, z2 + w2 * z, z3 + w3 * z
-        rough, drag, viscous = factors[i, 0], factors[i, 1], factors[i, 2]
-        fx, fy, fz = rough * (field[i, 0] - x0), rough * (field[i, 1] - y0), rough * (field[i, 2] - z0)
+        smoothing, drag, viscous = factors[i, 0], factors[i, 1], factors[i, 2]
+        fx, fy, fz = smoothing * (field[i, 0] - x0), smoothing * (field[i, 1] - y0), smoothing * (field[i, 2] - z0)
         result[i, 0] += fx
         result[i, 1] += fy
         result[i, 2] += fz
-        # Of each column: the force on N v and the stresses, by the weights of psi and its derivatives.
+        # Distribute the force on N v and the stresses over the columns by the weights of psi and its derivatives.
         x0, y0, z0 = drag * x0 - fx, drag * y0 - fy, drag * z0 - fz
         xy, xz, yz = viscous * (x2 + y1), viscous * (x3 + z1), viscous * (y3 + z2)
         xx, yy, zz = 2.0 * viscous * x1, 2.0 * viscous * y2, 2.0 * viscous * z3
@@ -300,7 +331,7 @@ def resistance(starts, columns, weights, field, factors):
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Divergence `(n,)` of velocities `(n + g, 3)`."""
+    """Return the divergence, shape (n,) [1/s], of velocities with ghosts, shape (n + g, 3) [m/s]."""
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):
@@ -314,7 +345,7 @@ def divergence(starts, columns, weights, field):
 
 @njit(cache=True)
 def divergence_transposed(starts, columns, weights, factor, result):
-    """Add the transposed of `divergence` to forces `(n + g, 3)`."""
+    """Add the transpose of ``divergence`` times ``factor`` (n,) [N m] to forces with ghosts, shape (n + g, 3) [N]."""
     for i in range(starts.shape[0] - 1):
         f = factor[i]
         if f != 0.0:
@@ -327,7 +358,7 @@ def divergence_transposed(starts, columns, weights, factor, result):
 
 @njit(cache=True)
 def reflected(field, source, reflection):
-    """A vector field `(n, 3)` with its images `(n + g, 3)`."""
+    """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3)."""
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
     for i in range(count):
@@ -344,7 +375,7 @@ def reflected(field, source, reflection):
 
 @njit(cache=True)
 def folded(forces, source, reflection):
-    """Forces `(n, 3)` of those on the particles and their images `(n + g, 3)`: the transposed of `reflected`."""
+    """Apply the transpose of ``reflected`` to forces on particles and ghosts, shape (n + g, 3) to (n, 3) [N]."""
     count = forces.shape[0] - source.shape[0]
     result = forces[:count].copy()
     for g in range(source.shape[0]):

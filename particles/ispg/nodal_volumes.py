@@ -1,12 +1,11 @@
-"""Volumes of particles, weights of direct nodal integration or masses: exact for 1 and x, nearly for x x.
+"""Nodal volumes: weights of direct nodal integration and volumes of masses, fitted to the moments of the body.
 
-A particle has the cell that the density of particles around it leaves, half of one on the free surface or a wall. These
-volumes, which know the shape of the liquid only roughly, become v exp(q), q a quadratic polynomial, so that sums over
-the particles of 1 and x equal the integrals over the body that the tracked surface encloses, and those of x x nearly:
-of all positive volumes they have the least sum of their relative entropy to the first ones, over the volume of the
-body, and of |missing x x / (V h^2)|^2 / (2 softness). Were second moments exact, a film of one or two spacings would
-leave next to nothing to the particles of its surfaces: cells at z = 0 and h have three times the moment of a film of
-thickness h, and particles without mass are thrown out of the liquid.
+The cell of a particle follows from the particle density around it, halved on the free surface and on a wall. These
+volumes v know the shape of the liquid only roughly. They become v exp(q), with a quadratic polynomial q, so that sums
+over the particles of 1 and x equal the integrals over the enclosed body exactly, and those of x x nearly. Of all
+positive volumes they minimise the relative entropy to v over the volume V, plus |missing x x / (V h^2)|^2 /
+(2 softness). With exact second moments, surface particles of a film of one or two spacings would get next to no mass
+(cells at z = 0 and h have three times the moment of a film of thickness h) and be ejected from the liquid.
 """
 
 from typing import TypeAlias
@@ -22,22 +21,25 @@ from reflowshock.particles.ispg.stencils import factor_spd, substitute
 
 Moments: TypeAlias = tuple[float, Floats, Floats]
 PAIRS = np.triu_indices(3)
-# Products of two directions stand for two entries of x x.
+# Multiplicity of the moments in x x; off-diagonal entries occur twice.
 ENTRIES = np.concatenate((np.full(4, np.inf), np.where(PAIRS[0] == PAIRS[1], 1.0, 2.0)))
 NEWTON_STEPS = 30
 TOLERANCE = 1e-12
-# Of the second moments: what a particle at the middle of its cell leaves out of it is 0.08 of volume times h^2.
+# Softness of the second moments: a particle at the centre of its cell misses 0.08 of volume times h^2.
 SOFTNESS = 0.03
 
 
 class NoNodalVolumes(RuntimeError):
-    """No positive volumes of the particles have the centre of the body."""
+    """Error of particles for which no positive volumes match the volume and the centre of the body."""
 
 
 def body_moments(body: Body) -> Moments:
-    """Integrals of 1 [m^3], x `(3,)` [m^4] and x x `(3, 3)` [m^5] over the liquid, by tetrahedra with the origin."""
-    if (own := body.moments()) is not None:
-        return own
+    """Return the integrals over the liquid of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
+
+    They are sums over tetrahedra between the triangles of the boundary and the origin.
+    """
+    if (exact := body.moments()) is not None:
+        return exact
     moments = np.zeros(13)
     _add_moments(body.points, body.triangles, moments)
     for ring, plate in zip(body.cloud.rings, body.plates, strict=True):
@@ -48,17 +50,17 @@ def body_moments(body: Body) -> Moments:
 
 @njit(cache=True)
 def _fan(count, forward):
-    """Triangles between a first point and each two of `count` others in a ring, `(count, 3)`."""
+    """Return the triangles between point 0 and successive points 1 to ``count`` in a ring, shape (count, 3)."""
     result = np.empty((count, 3), np.int32)
     for k in range(count):
-        own, after = 1 + k, 1 + (k + 1) % count
-        result[k] = (0, own, after) if forward else (0, after, own)
+        point, after = 1 + k, 1 + (k + 1) % count
+        result[k] = (0, point, after) if forward else (0, after, point)
     return result
 
 
 @njit(cache=True)
 def _add_moments(points, triangles, result):
-    """Add integrals of 1, x and x x over tetrahedra between triangles `(t, 3)` and the origin, one after the other."""
+    """Add the integrals of 1, x and x x over tetrahedra between triangles (t, 3) and the origin to ``result`` (13,)."""
     for t in range(triangles.shape[0]):
         a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
         volume = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
@@ -73,13 +75,21 @@ def _add_moments(points, triangles, result):
 
 
 def cell_share(body: Body) -> Floats:
-    """Part of a whole cell that each particle has, were walls not there, `(n,)`."""
+    """Return the share of a full cell of each particle without regard to walls: a half on the surface, shape (n,)."""
     on_surface = np.arange(len(body.points)) < body.cloud.surface_count
     return np.where(on_surface, 0.5, 1.0)
 
 
 def wall_shares(body: Body, volumes: Floats) -> Floats:
-    """Wetted area that each particle on a wall stands for `(n,)` [m^2]: shared out by their volumes `(n,)` [m^3]."""
+    """Return the wetted wall area of each particle, distributed by volume, zero off the walls.
+
+    Args:
+        body: Liquid body.
+        volumes: Nodal volumes, shape (n,) [m^3].
+
+    Returns:
+        Areas, shape (n,) [m^2].
+    """
     areas = np.zeros(len(body.points))
     for wall, ring in enumerate(body.cloud.rings):
         on_wall = body.cloud.wall == wall
@@ -89,38 +99,44 @@ def wall_shares(body: Body, volumes: Floats) -> Floats:
 
 
 def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
-    """Volumes of the particles `(n,)` [m^3].
+    """Return the nodal volumes, the weights of integration, shape (n,) [m^3].
 
     Args:
-        body: the liquid body.
-        density: `(n,)` of particles around each, walls mirrored, the free surface counted by `cell_share`.
-        moments: of the body.
+        body: Liquid body.
+        density: Particle density at each particle, with walls mirrored and the free surface counted by ``cell_share``,
+            shape (n,).
+        moments: Integrals of 1, x and x x over the body.
 
     Raises:
-        NoNodalVolumes: there are none.
+        NoNodalVolumes: No positive volumes match the volume and the centre of the body.
     """
-    # Around a particle of the free surface only half of its surroundings are liquid.
+    # Only half of the surroundings of a surface particle are liquid.
     on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
     return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud), moments)
 
 
 def with_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
-    """The volumes `(n,)` [m^3] closest to some cells `(n,)`, in any unit, that have the moments of the body.
+    """Return the volumes closest to given cells that have the moments of the body, shape (n,) [m^3].
+
+    Args:
+        body: Liquid body.
+        cells: Relative cell volumes, in any unit, shape (n,).
+        moments: Integrals of 1, x and x x over the body.
 
     Raises:
-        NoNodalVolumes: there are none.
+        NoNodalVolumes: No positive volumes match the volume and the centre of the body.
     """
     volume, first, second = moments
     centre, length = first / volume, np.cbrt(volume)
     central = (second - np.outer(first, first) / volume) / length**2
-    wanted = np.concatenate(([volume], np.zeros(3), central[PAIRS]))
+    required = np.concatenate(([volume], np.zeros(3), central[PAIRS]))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / ENTRIES
-    return fitted_volumes(cells * (volume / cells.sum()), _powers(body.points, centre, length), wanted, softness)
+    return fitted_volumes(cells * (volume / cells.sum()), _powers(body.points, centre, length), required, softness)
 
 
 @njit(cache=True)
 def _powers(points, centre, length):
-    """Monomials `(n, 10)` up to the second degree of points, from a centre `(3,)` in units of a length."""
+    """Return the monomials up to degree two of (points - centre) / length, shape (n, 10)."""
     result = np.ones((points.shape[0], 10))
     for i in range(points.shape[0]):
         x, y, z = (
@@ -134,45 +150,51 @@ def _powers(points, centre, length):
     return result
 
 
-def fitted_volumes(found: Floats, powers: Floats, wanted: Floats, softness: Floats) -> Floats:
-    """Volumes v exp(q) of n particles `(n,)` with k moments, q a polynomial.
+def fitted_volumes(cells: Floats, powers: Floats, moments: Floats, softness: Floats) -> Floats:
+    """Return volumes v exp(q) with given moments, q a polynomial; see the module.
 
     Args:
-        found: v, `(n,)` [m^3]; they add up to the volume of the body.
-        powers: `(n, k)` monomials at the particles, without unit, the first one is 1.
-        wanted: `(k,)` their integrals over the body [m^3].
-        softness: `(k,)` of them [m^3], 0 where they are exact.
+        cells: Volumes v, whose sum is the volume of the body, shape (n,) [m^3].
+        powers: Dimensionless monomials at the particles, the first of which is 1, shape (n, k).
+        moments: Required sums of volumes times monomials, shape (k,) [m^3].
+        softness: Softness of each moment, 0 if exact, shape (k,) [m^3].
+
+    Returns:
+        Volumes, shape (n,) [m^3].
 
     Raises:
-        NoNodalVolumes: there are none.
+        NoNodalVolumes: No positive volumes have these moments.
     """
-    volume = wanted[0]
-    found, missing = _fitted(powers, found, wanted, softness)
+    volume = moments[0]
+    volumes, missing = _fitted(powers, cells, moments, softness)
     if missing < TOLERANCE * volume:
-        return found
-    raise NoNodalVolumes("the particles fill the liquid too unevenly: no volumes of theirs have its centre")
+        return volumes
+    raise NoNodalVolumes(
+        "the particles are too uneven: no nodal volumes match the volume and the centre of the liquid; "
+        "try another solder.numerics.spacing"
+    )
 
 
 @njit(cache=True)
-def _fitted(powers, volumes, wanted, softness):
-    """Volumes `(n,)` times exp(powers q) with wanted sums of powers `(n, k)`, and the largest that is missing of one.
+def _fitted(powers, volumes, required, softness):
+    """Return volumes (n,) times exp(powers q) with required moments (k,), and the largest error of a moment.
 
-    Newton's method for q; what is missing may be softness times q. Infinity: particles do not tell powers apart.
+    Newton's method for q; a moment may miss softness times q. The error is infinite if the monomials are dependent.
     """
-    (count, size), found, growth = powers.shape, volumes.copy(), np.empty(len(volumes))
+    (count, size), result, growth = powers.shape, volumes.copy(), np.empty(len(volumes))
     factors, sums, change, matrix = np.zeros(size), np.empty(size), np.empty((size, 1)), np.empty((size, size))
     for step in range(NEWTON_STEPS + 1):
-        _take_sums(powers, found, sums, matrix)
+        _take_sums(powers, result, sums, matrix)
         missing = 0.0
         for a in range(size):
-            change[a, 0] = wanted[a] - sums[a] - softness[a] * factors[a]
+            change[a, 0] = required[a] - sums[a] - softness[a] * factors[a]
             matrix[a, a] += softness[a]
             if abs(change[a, 0]) > missing or np.isnan(change[a, 0]):
                 missing = abs(change[a, 0])
-        if missing < TOLERANCE * wanted[0] or step == NEWTON_STEPS:
+        if missing < TOLERANCE * required[0] or step == NEWTON_STEPS:
             break
         if not _solve(matrix, change):
-            return found, np.inf
+            return result, np.inf
         largest = 1.0
         for i in range(count):
             growth[i] = 0.0
@@ -182,13 +204,13 @@ def _fitted(powers, volumes, wanted, softness):
         for a in range(size):
             factors[a] += change[a, 0] / largest
         for i in range(count):
-            found[i] *= np.exp(growth[i] / largest)
-    return found, missing
+            result[i] *= np.exp(growth[i] / largest)
+    return result, missing
 
 
 @njit(cache=True, fastmath={"contract"})
 def _take_sums(powers, volumes, sums, matrix):
-    """Write the sums of powers times volumes `(k,)`, and of their products `(k, k)`."""
+    """Write the sums over particles of volume times monomial (k,) and of volume times products of two (k, k)."""
     sums[:] = 0.0
     matrix[:] = 0.0
     for i in range(powers.shape[0]):
@@ -201,9 +223,9 @@ def _take_sums(powers, volumes, sums, matrix):
 
 @njit(cache=True)
 def _solve(matrix, right):
-    """Solve a symmetric positive definite system in place, right-hand side `(k, 1)`; False where a pivot vanishes.
+    """Solve a symmetric positive definite system in place, right-hand side (k, 1); return False if a pivot vanishes.
 
-    In units of the unknowns that make its diagonal 1: powers of a film's thickness are small, but not dependent.
+    The diagonal is scaled to 1, because powers of a film's thickness are small without being dependent.
     """
     size = matrix.shape[0]
     scale = np.empty(size)

@@ -19,7 +19,7 @@ from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle
 from reflowshock.particles.scenes.reflow import contact_line, start_flow, stop_rule
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
-from reflowshock.particles.steps.shape import JointShape, Snapshot, numbered_on, together
+from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenated, shifted_indices
 from reflowshock.particles.surface.profile import fit_profile
 
 WORST = ("_error", "_drift", "_scatter", "_at_rest")
@@ -132,13 +132,13 @@ def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> J
     """All drops that are left as one shape, the history that of the first; `capillary`: mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = together([body.points for body in bodies], counts)
+    points = concatenated([body.points for body in bodies], counts)
     return JointShape(
         points=points,
-        velocity=together([body.velocity for body in bodies], counts),
-        pressure=together([particle_pressure(drop.flow) for drop in drops], counts),
+        velocity=concatenated([body.velocity for body in bodies], counts),
+        pressure=concatenated([particle_pressure(drop.flow) for drop in drops], counts),
         surface_points=points[: sum(counts)],
-        triangles=np.concatenate(numbered_on([body.triangles for body in bodies], counts)),
+        triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=(),
         history=Run(records=drops[0].records).history(capillary),
         snapshots=_stages(drops),
@@ -164,6 +164,6 @@ def _now(drop: MovingDrop) -> Snapshot:
 
 def _side_by_side(states: Sequence[Snapshot]) -> Snapshot:
     """States of several drops as one."""
-    triangles = numbered_on([state.triangles for state in states], [len(state.points) for state in states])
+    triangles = shifted_indices([state.triangles for state in states], [len(state.points) for state in states])
     points = np.concatenate([state.points for state in states])
     return Snapshot(max(state.time for state in states), points, np.concatenate(triangles))

@@ -24,7 +24,7 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
-from reflowshock.particles.steps.shape import JointShape, numbered_on, together
+from reflowshock.particles.steps.shape import JointShape, concatenated, shifted_indices
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, with_lids
 from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
 from reflowshock.particles.surface.morphological_closing import smooth_slits
@@ -243,16 +243,16 @@ def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> 
     """
     bodies = [flow.body for flow, _ in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = together([body.points for body in bodies], counts)
+    points = concatenated([body.points for body in bodies], counts)
     kept = {name: number for name, number in joint.metrics.items() if name in KEPT_METRICS}
     return replace(
         joint,
         points=points,
-        velocity=together([body.velocity for body in bodies], counts),
-        pressure=together([particle_pressure(flow) for flow, _ in drops], counts),
+        velocity=concatenated([body.velocity for body in bodies], counts),
+        pressure=concatenated([particle_pressure(flow) for flow, _ in drops], counts),
         surface_points=points[: sum(counts)],
-        triangles=np.concatenate(numbered_on([body.triangles for body in bodies], counts)),
-        rings=tuple(numbered_on([body.cloud.rings[0] for body in bodies], counts)),
+        triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
+        rings=tuple(shifted_indices([body.cloud.rings[0] for body in bodies], counts)),
         metrics=kept | _drop_metrics(solder, drops),
     )
 

@@ -1,1 +1,1 @@
-"""One time step towards rest or with inertia, and steps until rest; start with `flow.py`."""
+"""Time steps of a liquid body, with inertia or towards rest, and runs until it is at rest; start with ``flow.py``."""

@@ -1,9 +1,9 @@
-"""Time integration of second order: BDF2 for any ratio of steps, as a backward Euler step from a shifted start.
+"""BDF2 for variable steps, written as a backward Euler step from a shifted start.
 
-With r = dt / dt_before, BDF2 reads x = x_base + dt_eff v and v = v_base + dt_eff a; dt_eff = dt (1 + r) / (1 + 2 r),
-x_base = x_n + w (x_n - x_before), v_base = v_n + w (v_n - v_before), w = r^2 / (1 + 2 r). The first step is backward
-Euler. A mode of frequency omega is damped at a rate of omega^4 dt^3 / 4 and slowed by a fraction (omega dt)^2 / 3.
-`stepped` gives the effects as that backward Euler step sees them.
+With r = dt / dt_before, BDF2 reads x = x_base + dt_eff v and v = v_base + dt_eff a, where
+dt_eff = dt (1 + r) / (1 + 2 r), x_base = x_n + w (x_n - x_before), v_base = v_n + w (v_n - v_before) and
+w = r^2 / (1 + 2 r). The first step is backward Euler. A mode of frequency omega is damped at a rate of
+omega^4 dt^3 / 4 and slowed by a fraction (omega dt)^2 / 3. ``stepped`` converts effects to that backward Euler step.
 """
 
 from dataclasses import dataclass, replace
@@ -22,13 +22,13 @@ from reflowshock.particles.physics.plate_motion import PlateMotion
 
 @dataclass(frozen=True, slots=True)
 class Base:
-    """Where the equivalent backward Euler step starts.
+    """Start of the equivalent backward Euler step.
 
     Attributes:
-        points: `(n, 3)` [m].
-        velocity: `(n, 3)` [m/s].
-        time_step: [s].
-        weight: of the last step.
+        points: Positions, shape (n, 3) [m].
+        velocity: Velocity, shape (n, 3) [m/s].
+        time_step: Effective time step [s].
+        weight: Weight w of the last step.
     """
 
     points: Floats
@@ -39,7 +39,13 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class LastStep:
-    """The last step: its displacement and change of velocity, `(n, 3)`, and its size [s]; infinite at the start."""
+    """Last step of a two-step method.
+
+    Attributes:
+        displacement: Displacement, shape (n, 3) [m].
+        velocity_change: Change of the velocity, shape (n, 3) [m/s].
+        time_step: Size of the step [s]; infinite before the first step.
+    """
 
     displacement: Floats
     velocity_change: Floats
@@ -47,16 +53,22 @@ class LastStep:
 
     @classmethod
     def start(cls, count: int) -> Self:
-        """Start a body of `count` particles."""
+        """Return the history of ``count`` particles before their first step."""
         return cls(np.zeros((count, 3)), np.zeros((count, 3)))
 
 
 @dataclass(frozen=True, slots=True)
 class BackwardDifference(LastStep):
-    """The last step, as this method continues it."""
+    """Last step, continued by BDF2."""
 
     def base(self, points: Floats, velocity: Floats, time_step: float) -> Base:
-        """Start of the equivalent step from positions and velocities `(n, 3)` now, for a time step [s]."""
+        """Return the start of the equivalent backward Euler step.
+
+        Args:
+            points: Current positions, shape (n, 3) [m].
+            velocity: Current velocity, shape (n, 3) [m/s].
+            time_step: Time step [s].
+        """
         ratio = time_step / self.time_step
         weight = ratio**2 / (1.0 + 2.0 * ratio)
         return Base(
@@ -69,30 +81,30 @@ class BackwardDifference(LastStep):
 
 @dataclass(frozen=True, slots=True)
 class PredictedTension:
-    """Surface tension has moved the body to the predicted positions already: only the rest is implicit.
+    """Implicit surface tension in a step from predicted positions, which already contain its displacement.
 
     Attributes:
-        tension: the surface tension.
-        velocity: of the prediction, `(n, 3)` [m/s].
+        tension: Surface tension.
+        velocity: Predicted velocity, shape (n, 3) [m/s].
     """
 
     tension: SurfaceTension
     velocity: Floats
 
     def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
-        """Return dt gamma K v, `(n, 3)` [N]."""
+        """Return dt gamma K v with the predicted velocity, shape (n, 3) [N]."""
         matrix = self.tension.matrix(body, space, time_step)
         return np.ascontiguousarray((matrix @ self.velocity.T.ravel()).reshape(3, -1).T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SteppedMotion:
-    """Motion of a plate as the equivalent backward Euler step sees it: after the whole step it is where it should be.
+    """Motion of a plate in the equivalent backward Euler step; it is exact at the end of the whole step.
 
     Attributes:
-        motion: of the plate.
-        carried: `(6,)` displacement and rotation from the last step that the step starts with [m, rad].
-        whole: the whole time step [s].
+        motion: Motion of the plate.
+        carried: Displacement and rotation carried on from the last step, shape (6,) [m, rad].
+        whole: Whole time step [s].
     """
 
     motion: PlateMotion
@@ -106,27 +118,27 @@ class SteppedMotion:
 
     @property
     def directions(self) -> Floats:
-        """The twists with which the plate moves freely, `(k, 6)`."""
+        """Twists with which the plate floats, shape (k, 6)."""
         return self.motion.directions
 
     @property
     def load(self) -> Floats:
-        """Force on the plate besides the solder's, `(3,)` [N]."""
+        """External force on the plate, shape (3,) [N]."""
         return self.motion.load
 
     def given(self, plate: Plate, time_step: float) -> Floats:
-        """Twist `(6,)` at the end of the step [m/s, rad/s]."""
+        """Return the twist at the end of the step, shape (6,) [m/s, rad/s]."""
         return (self.whole * self.motion.given(plate, self.whole) - self.carried) / time_step
 
 
 def stepped(physics: Physics, velocity: Floats, carried: dict[int, Floats], time_step: float) -> Physics:
-    """Physics of a step [s] at the positions that a velocity `(n, 3)` predicts.
+    """Return the effects as the equivalent backward Euler step from predicted positions uses them.
 
     Args:
-        physics: what acts on the body.
-        velocity: of the prediction [m/s].
-        carried: `(6,)` of each plate that moves, what the last step carries it on [m, rad].
-        time_step: the whole step [s].
+        physics: Effects that act on the body.
+        velocity: Predicted velocity, shape (n, 3) [m/s].
+        carried: Displacement carried on from the last step by each moving plate, shape (6,) [m, rad].
+        time_step: Whole time step [s].
     """
     tensions = (part for part in physics.operators if isinstance(part, SurfaceTension))
     momenta = (*physics.momenta, *(PredictedTension(tension, velocity) for tension in tensions))

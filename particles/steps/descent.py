@@ -1,9 +1,9 @@
-"""What keeps the surface's triangles well shaped may not raise the energy of a body that relaxes.
+"""Mesh smoothing that does not raise the energy of a body that relaxes.
 
-A step along the forces lowers the energy. Smoothing and flips leave the shape, but not the energy of the triangles that
-stand for it: they move vertices in the tangent plane and exchange diagonals of quadrangles that are not flat. So they
-are done as far as the energy of the step allows: that before it, at the same volume. All of it is compared with what
-the forces are the gradient of, the energy of the triangles.
+A step along the forces lowers the energy. Smoothing and flips keep the shape, but not the energy of the triangles that
+represent it: they move vertices in the tangent plane and swap diagonals of quadrangles that are not flat. They are
+therefore done as far as the energy permits: that before the step, at the same volume. The energy is the one whose
+gradient are the forces.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,66 +23,86 @@ from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoo
 
 VOLUME_PASSES = 2
 SAME_VOLUME = 1e-14
-# Of the energies' sizes: what volume corrections and sums leave.
+# Tolerance of the energy, relative to the sum of magnitudes, for volume corrections and summation.
 ROUNDING = 1e-10
-# Of the spacing: a plate that a step moves by less has arrived.
+# Displacement of a plate, in spacings, below which it counts as at rest.
 ARRIVED = 1e-12
 SHARE_PASSES = 12
-# Of the energy that a step may give to smoothing: so much may be left. Where smoothing undoes a step, this decides how
-# fast a body creeps on that would else be at rest: at 0.01 by more energy in a step than `solder.numerics.tolerance`.
+# Share of the energy available for smoothing that may be left. Where smoothing undoes a step, it sets how fast a body
+# creeps that would otherwise be at rest: at 0.01 by more energy per step than ``solder.numerics.tolerance``.
 LEFT_OVER = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
-    """What edges hold: of each contact line the states and pads of the vertices, which were stopped, its constant."""
+class PinningState:
+    """Pinning of a contact line.
 
-    lines: tuple[tuple[NDArray[np.int8], Indices, NDArray[np.bool_], float], ...]
+    Attributes:
+        state: State of each vertex, shape (k,).
+        pad: Pad of each vertex, shape (k,).
+        stopped: Whether each vertex was stopped at an edge, shape (k,).
+        constant: Constant of the energy of the line [J].
+    """
+
+    state: NDArray[np.int8]
+    pad: Indices
+    stopped: NDArray[np.bool_]
+    constant: float
 
     @classmethod
-    def of(cls, lines: Sequence[ContactLine]) -> "Held":
-        """Remember how lines are."""
-        return cls(tuple((line.state.copy(), line.pad, line.stopped, line.constant) for line in lines))
+    def of(cls, line: ContactLine) -> "PinningState":
+        """Copy the current pinning of a contact line."""
+        return cls(line.state.copy(), line.pad, line.stopped, line.constant)
 
-    def restore(self, lines: Sequence[ContactLine]) -> None:
-        """Make lines as they were."""
-        for line, (state, pad, stopped, constant) in zip(lines, self.lines, strict=True):
-            line.state, line.pad, line.stopped, line.constant = state.copy(), pad, stopped, constant
+    def restore(self, line: ContactLine) -> None:
+        """Give a contact line this pinning."""
+        line.state, line.pad, line.stopped, line.constant = self.state.copy(), self.pad, self.stopped, self.constant
+
+
+def pinning_of(lines: Sequence[ContactLine]) -> list[PinningState]:
+    """Copy the current pinning of contact lines."""
+    return [PinningState.of(line) for line in lines]
+
+
+def restore_pinning(saved: Sequence[PinningState], lines: Sequence[ContactLine]) -> None:
+    """Give contact lines the pinning that ``pinning_of`` returned."""
+    for pinning, line in zip(saved, lines, strict=True):
+        pinning.restore(line)
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
-    """Where a step began, to begin it again: a step makes new arrays.
+class StepStart:
+    """Start of a step, to repeat the step from; a step replaces arrays and does not change them in place.
 
     Attributes:
-        body: as it was.
-        held: what edges held.
+        body: Body at the start.
+        pinning: Pinning of the contact lines.
     """
 
     body: Body
-    held: Held
+    pinning: Sequence[PinningState]
 
     @classmethod
-    def of(cls, body: Body, lines: Sequence[ContactLine]) -> "Start":
-        """Remember where a body is."""
-        return cls(replace(body), Held.of(lines))
+    def of(cls, body: Body, lines: Sequence[ContactLine]) -> "StepStart":
+        """Copy the current body and the pinning of its contact lines."""
+        return cls(replace(body), pinning_of(lines))
 
     def restore(self, body: Body, lines: Sequence[ContactLine]) -> None:
-        """Put the body back."""
+        """Return the body and its contact lines to the start of the step."""
         for entry in fields(body):
             setattr(body, entry.name, getattr(self.body, entry.name))
-        self.held.restore(lines)
+        restore_pinning(self.pinning, lines)
 
 
 @dataclass(frozen=True, slots=True)
 class MeshSmoothing:
-    """How the triangles are evened out.
+    """Mesh smoothing after a step.
 
     Attributes:
-        passes: of smoothing; of the last, the part that is left of a whole number is done.
-        flips: whether edges are flipped, too.
-        flip_worth: angle [rad] for which a flip may even out the numbers of triangles (`flip_to_delaunay`).
-        highest: energy that the body may have afterwards [J].
+        passes: Number of smoothing passes; the last one is done in part if the number is not whole.
+        flips: Whether edges are flipped, too.
+        flip_worth: Angle beyond Delaunay for which a flip may balance the numbers of triangles [rad].
+        highest: Energy that the body may have afterwards [J].
     """
 
     passes: float
@@ -92,10 +112,16 @@ class MeshSmoothing:
 
 
 def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: float) -> float:
-    """Energy [J] that a step [s] must not exceed: that before it, where nothing but the energy drives the body.
+    """Return the energy that a body must not exceed after a step: that before it, if only energy drives the body [J].
 
-    Infinite where momentum is kept, a plate is moved (its work is not known), or friction holds a contact line, which
-    no energy describes.
+    It is infinite with inertia, with moving plates, whose work is unknown, and with contact-line friction, which has no
+    energy.
+
+    Args:
+        body: Liquid body.
+        physics: Effects that act on the body.
+        solver: Step solver.
+        time_step: Time step [s].
     """
     relaxes = solver.traits.descends and not physics.momenta and all(line.has_energy for line in physics.lines)
     if not relaxes or is_driven(body, physics, time_step):
@@ -104,51 +130,59 @@ def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: 
 
 
 def is_driven(body: Body, physics: Physics, time_step: float) -> bool:
-    """Whether a plate is moved in a step [s]."""
+    """Return whether a plate moves along a prescribed path in a step [s]."""
     for motion in physics.motions:
         plate, line = body.plates[motion.wall], body.points[body.cloud.rings[motion.wall]]
-        way = time_step * plate.rigid_velocity(motion.given(plate, time_step), line)
-        if np.abs(way).max() > ARRIVED * body.cloud.spacing:
+        displacement = time_step * plate.rigid_velocity(motion.given(plate, time_step), line)
+        if np.abs(displacement).max() > ARRIVED * body.cloud.spacing:
             return True
     return False
 
 
-def smooth_surface(body: Body, physics: Physics, volume: float, evening: MeshSmoothing) -> int | None:
-    """Flip edges and smooth the surface as far as the energy permits; correct the volume [m^3], stop lines at edges.
+def smooth_surface(body: Body, physics: Physics, volume: float, smoothing: MeshSmoothing) -> int | None:
+    """Flip edges and smooth the surface as far as the energy permits, correct the volume, and stop lines at edges.
+
+    Args:
+        body: Liquid body; changed in place.
+        physics: Effects that act on the body.
+        volume: Enclosed volume [m^3].
+        smoothing: Passes, flips and the highest energy.
 
     Returns:
-        The number of flips; None where the energy is too high even without flips and smoothing.
+        Number of flips; None if the energy is too high even without flips and smoothing.
     """
-    cloud, triangles, points, held = body.cloud, body.triangles, body.points, Held.of(physics.lines)
-    if evening.flips:
+    cloud, triangles, points = body.cloud, body.triangles, body.points
+    pinning = pinning_of(physics.lines)
+    if smoothing.flips:
         lines = (*cloud.rings, *(on for _, on in surface_planes(cloud)))
-        body.triangles, flips = flip_to_delaunay(points, triangles, lines, evening.flip_worth)
-        if _smooth(body, physics, volume, evening):
+        body.triangles, flips = flip_to_delaunay(points, triangles, lines, smoothing.flip_worth)
+        if _smooth(body, physics, volume, smoothing):
             return flips
-        held.restore(physics.lines)
+        restore_pinning(pinning, physics.lines)
         body.points, body.triangles = points, triangles
         if not flips:
             return None
-    return 0 if _smooth(body, physics, volume, evening) else None
+    return 0 if _smooth(body, physics, volume, smoothing) else None
 
 
-def _smooth(body: Body, physics: Physics, volume: float, evening: MeshSmoothing) -> bool:
-    """Smooth as far as the energy permits, at a volume [m^3]; return whether it permits any."""
-    start, offset, held = body.points, _offset(body, physics, evening.passes), Held.of(physics.lines)
+def _smooth(body: Body, physics: Physics, volume: float, smoothing: MeshSmoothing) -> bool:
+    """Smooth as far as the energy permits, at a volume [m^3]; return whether the energy is low enough."""
+    start, offset = body.points, _offset(body, physics, smoothing.passes)
+    pinning = pinning_of(physics.lines)
 
     def smooth(share: float) -> None:
-        held.restore(physics.lines)
+        restore_pinning(pinning, physics.lines)
         body.points = start + share * offset
         correct_volume(body, physics, volume)
         for line in physics.lines:
             line.stop_at_edges(body)
-        correct_volume(body, physics, volume)  # of the vertices that were caught
+        correct_volume(body, physics, volume)  # moved by the vertices that were stopped
 
     def excess(share: float) -> float:
         smooth(share)
-        return physics.energy(body) - evening.highest
+        return physics.energy(body) - smoothing.highest
 
-    if np.isinf(evening.highest):
+    if np.isinf(smoothing.highest):
         smooth(1.0)
         return True
     above = excess(1.0)
@@ -162,9 +196,9 @@ def _smooth(body: Body, physics: Physics, volume: float, evening: MeshSmoothing)
 
 
 def _largest_share(excess: Callable[[float], float], below: float, above: float) -> float:
-    """Return the largest share in [0, 1] at which an excess, below zero at 0 and above at 1, is not positive.
+    """Return the largest share in [0, 1] at which an excess, negative at 0 and positive at 1, is not positive.
 
-    To a small part of the excess at 0, by false position; an end that stays twice counts half (the Illinois method).
+    Regula falsi with the Illinois modification, to a small share of the excess at 0.
     """
     low, high, reached, enough = 0.0, 1.0, below, LEFT_OVER * below
     was_below = None
@@ -184,7 +218,7 @@ def _largest_share(excess: Callable[[float], float], below: float, above: float)
 
 
 def _offset(body: Body, physics: Physics, passes: float) -> Floats:
-    """Displacement `(n, 3)` [m] of some passes of smoothing, as walls, planes and edges allow it."""
+    """Return the displacement of some smoothing passes as walls, planes and edges admit it, shape (n, 3) [m]."""
     cloud, surface = body.cloud, body.surface()
     count, planes = cloud.surface_count, surface_planes(cloud)
     for done in range(ceil(passes)):
@@ -196,10 +230,10 @@ def _offset(body: Body, physics: Physics, passes: float) -> Floats:
 
 
 def correct_volume(body: Body, physics: Physics, volume: float) -> None:
-    """Move a body to a volume [m^3] along its gradient, by Newton steps."""
+    """Move a body along the gradient of its volume to a given volume [m^3], by Newton steps."""
     for _ in range(VOLUME_PASSES):
-        found, gradient = body.volume()
-        if abs(volume - found) <= SAME_VOLUME * volume:
+        enclosed, gradient = body.volume()
+        if abs(volume - enclosed) <= SAME_VOLUME * volume:
             return
         gradient = physics.admit(body, gradient)
-        body.points = body.points + (volume - found) / (gradient**2).sum() * gradient
+        body.points = body.points + (volume - enclosed) / (gradient**2).sum() * gradient

@@ -1,8 +1,8 @@
-"""One implicit step of molten solder, Lagrangian Navier-Stokes (Hu et al., eqs 1-7).
+"""Flow of a liquid body: one implicit step of Lagrangian Navier-Stokes after the other (Hu et al., eqs 1 to 7).
 
-A step: contact line events; forces; saddle-point solve for velocity and pressure; move; smooth and flip the surface;
-correct the volume along its gradient; shift the interior. Each of these lives in its own module. A body that relaxes
-ends each step with no more energy than it had (`descent`).
+A step: contact line events; forces; solve for velocity and pressure; move; smooth and flip the surface; correct the
+volume along its gradient; shift the interior particles. Each part has its own module. A body that relaxes ends each
+step with no more energy than before (``descent.py``).
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.descent import MeshSmoothing, Start, correct_volume, highest_energy, smooth_surface
+from reflowshock.particles.steps.descent import MeshSmoothing, StepStart, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.interior_shift import interior_shift
 from reflowshock.particles.steps.shape import Snapshot
 from reflowshock.particles.steps.step_solver import Motion, PreparedStep, StepSolver
@@ -27,25 +27,29 @@ from reflowshock.particles.surface.surface_quality import vertex_normals
 
 SKIN = 0.2
 FLIP_INTERVAL = 2
-STEADY = 0.02  # share of itself by which a steady motion changes in a step
-FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # that a saved flow consists of
+STEADY = 0.02  # relative change per step below which a motion is steady
+FLOW_RECORDS = (Body, Cloud, Plate, Pad, TimeStep)  # dataclasses in a checkpoint of a flow
 SAVED = ("body", "time_step", "volume", "time", "steps", "pace")
 
 
 @dataclass(frozen=True, slots=True)
 class StepRecord:
-    """What a step did.
+    """Record of a step.
 
     Attributes:
-        step, time, time_step, binding: number, end and size of the step [s], and what bound its size.
-        height, volume, energy: of the body after the step [m, m^3, J].
-        speed: largest velocity of the surface along its normal, smoothing and correction included [m/s]; beyond that
-            of a rigid motion that nothing ends.
-        displacement: that velocity times the time step, over the spacing.
-        flips: edges flipped.
-        iterations: conjugate gradient steps of the pressure solve.
-        standoff: height of the second plate's origin above the first plate [m]; not a number with fewer plates.
-        pull: mean force that has moved a plate, along its way [N]; not a number where none was moved.
+        step: Number of the step.
+        time: Time at its end [s].
+        time_step: Its size [s].
+        binding: Criterion that bounds its size.
+        height: Height of the body after the step [m].
+        volume: Volume after the step [m^3].
+        energy: Potential energy after the step [J].
+        speed: Largest normal velocity of the surface, smoothing and correction included, less slow rigid drift [m/s].
+        displacement: That velocity times the time step, over the spacing.
+        flips: Number of flipped edges.
+        iterations: Number of iterations of the pressure solve.
+        standoff: Height of the second plate's origin above the first plate [m]; NaN with fewer plates.
+        pull: Mean force on plates with prescribed motion, along it [N]; NaN without such motion.
     """
 
     step: int
@@ -64,10 +68,10 @@ class StepRecord:
 
 
 class LiquidFlow:
-    """A liquid body that flows under its physics.
+    """Liquid body that flows under its physics.
 
     Attributes:
-        records: what a saved one consists of.
+        records: Dataclasses in a checkpoint.
     """
 
     records: ClassVar[tuple[type, ...]] = FLOW_RECORDS
@@ -76,10 +80,10 @@ class LiquidFlow:
         """Set up the neighbour list of the solver and remember the volume to keep.
 
         Args:
-            body: the liquid body; changed in place.
-            physics: what acts on it.
-            time_step: the step size control.
-            solver: of the motion in a step.
+            body: Liquid body; changed in place.
+            physics: Effects that act on the body.
+            time_step: Step size control.
+            solver: Step solver.
         """
         spacing = body.cloud.spacing
         self.body, self.physics, self.time_step, self.solver = body, physics, time_step, solver
@@ -89,7 +93,7 @@ class LiquidFlow:
         self.pace = np.zeros((body.cloud.surface_count, 3))  # mean velocity of the surface in the last step [m/s]
 
     def saved(self) -> dict[str, Any]:
-        """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
+        """Return the data that a checkpoint keeps; a flow of the same physics continues from it to the same bits."""
         return {name: getattr(self, name) for name in SAVED} | {
             "lines": [line.saved() for line in self.physics.lines],
             "solver": self.solver.saved(),
@@ -97,11 +101,11 @@ class LiquidFlow:
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         for name in SAVED:
             setattr(self, name, saved[name])
-        for line, kept in zip(self.physics.lines, saved["lines"], strict=True):
-            line.restore(kept)
+        for line, state in zip(self.physics.lines, saved["lines"], strict=True):
+            line.restore(state)
         self.solver.restore(saved["solver"])
         self.neighbours.restore(saved["neighbours"])
 
@@ -109,14 +113,14 @@ class LiquidFlow:
         """Advance one time step.
 
         Raises:
-            SolveFailed: the linear solve failed.
-            FloatingPointError: a position is not finite.
-            StepCollapsed: a particle would move too far in the shortest step.
+            SolveFailed: The linear solve failed.
+            FloatingPointError: A position is not finite.
+            StepCollapsed: A particle would move too far in the shortest step.
         """
         body = self.body
         for event in self.physics.events:
             event.update(body)
-        correct_volume(body, self.physics, self.volume)  # events move the vertices that they catch
+        correct_volume(body, self.physics, self.volume)  # events move the vertices that they pin
         before = body.points[: body.cloud.surface_count].copy()
         motion, flips = self._descend()
         self.neighbours.update(body.points)
@@ -125,73 +129,74 @@ class LiquidFlow:
         self.time += self.time_step.size
         self.pace = (body.points[: len(before)] - before) / self.time_step.size
         record = self._record(flips, motion)
-        # Where momentum is kept, the next step will be as fast.
+        # With inertia the next step will be as fast.
         self.time_step.grow(motion.top_speed if self.physics.momenta else 0.0)
         return record
 
     def outward(self) -> Floats:
-        """Unit normals out of the liquid at the vertices of the surface `(s, 3)`."""
+        """Return the outward unit normals at the vertices of the surface, shape (s, 3)."""
         return vertex_normals(self.body.points, self.body.triangles, self.body.cloud.surface_count)
 
     def profile(self) -> Profile:
-        """Cross-sections of the surface against their height."""
+        """Return the areas of the horizontal cross-sections against height."""
         body = self.body
         return fit_profile(body.points, body.triangles, body.span(), body.cloud.parts)
 
     def snapshot(self) -> Snapshot:
-        """Particles and surface as they are."""
+        """Return a copy of the current particles and surface."""
         body = self.body.whole()
         return Snapshot(self.time, body.points.copy(), body.triangles.copy())
 
     def _descend(self) -> tuple[Motion, int]:
         """Move so that the energy does not rise; return the motion and the number of flips."""
-        body, start = self.body, Start.of(self.body, self.physics.lines)
+        body, start = self.body, StepStart.of(self.body, self.physics.lines)
         highest = highest_energy(body, self.physics, self.solver, self.time_step.size)
         traits = self.solver.traits
-        evening = MeshSmoothing(traits.smoothing_passes, self.steps % FLIP_INTERVAL == 0, traits.flip_worth, highest)
+        smoothing = MeshSmoothing(traits.smoothing_passes, self.steps % FLIP_INTERVAL == 0, traits.flip_worth, highest)
         attempted = [event.attempt(body) for event in self.physics.events]
         if any(attempted):
             correct_volume(body, self.physics, self.volume)
             time_step = replace(self.time_step)
-            done = self._move(evening)
+            done = self._move(smoothing)
             if done is not None:
                 return done
             start.restore(body, self.physics.lines)
             self.time_step = time_step
         while True:
-            done = self._move(evening)
+            done = self._move(smoothing)
             if done is not None:
                 return done
             start.restore(body, self.physics.lines)
             self.time_step.cut_for_energy()
 
-    def _move(self, evening: MeshSmoothing) -> tuple[Motion, int] | None:
-        """Move the body by one step; None where its energy is too high after it."""
+    def _move(self, smoothing: MeshSmoothing) -> tuple[Motion, int] | None:
+        """Move the body by one step; return the motion and the number of flips, or None if its energy is too high."""
         body = self.body
         motion = self._accelerate(self.solver.prepare(body, self.physics, self.neighbours))
-        steps = 1.0 if np.isinf(evening.highest) else self._steady_steps(motion)
+        steps = 1.0 if np.isinf(smoothing.highest) else self._steady_steps(motion)
         if steps > 1.0:
-            start, time_step = Start.of(body, self.physics.lines), replace(self.time_step)
+            start, time_step = StepStart.of(body, self.physics.lines), replace(self.time_step)
             self.time_step.prolong(steps)
-            flips = self._follow(motion, evening)
+            flips = self._follow(motion, smoothing)
             if flips is not None:
                 return motion, flips
             start.restore(body, self.physics.lines)
             self.time_step = time_step
-        flips = self._follow(motion, evening)
+        flips = self._follow(motion, smoothing)
         return None if flips is None else (motion, flips)
 
-    def _follow(self, motion: Motion, evening: MeshSmoothing) -> int | None:
-        """Move the body along; return the number of flips, None where its energy is too high after it."""
+    def _follow(self, motion: Motion, smoothing: MeshSmoothing) -> int | None:
+        """Move the body and smooth its surface; return the number of flips, or None if its energy is too high."""
         self.body.move(self.time_step.size, motion.transport, motion.twists)
-        return smooth_surface(self.body, self.physics, self.volume, evening)
+        return smooth_surface(self.body, self.physics, self.volume, smoothing)
 
     def _steady_steps(self, motion: Motion) -> float:
-        """Over how many steps a motion goes on that is steady: at the rate of its change, until nothing of it is left.
+        """Return the number of steps for which a steady motion may continue at once.
 
-        A body that has overflowed both pads slides as a whole, and nothing resists but the mass, the more the smaller
-        the steps are: it would creep. It must go as it went in the last step, smoothing included: where smoothing
-        undoes what the forces move, these move the same in each step, too, but lead nowhere.
+        The motion may change at its present rate until nothing of it is left. A body that has overflowed both pads
+        slides as a whole, resisted only by a mass term that grows with smaller steps, and would creep. The motion must
+        equal that of the last step, smoothing included: where smoothing undoes what the forces move, these move the
+        same distance in each step, too, but to no effect.
         """
         if self.solver.traits.keeps_time:
             return 1.0
@@ -205,7 +210,7 @@ class LiquidFlow:
         )
 
     def _accelerate(self, prepared: PreparedStep) -> Motion:
-        """Solve for velocity and pressure, again with a smaller step where a particle would move too far."""
+        """Solve for velocity and pressure, with a smaller step if a particle would move too far."""
         body = self.body
         while True:
             motion = prepared.solve(self.time_step.size, self.volume)
@@ -216,22 +221,22 @@ class LiquidFlow:
         return motion
 
     def _accepts(self, motion: Motion) -> bool:
-        """Whether no particle moves too far; an error that no step can mend tells where the particle is."""
+        """Return whether no particle moves too far; a collapsed time step raises an error with the position."""
         try:
             return self.time_step.accepts(motion.top_speed)
         except StepCollapsed as error:
             particle = int((motion.transport**2).sum(axis=1).argmax())
-            place = ", ".join(f"{coordinate:.4g}" for coordinate in self.body.points[particle])
-            where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({place}) m"
+            position = ", ".join(f"{coordinate:.4g}" for coordinate in self.body.points[particle])
+            where = f"step {self.steps + 1} at time {self.time:.4g} s, particle {particle} at ({position}) m"
             raise StepCollapsed(f"{where}: {error}") from error
 
     def _standoff(self) -> float:
-        """Height of the second plate above the first one [m]."""
+        """Return the height of the second plate above the first one [m], NaN with fewer plates."""
         first, *others = self.body.plates or (None,)
         return float(first.local(others[0].origin[None])[0, 2]) if first and others else float("nan")
 
     def _normals(self) -> Floats:
-        """Unit normals of the surface `(s, 3)`, along the walls on contact lines; zero where an edge holds a vertex."""
+        """Return unit normals of the surface, within walls on contact lines, zero at pinned vertices, (s, 3)."""
         normal = self.physics.admit(self.body, self.body.volume()[1])[: self.body.cloud.surface_count]
         return normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
 

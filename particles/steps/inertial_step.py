@@ -1,10 +1,9 @@
-"""A step with inertia and volume viscosity on tetrahedra of the particles, of second order in time: BDF2.
+"""Step with inertia and viscosity on linear tetrahedra between the particles, by BDF2.
 
-Forces and operators are taken at the predicted positions x* = x_base + dt_eff v_n. The implicit surface tension then
-acts on v - v_n only: an added mass of order dt^2, not a damping of order dt. The tetrahedra travel with their particles
-until these are shifted, the surface changes or they are worn out: then they are made anew.
-
-Moving least squares was tried first; its transpose scatters the force of the surface into noise.
+Forces and operators are evaluated at the predicted positions x* = x_base + dt_eff v_n. The implicit surface tension
+then acts on v - v_n only: an added mass of order dt^2 instead of a damping of order dt. The tetrahedra move with their
+particles and are rebuilt when particles are shifted, the surface changes or a tetrahedron degenerates. Moving least
+squares are unsuitable here: their transpose scatters the force of the surface into noise.
 """
 
 from collections.abc import Mapping
@@ -31,21 +30,21 @@ from reflowshock.particles.steps.step_solver import Motion, SolverTraits, StepSo
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
 
 SUPPORT = 1.5
-# Shift of a particle that calls for new tetrahedra, in spacings.
+# Shift of a particle, in spacings, from which tetrahedra are rebuilt.
 SHIFT_TOLERANCE = 1e-6
 NO_NEIGHBOURS = NeighbourList(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class InertialState:
-    """What the last step left.
+    """State that one step hands to the next.
 
     Attributes:
-        space: its tetrahedra.
-        triangles: `(t, 3)` of their surface.
-        points: `(n, 3)` where it took the particles [m].
-        history: its displacement and change of velocity.
-        plates: `(6,)` displacement and rotation of each plate that moved, by its index [m, rad].
+        space: Tetrahedra of the last step.
+        triangles: Triangles of their surface, shape (t, 3).
+        points: Positions at the end of the step, shape (n, 3) [m].
+        history: Displacement and velocity change of the step.
+        plates: Displacement and rotation of each moving plate by its index, shape (6,) [m, rad].
     """
 
     space: LinearTetrahedra
@@ -56,19 +55,25 @@ class InertialState:
 
     @classmethod
     def start(cls, body: Body, density: float, viscosity: float) -> "InertialState":
-        """Fill a body that has not moved yet with tetrahedra."""
+        """Fill a body with tetrahedra before its first step.
+
+        Args:
+            body: Liquid body.
+            density: Density [kg/m^3].
+            viscosity: Dynamic viscosity [Pa s].
+        """
         space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
         return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)), {})
 
     def saved(self) -> dict[str, Any]:
-        """Return what a checkpoint keeps: the mass follows from the volumes."""
-        kept = {name: getattr(self.space, name) for name in ("cells", "volumes", "viscosity")}
-        plates = {str(wall): way for wall, way in self.plates.items()}
-        return fields_of(self) | {"space": kept, "history": fields_of(self.history), "plates": plates}
+        """Return the data that a checkpoint keeps; the mass follows from the volumes."""
+        space = {name: getattr(self.space, name) for name in ("cells", "volumes", "viscosity")}
+        plates = {str(wall): displacement for wall, displacement in self.plates.items()}
+        return fields_of(self) | {"space": space, "history": fields_of(self.history), "plates": plates}
 
     @classmethod
     def restored(cls, saved: Mapping[str, Any], density: float) -> "InertialState":
-        """Make it again of what `saved` returned."""
+        """Return the state whose data ``saved`` returned, for a density [kg/m^3]."""
         space, points = saved["space"], saved["points"]
         mass = particle_mass(space["cells"], space["volumes"], len(points))
         return cls(
@@ -76,17 +81,17 @@ class InertialState:
             saved["triangles"],
             points,
             BackwardDifference(**saved["history"]),
-            {int(wall): way for wall, way in saved["plates"].items()},
+            {int(wall): displacement for wall, displacement in saved["plates"].items()},
         )
 
     def fits(self, body: Body) -> bool:
-        """Whether the tetrahedra still fill the body well."""
+        """Return whether the tetrahedra still fill the body and none is degenerate."""
         shift = float(np.abs(body.points - self.points).max())
         same_surface = np.array_equal(self.triangles, body.triangles)
         return same_surface and shift < SHIFT_TOLERANCE * body.cloud.spacing and not self.space.is_worn(body.points)
 
     def transferred(self, body: Body, physics: Physics) -> tuple["InertialState", Floats]:
-        """The state on new tetrahedra, and the velocity `(n, 3)` of the particles where they are now [m/s]."""
+        """Return the state on new tetrahedra, and the velocity at the current positions, shape (n, 3) [m/s]."""
         new = LinearTetrahedra.start(body.points, fill(body), self.space.density, self.space.viscosity)
         values = interpolation(self.points, self.space.cells, body.points - self.points)
         unit_fields = [physics.admit(body, np.broadcast_to(axis, body.points.shape)) for axis in np.eye(3)]
@@ -98,11 +103,11 @@ class InertialState:
 
 @dataclass(slots=True)
 class InertialStep:
-    """Linear tetrahedra with memory of the last step.
+    """Step solver on linear tetrahedra.
 
     Attributes:
-        density: of the liquid [kg/m^3].
-        state: what the last step left, None before the first.
+        density: Density [kg/m^3].
+        state: State at the end of the last step; None before the first.
     """
 
     density: float
@@ -110,7 +115,7 @@ class InertialStep:
 
     @property
     def traits(self) -> SolverTraits:
-        """Lists serve the shift of the particles alone; viscosity and mass only slow down what the forces drive."""
+        """Properties of the scheme; it descends, because viscosity and mass only slow the motion along the forces."""
         return SolverTraits(support=SUPPORT, descends=True)
 
     def prepare(self, body: Body, physics: Physics, _neighbours: NeighbourList) -> "PreparedInertialStep":
@@ -118,7 +123,7 @@ class InertialStep:
         return self.start(body, physics)
 
     def start(self, body: Body, physics: Physics) -> "PreparedInertialStep":
-        """Provide tetrahedra and the velocity of the particles where they are now; without inertia it is zero."""
+        """Provide tetrahedra and the velocity at the current positions; without inertia it is zero."""
         if self.state is None or not physics.momenta:
             viscosity = sum(part.coefficient for part in physics.operators if isinstance(part, Viscosity))
             self.state = InertialState.start(body, self.density, viscosity)
@@ -129,11 +134,11 @@ class InertialStep:
         return PreparedInertialStep(body, physics, self, self.state)
 
     def saved(self) -> dict[str, Any]:
-        """What it remembers of earlier steps, for a checkpoint."""
+        """Return the data that a checkpoint keeps."""
         return {"state": self.state and self.state.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.state = saved["state"] and InertialState.restored(saved["state"], self.density)
 
     def stop(self, body: Body) -> None:
@@ -144,25 +149,25 @@ class InertialStep:
 
     @property
     def mass(self) -> sparse.csr_matrix:
-        """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
+        """Mass matrix of the last step over the density, shape (n, n) [m^3]."""
         if self.state is None:
-            raise ValueError("the first step gives the particles their volumes")
+            raise ValueError("the particles carry no volumes before the first step")
         return self.state.space.mass
 
     def kinetic_energy(self, body: Body) -> float:
-        """Kinetic energy of the body with the velocity of the last step [J]."""
+        """Return the kinetic energy of the body with the masses of the last step [J]."""
         return 0.5 * self.density * float((body.velocity * (self.mass @ body.velocity)).sum())
 
 
 @dataclass(frozen=True, slots=True)
 class PreparedInertialStep:
-    """A step from the body's current positions.
+    """Step from the body's current positions.
 
     Attributes:
-        body: the liquid body.
-        physics: what acts on it.
-        solver: remembers the step.
-        state: tetrahedra at the body's positions and the step before.
+        body: Liquid body.
+        physics: Effects that act on the body.
+        solver: Step solver, which keeps the state after the step.
+        state: State of the last step, with tetrahedra at the current positions.
     """
 
     body: Body
@@ -171,10 +176,14 @@ class PreparedInertialStep:
     state: InertialState
 
     def solve(self, time_step: float, volume: float) -> Motion:
-        """Return the motion in a time step [s] that ends at a volume [m^3].
+        """Compute the motion in a time step.
+
+        Args:
+            time_step: Time step [s].
+            volume: Enclosed volume at the end of the step [m^3].
 
         Raises:
-            SolveFailed: the linear solve failed.
+            SolveFailed: The linear solve failed.
         """
         body, state = self.body, self.state
         base = state.history.base(body.points, body.velocity, time_step)
@@ -198,68 +207,68 @@ class PreparedInertialStep:
             transport=history.displacement / time_step,
             pressure=solution.pressure,
             surface_pressure=float(space.volume_share @ solution.pressure),
-            twists={wall: way / time_step for wall, way in plates.items()},
+            twists={wall: displacement / time_step for wall, displacement in plates.items()},
             iterations=solution.iterations,
         )
 
     def _guess(self, base: Base) -> Floats:
-        """Velocity of the prediction `(n, 3)` [m/s]: the last one, as far as a step may go."""
+        """Return the predicted velocity, shape (n, 3) [m/s]: the last one, reduced if particles would move too far."""
         velocity = self.body.velocity
-        way = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
+        distance = base.time_step * float(np.sqrt((velocity**2).sum(axis=1).max()))
         bound = LARGEST_DISPLACEMENT * self.body.cloud.spacing
-        return velocity if way <= bound else bound / way * velocity
+        return velocity if distance <= bound else bound / distance * velocity
 
 
 class InertialSolver(StepSolver, Protocol):
-    """A step solver whose particles carry momentum."""
+    """Step solver whose particles carry momentum."""
 
     @property
     def mass(self) -> sparse.csr_matrix:
-        """Volumes that the particles carried in the last step, `(n, n)` [m^3]."""
+        """Mass matrix of the last step over the density, shape (n, n) [m^3]."""
 
     def stop(self, body: Body) -> None:
         """Bring the body to rest."""
 
 
 class InertialFlow:
-    """A body without walls and its steps; triangles and particles are left as they move."""
+    """Flow of a body without walls, without mesh smoothing and particle shifting."""
 
     def __init__(self, body: Body, physics: Physics, solver: InertialSolver) -> None:
         """Remember the volume to keep.
 
         Args:
-            body: the liquid body; changed in place.
-            physics: what acts on it.
-            solver: of the motion in a step; it needs no list of neighbours.
+            body: Liquid body; changed in place.
+            physics: Effects that act on the body.
+            solver: Step solver that needs no neighbour list.
         """
         self.body, self.physics, self.solver = body, physics, solver
         self.volume = body.volume()[0]
 
     def saved(self) -> dict[str, Any]:
-        """All that a flow of the same physics needs to continue to the same bits, for a checkpoint."""
+        """Return the data that a checkpoint keeps; a flow of the same physics continues from it to the same bits."""
         return {"body": self.body, "volume": self.volume, "solver": self.solver.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.body, self.volume = saved["body"], saved["volume"]
         self.solver.restore(saved["solver"])
 
     @property
     def mass(self) -> sparse.csr_matrix:
-        """Volumes that the particles carry, `(n, n)` [m^3], from the first step on."""
+        """Mass matrix over the density from the first step on, shape (n, n) [m^3]."""
         return self.solver.mass
 
     def settle(self, time_step: float, steps: int) -> None:
-        """Bring the body to rest: stop all motion after every step [s]."""
+        """Relax the body by a number of steps [s], each from rest."""
         for _ in range(steps):
             self.step(time_step)
             self.solver.stop(self.body)
 
     def step(self, time_step: float) -> int:
-        """Advance one time step [s]; return the iterations of the pressure solve.
+        """Advance one time step [s]; return the number of iterations of the pressure solve.
 
         Raises:
-            SolveFailed: the linear solve failed.
+            SolveFailed: The linear solve failed.
         """
         body = self.body
         motion = self.solver.prepare(body, self.physics, NO_NEIGHBOURS).solve(time_step, self.volume)

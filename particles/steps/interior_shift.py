@@ -1,4 +1,4 @@
-"""Shifting of the particles below the surface: even spacing, and none pierces the surface."""
+"""Shifting of the particles below the surface, for even spacing and a distance from the surface."""
 
 import numpy as np
 from numba import njit, prange
@@ -18,7 +18,7 @@ SMALLEST_HEIGHT = 0.25
 
 @njit(cache=True, parallel=True)
 def _repulsion(rows, points, lists, reach):
-    """Sum of unit vectors away from the neighbours, weighed by 1 - r/reach, `(m, 3)`."""
+    """Return the sum of unit vectors away from the neighbours, weighted by 1 - r/reach, shape (m, 3)."""
     offsets, indices = lists
     result = np.zeros((rows.shape[0], 3))
     for r in prange(rows.shape[0]):
@@ -38,7 +38,7 @@ def _repulsion(rows, points, lists, reach):
 
 @njit(cache=True)
 def _nearest(i, points, lists, count):
-    """The neighbour of particle i among the first `count` particles that is closest to it, -1 if there is none."""
+    """Return the closest neighbour of particle i among the first ``count`` particles, -1 without one."""
     offsets, indices = lists
     nearest, smallest = -1, np.inf
     for k in range(offsets[i], offsets[i + 1]):
@@ -54,7 +54,7 @@ def _nearest(i, points, lists, count):
 
 @njit(cache=True, parallel=True)
 def _penetration(rows, points, lists, normals, depth):
-    """Displacement that puts a particle a depth below the tangent plane of its nearest surface vertex, `(m, 3)`."""
+    """Return displacements to a depth below the tangent plane of the nearest surface vertex, shape (m, 3)."""
     result = np.zeros((rows.shape[0], 3))
     for r in prange(rows.shape[0]):
         j = _nearest(rows[r], points, lists, normals.shape[0])
@@ -68,12 +68,12 @@ def _penetration(rows, points, lists, normals, depth):
 
 
 def interior_shift(body: Body, neighbours: NeighbourList, normals: Floats) -> Floats:
-    """Displacements of the particles below the surface, `(m, 3)` [m]; on a wall within the wall.
+    """Return the shifts of the m particles below the surface, within the wall for those on one, shape (m, 3) [m].
 
     Args:
-        body: the liquid body.
-        neighbours: a valid list that reaches at least 1.1 spacings.
-        normals: out of the liquid at the vertices of the surface, `(s, 3)`.
+        body: Liquid body.
+        neighbours: Valid neighbour list with a radius of at least 1.1 spacings.
+        normals: Outward unit normals at the vertices of the surface, shape (s, 3).
     """
     cloud, rows = body.cloud, body.interior
     lists = (neighbours.offsets, neighbours.indices)
@@ -87,9 +87,9 @@ def interior_shift(body: Body, neighbours: NeighbourList, normals: Floats) -> Fl
 
 
 def _away_from_plates(body: Body, points: Floats) -> Floats:
-    """Displacements `(m, 3)` [m] that put the particles below the surface, now at `points`, off the plates.
+    """Return displacements that keep interior particles, now at ``points``, off the plates, shape (m, 3) [m].
 
-    Where a drop spreads, the particles on its wall thin out and no longer keep those above them from passing through.
+    Where a drop spreads, the particles on its wall thin out and no longer prevent others from passing through.
     """
     result = np.zeros_like(points)
     loose = body.cloud.wall[body.interior] < 0
@@ -102,7 +102,7 @@ def _away_from_plates(body: Body, points: Floats) -> Floats:
 
 
 def _away_from_symmetry(body: Body, points: Floats) -> Floats:
-    """Displacements `(m, 3)` [m] that keep particles off the planes of symmetry, behind which are their images."""
+    """Return displacements that keep particles off the planes of symmetry, shape (m, 3) [m]."""
     result = np.zeros_like(points)
     for axis in body.cloud.symmetry:
         loose = ~on_plane(body.cloud, axis)[body.interior]

@@ -1,9 +1,9 @@
-"""Potential flow through the particles of a body: v = grad phi from the flux through its boundary.
+"""Potential flow v = grad phi through the particles of a body, driven by the flux through its boundary.
 
-The discrete Laplacian is a graph: an edge of two particles conducts w_ij (phi_j - phi_i), so what flows into a particle
-flows out of another, and the sum of the fluxes is that through the boundary. With w = 3 (s_i + s_j) W and
-s = V / sum of W r^2 the sum over j is V times the Laplacian of phi (Cummins & Rudman 1999). At a plate, which nothing
-passes, each particle has its mirror image: phi is even there, and the gradient of particles near the plate is not
+The discrete Laplacian is a graph Laplacian: the edge between two particles conducts w_ij (phi_j - phi_i), so that flow
+out of one particle is flow into another, and the fluxes sum to that through the boundary. With
+w = 3 (s_i + s_j) W and s = V / sum of W r^2, the sum over j is V times the Laplacian of phi (Cummins and Rudman 1999).
+At an impermeable plate each particle has a mirror image: phi is even there, and gradients near the plate are not
 extrapolated from one side.
 """
 
@@ -18,23 +18,23 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 
-# Share of its edges that each particle leaks: fixes the constant, also that of particles apart from the others.
+# Relative leak of each particle, which fixes the constant, also that of disconnected particles.
 LEAK = 1e-6
-# Keeps the normal equations regular where the edges of a particle lie in a plane, or where it has none.
+# Regularises the normal equations of particles without edges or with edges in a plane.
 RIDGE = 1e-9
 TINY = 1e-100
 
 
 @njit(cache=True)
 def _weight(square, support):
-    """Weight (1 - q^2)^3 of an edge, zero from the support radius on."""
+    """Return the weight (1 - q^2)^3 of an edge, zero from the support radius on."""
     q = square / (support * support)
     return (1.0 - q) ** 3 if q < 1.0 else 0.0
 
 
 @njit(cache=True)
 def _image_offset(points, pair, height, normal):
-    """From particle i to the mirror image of j, which is twice its height away from it."""
+    """Return the offset from particle i to the mirror image of j, twice the height away from j."""
     i, j = pair
     x = points[j, 0] - points[i, 0] - 2.0 * height * normal[0]
     y = points[j, 1] - points[i, 1] - 2.0 * height * normal[1]
@@ -44,7 +44,7 @@ def _image_offset(points, pair, height, normal):
 
 @njit(cache=True)
 def _edge(points, mirrors, pair, support):
-    """Weight of an edge and of those to the mirror images of its end; the same, times the squared lengths.
+    """Return the weight of an edge with those to mirror images of its end, and the same times squared lengths.
 
     A particle on a plate is its own image and counts once.
     """
@@ -67,11 +67,11 @@ def _edge(points, mirrors, pair, support):
 
 @njit(cache=True, parallel=True)
 def _moments(points, mirrors, lists, support):
-    """Sum of weight times squared length of each particle's edges, `(n,)` [m^2]."""
+    """Return the sum of weight times squared length over each particle's edges, shape (n,) [m^2]."""
     offsets, indices = lists
     result = np.empty(points.shape[0])
     for row in prange(points.shape[0]):
-        i, total = np.int64(row), 0.0  # unsigned, as of prange, what is called would be compiled twice
+        i, total = np.int64(row), 0.0  # a signed index, or numba compiles every callee twice
         for k in range(offsets[i], offsets[i + 1]):
             total += _edge(points, mirrors, (i, np.int64(indices[k])), support)[1]
         result[i] = total
@@ -80,7 +80,7 @@ def _moments(points, mirrors, lists, support):
 
 @njit(cache=True, parallel=True)
 def _rows(points, mirrors, lists, scale, support):
-    """Columns and values of the rows; the last entry of a row is its diagonal, one for a particle without edges."""
+    """Return columns and values of the rows; the diagonal comes last and is one for a particle without edges."""
     offsets, indices = lists
     count = points.shape[0]
     columns = np.empty(offsets[count] + count, np.int32)
@@ -100,7 +100,7 @@ def _rows(points, mirrors, lists, scale, support):
 
 @njit(cache=True)
 def _add_difference(sums, offset, difference, support):
-    """Add an edge to the normal equations of a gradient: its six moments and its right-hand side."""
+    """Add an edge to the normal equations of a gradient: six moments and the right-hand side."""
     x, y, z = offset
     w = _weight(x * x + y * y + z * z, support)
     sums[0] += w * x * x
@@ -116,7 +116,7 @@ def _add_difference(sums, offset, difference, support):
 
 @njit(cache=True)
 def _solve_symmetric(sums, result):
-    """Gradient from the normal equations, by the adjugate of the 3 x 3 matrix; zero across the plane of the edges."""
+    """Solve the normal equations for the gradient by the adjugate; it is zero across a plane of edges."""
     xx, xy, xz, yy, yz, zz, a, b, c = sums
     ridge = RIDGE * (xx + yy + zz) + TINY
     xx, yy, zz = xx + ridge, yy + ridge, zz + ridge
@@ -130,7 +130,7 @@ def _solve_symmetric(sums, result):
 
 @njit(cache=True)
 def _add_edges(points, mirrors, edge, support, sums):
-    """Add an edge, its ends and the difference of the field between them, and those to the mirror images."""
+    """Add an edge, given by its ends and the difference of the field, and those to mirror images."""
     heights, normals = mirrors
     i, j, difference = edge
     if i != j:
@@ -144,7 +144,7 @@ def _add_edges(points, mirrors, edge, support, sums):
 
 @njit(cache=True, parallel=True)
 def _gradients(points, mirrors, lists, field, support):
-    """Least-squares gradient of the field at the particles from `lists[2]` on, `(m, 3)`."""
+    """Return the least-squares gradient of the field at the particles from ``lists[2]`` on, shape (m, 3)."""
     offsets, indices, first = lists
     count = points.shape[0] - first
     result, sums = np.empty((count, 3)), np.zeros((count, 9))
@@ -159,7 +159,7 @@ def _gradients(points, mirrors, lists, field, support):
 
 
 def _mirrors(body: Body) -> tuple[Floats, Floats]:
-    """Heights above each plate and plane of symmetry `(p, n)` [m], zero on it, and their normals into the liquid."""
+    """Return heights above each plate and plane of symmetry, shape (p, n) [m], and their inward normals, (p, 3)."""
     symmetry, local = body.cloud.symmetry, [plate.local(body.points)[:, 2] for plate in body.plates]
     heights = [
         np.where(body.cloud.wall == wall, 0.0, -plate.side * local[wall]) for wall, plate in enumerate(body.plates)
@@ -173,7 +173,7 @@ class PotentialFlow:
     """Operators of the potential at the current positions.
 
     Attributes:
-        laplacian: `(n, n)` [m], minus the Laplacian times volume, symmetric and (by a small leak) positive definite.
+        laplacian: Minus the Laplacian times volume, symmetric positive definite by a small leak, shape (n, n) [m].
     """
 
     laplacian: sparse.csr_matrix
@@ -183,11 +183,11 @@ class PotentialFlow:
 
     @classmethod
     def of(cls, body: Body, neighbours: NeighbourList) -> "PotentialFlow":
-        """Build the operators.
+        """Assemble the operators.
 
         Args:
-            body: the liquid body.
-            neighbours: a valid list; its radius is the support of the weights.
+            body: Liquid body.
+            neighbours: Valid neighbour list; its radius is the support of the weights.
         """
         mirrors, lists = _mirrors(body), (neighbours.offsets, neighbours.indices)
         moments = _moments(body.points, mirrors, lists, neighbours.radius)
@@ -200,16 +200,16 @@ class PotentialFlow:
         return cls(laplacian, body, neighbours, mirrors)
 
     def balanced(self, flux: Floats) -> Floats:
-        """Fluxes `(n,)` [m^3/s] less their mean, in each group of particles that is apart from the others.
+        """Subtract the volume-weighted mean from fluxes of shape (n,) [m^3/s] in each connected group of particles.
 
-        In a film thinner than the particles are apart there are many: what flows between them has no way.
+        A film thinner than the particle distance has many groups, between which no flow is possible.
         """
         _, group = connected_components(self.laplacian, directed=False)
         mean = np.bincount(group, flux) / np.bincount(group, self._body.volumes)
         return flux - mean[group] * self._body.volumes
 
     def velocity(self, potential: Floats) -> Floats:
-        """Gradient of a potential `(n,)` [m^2/s] at the particles below the surface, `(m, 3)` [m/s]."""
+        """Return the gradient of a potential of shape (n,) [m^2/s] at the interior particles, shape (m, 3) [m/s]."""
         body, neighbours = self._body, self._neighbours
         lists = (neighbours.offsets, neighbours.indices, body.cloud.surface_count)
         return _gradients(body.points, self._mirrors, lists, potential, neighbours.radius)

@@ -1,19 +1,19 @@
-"""A step towards rest: the free surface relaxes at constant volume, the particles below it follow as potential flow.
+"""Relaxation step: the free surface relaxes at constant volume, the particles below it follow as potential flow.
 
-Without inertia and viscosity a step is no physical motion; all that counts is the energy, and that is of the surface:
+Without inertia and viscosity a step is no physical motion; only the energy of the surface counts:
 
     A v = f + p a,     a . v = dV/dt
 
-with A the mass over the time step and the implicit surface tension, both of the surface's particles, and the pressure p
-of the body, one unknown. At rest f = -p a makes the discrete energy stationary. The flux of the surface's motion drives
-a potential flow inside, which keeps the particles evenly spread; its pressure vanishes at rest.
+A is the mass over the time step plus the implicit surface tension, both of the surface particles, a the gradient of the
+volume, and the pressure p of the body a single unknown. At rest f = -p a makes the discrete energy stationary. The flux
+of the surface motion drives a potential flow inside, which keeps the particles evenly spread; its pressure vanishes at
+rest.
 
-No step raises the energy of the triangles, and the volume is exact (``descent``). At rest the forces balance but for
-what evening out undoes. Where a contact line leaves the edge of a pad at a sharp corner, this energy would fall further
-as the triangles there become uneven; evening out undoes each such step, so that it is not the least there. The load of
-gravity is the gradient of its energy to second order. Evening out would shift a free body, so its centre is moved back.
-A motion that stays the same from step to step is taken for many steps at once. The cost grows with the number of
-particles; the number of iterations does not.
+No step raises the energy of the triangles, and the volume is exact (``descent.py``). At rest the forces balance except
+for what mesh smoothing undoes: where a contact line leaves the edge of a pad at a sharp corner, the energy of ever more
+distorted triangles would be lower. The load of gravity is the gradient of its energy to second order. Mesh smoothing
+would shift a free body, so its centre is restored. A motion that does not change from step to step is taken for many
+steps at once. The number of iterations does not grow with the number of particles.
 """
 
 from collections.abc import Mapping
@@ -38,18 +38,19 @@ from reflowshock.particles.steps.step_equations import StepEquations
 from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 
 SUPPORT = 2.0
-# The surface moves along its normals and stretches its triangles unevenly, which biases the shape of least energy: one
-# pass leaves 0.05 % of the height of a cap at any spacing.
+# Motion along the normals distorts the triangles, which biases the shape of least energy: with one pass the height of a
+# cap is off by 0.05 % at any spacing.
 SMOOTHING_PASSES = 12
 
 
 @dataclass(slots=True)
 class Relaxation:
-    """Relaxation towards rest.
+    """Step solver that relaxes the surface energy.
 
     Attributes:
-        density: [kg/m^3].
-        centre: `(3,)` centre of volume of a body without walls and planes at its first step [m], else None.
+        density: Density [kg/m^3].
+        centre: Centre of volume at the first step of a body without walls and planes of symmetry, shape (3,) [m]; else
+            None.
     """
 
     density: float
@@ -58,11 +59,11 @@ class Relaxation:
 
     @property
     def traits(self) -> SolverTraits:
-        """A step goes along the forces and is no physical motion."""
+        """Properties of the scheme: it descends, and a step is no physical motion."""
         return SolverTraits(SUPPORT, SMOOTHING_PASSES, descends=True, keeps_time=False)
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":
-        """Build the equations of the surface and the operators of the potential flow."""
+        """Assemble the equations of the surface and the operators of the potential flow."""
         if self.centre is None and not body.plates and not body.cloud.symmetry:
             self.centre = centre_of_volume(body.points, body.triangles)
         surface = body.surface()
@@ -71,21 +72,29 @@ class Relaxation:
         return PreparedRelaxation(self, body, equations, PotentialFlow.of(body, neighbours))
 
     def saved(self) -> dict[str, Any]:
-        """What it remembers of earlier steps, for a checkpoint."""
+        """Return the data that a checkpoint keeps."""
         return {"centre": self.centre, "multigrid": self._multigrid.saved()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.centre = saved["centre"]
         self._multigrid.restore(saved["multigrid"])
 
     def potential(self, flow: PotentialFlow, flux: Floats) -> tuple[Floats, int]:
-        """Potential `(n,)` [m^2/s] of the fluxes into the particles `(n,)` [m^3/s], and the iterations."""
+        """Solve for the potential of fluxes into the particles.
+
+        Args:
+            flow: Operators of the potential flow.
+            flux: Fluxes, shape (n,) [m^3/s].
+
+        Returns:
+            Potential, shape (n,) [m^2/s], and the number of iterations.
+        """
         return self._multigrid.solve(flow.laplacian, flow.balanced(flux))
 
 
 def _volume_only(surface: Body) -> Discretisation:
-    """The free surface alone: nothing to integrate inside, and the body's volume is the only constraint."""
+    """Return operators of the free surface alone, with the enclosed volume as the only constraint."""
     nothing = sparse.csr_matrix((0, len(surface.points)))
     return Discretisation(
         gradient=(nothing, nothing, nothing),
@@ -98,13 +107,13 @@ def _volume_only(surface: Body) -> Discretisation:
 
 @dataclass(frozen=True, slots=True)
 class PreparedRelaxation:
-    """A step from the current positions.
+    """Step from the current positions.
 
     Attributes:
-        solver: that prepared it.
-        body: the liquid body.
-        equations: of its free surface.
-        flow: potential flow inside.
+        solver: Step solver.
+        body: Liquid body.
+        equations: Equations of its free surface.
+        flow: Potential flow inside.
     """
 
     solver: Relaxation
@@ -113,25 +122,29 @@ class PreparedRelaxation:
     flow: PotentialFlow
 
     def solve(self, time_step: float, volume: float) -> Motion:
-        """Return the motion in a time step [s] that ends at a volume [m^3].
+        """Compute the motion in a time step.
+
+        Args:
+            time_step: Time step [s].
+            volume: Enclosed volume at the end of the step [m^3].
 
         Raises:
-            SolveFailed: a linear solve failed.
+            SolveFailed: A linear solve failed.
         """
         body, density, count = self.body, self.solver.density, self.body.cloud.surface_count
         solution = solve_volume(self.equations.problem(time_step, volume))
         surface, twists = self.equations.expand(solution.velocity, time_step)
-        surface = surface + self._recall(surface, time_step)
+        surface = surface + self._recentring(surface, time_step)
         potential, iterations = self.solver.potential(self.flow, _flux(body, surface, twists))
         velocity = np.concatenate((surface, _limited(self._inside(potential, twists), surface)))
         surface_pressure = float(solution.pressure[0])
         pressure = surface_pressure - density / time_step * (potential - potential[:count].mean())
         return Motion(velocity, velocity, pressure, surface_pressure, twists, iterations)
 
-    def _recall(self, surface: Floats, time_step: float) -> Floats:
-        """Velocity `(3,)` [m/s] that brings the centre of a free body back to where it was: no force moves it.
+    def _recentring(self, surface: Floats, time_step: float) -> Floats:
+        """Return the velocity that restores the centre of a free body, which no force moves, shape (3,) [m/s].
 
-        Each part of the surface passes its flux at its place, and V dc/dt is the integral of x v . n.
+        V dc/dt is the integral of x v . n over the surface.
         """
         body = self.body
         if self.solver.centre is None:
@@ -142,7 +155,7 @@ class PreparedRelaxation:
         return (self.solver.centre - centre) / time_step - drift
 
     def _inside(self, potential: Floats, twists: dict[int, Floats]) -> Floats:
-        """Velocities below the surface `(m, 3)` [m/s]; on a plate they slip along it and go with it."""
+        """Return interior velocities, shape (m, 3) [m/s]; on a plate they slip along it and follow its motion."""
         body, rows = self.body, self.body.interior
         wall = body.cloud.wall[rows]
         velocity = fold(body.cloud, slide(body.plates, wall, self.flow.velocity(potential)), body.cloud.surface_count)
@@ -154,9 +167,9 @@ class PreparedRelaxation:
 
 
 def _limited(inside: Floats, surface: Floats) -> Floats:
-    """Velocities `(m, 3)` no faster than the surface: the speed of a potential flow is largest on its boundary.
+    """Limit velocities of shape (m, 3) to the largest speed of the surface, as the maximum principle requires.
 
-    Where a film is thinner than the particles are apart, their few neighbours do not keep this by themselves.
+    In a film thinner than the particle distance the few neighbours of a particle do not ensure this.
     """
     speed = np.linalg.norm(inside, axis=1)
     largest = np.linalg.norm(surface, axis=1).max()
@@ -164,9 +177,9 @@ def _limited(inside: Floats, surface: Floats) -> Floats:
 
 
 def _flux(body: Body, surface: Floats, twists: dict[int, Floats]) -> Floats:
-    """Volume that the motion of the boundary takes up, particle by particle `(n,)` [m^3/s].
+    """Return the flux through the boundary by particle, shape (n,) [m^3/s].
 
-    What the surface's particles pass is theirs, what a plate passes is spread over the particles on it.
+    The flux through the surface belongs to its vertices; that through a plate is distributed over the particles on it.
     """
     flux = np.zeros(len(body.points))
     flux[: body.cloud.surface_count] = surface_flux(body.points, body.triangles, surface)

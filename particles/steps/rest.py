@@ -1,4 +1,4 @@
-"""Running a flow until the body is at rest."""
+"""Run of a flow until the body is at rest, with snapshots, progress and checkpoints."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,29 +24,29 @@ CALM_STEPS = 3
 CALM_DISPLACEMENT = 1e-4
 SNAPSHOT_DISPLACEMENT = 0.1
 RUPTURE_SPACINGS = 2.0
-RECORDS = (*FLOW_RECORDS, Snapshot)  # that a flow and its run consist of in a checkpoint
+RECORDS = (*FLOW_RECORDS, Snapshot)  # dataclasses in a checkpoint of a flow and its run
 COUNTS = ("seconds", "ruptured", "calm", "at_rest", "moved")
 
 
 class SchemeUnstable(RuntimeError):
-    """A scheme that does not hold has come to its end."""
+    """Error of a scheme that is known to be unstable."""
 
 
 class NotAtRest(RuntimeError):
-    """The body did not come to rest within the allowed steps."""
+    """Error of a body that did not come to rest within the allowed steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopRule:
-    """When a run ends.
+    """Criteria by which a run ends.
 
     Attributes:
-        max_steps: steps after which it has failed.
-        tolerance: relative change of energy in a step below which a body is at rest.
-        calm_time: time in which the surface of a body at rest moves less than 1e-4 spacings [s].
-        end_time: physical end of the process [s]; infinite in the quasi-static mode.
-        lasting: time that a body is calm for before it is at rest [s]. Where it swings, a quarter of its slowest swing:
-            one that hardly decays is calm where it turns, but moves fastest a quarter later.
+        max_steps: Number of steps after which it has failed.
+        tolerance: Relative change of energy in a step below which a body is calm.
+        calm_time: Time in which the surface of a calm body moves less than 1e-4 spacings [s].
+        end_time: Physical end of the process [s]; infinite in the quasi-static mode.
+        lasting: Time for which a body must be calm to be at rest [s]. For an oscillating body this is a quarter of its
+            slowest period: a weakly damped oscillation is calm at its turning points and fastest a quarter later.
     """
 
     max_steps: int
@@ -58,17 +58,17 @@ class StopRule:
 
 @dataclass(slots=True)
 class Run:
-    """The steps of a run and its snapshots.
+    """Steps of a run and its snapshots.
 
     Attributes:
-        records: what each step did.
-        profiles: the shape after each step.
-        snapshots: the first, the last and some states between.
-        seconds: wall time of the steps, those before a restart included [s].
-        ruptured: whether the neck became thinner than two spacings.
-        calm: last steps that hardly moved the body.
-        at_rest: whether it came to rest; else the process ended, or the neck ruptured, before it did.
-        moved: displacement since the last snapshot, over the spacing.
+        records: Record of each step.
+        profiles: Profile of the body after each step.
+        snapshots: First, last and intermediate snapshots.
+        seconds: Wall time of the steps, including those before a restart [s].
+        ruptured: Whether the neck became thinner than two spacings.
+        calm: Number of consecutive calm steps at the end.
+        at_rest: Whether the body came to rest before the process ended or the neck ruptured.
+        moved: Displacement since the last snapshot, over the spacing.
     """
 
     records: list[StepRecord] = field(default_factory=list)
@@ -81,7 +81,7 @@ class Run:
     moved: float = 0.0
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the data that a checkpoint keeps."""
         return {name: getattr(self, name) for name in COUNTS} | {
             "records": columns([fields_of(record) for record in self.records]),
             "areas": np.array([profile.areas.coef for profile in self.profiles]),
@@ -91,7 +91,7 @@ class Run:
 
     @classmethod
     def restored(cls, saved: Mapping[str, Any]) -> "Run":
-        """Make it again of what `saved` returned."""
+        """Return the run whose data ``saved`` returned."""
         return cls(
             records=[StepRecord(**row) for row in rows(saved["records"])],
             profiles=[Profile.of(Legendre(*fit)) for fit in zip(saved["areas"], saved["spans"], strict=True)],
@@ -101,13 +101,16 @@ class Run:
 
     @property
     def time_at_rest(self) -> float:
-        """When the body came to rest: the end of the third of its calm steps [s]; not a number where it did not."""
+        """Time at which the body came to rest, the end of its third calm step [s]; NaN if it did not."""
         return self.records[CALM_STEPS - 1 - self.calm].time if self.at_rest else float("nan")
 
     def history(self, viscosity_over_tension: float) -> dict[str, NDArray]:
-        """Columns of the records, with width and capillary number mu v / gamma.
+        """Return the records as columns, with the width and the capillary number mu v / gamma.
 
-        Where a plate was moved by a known force they have this, too, and the standoff.
+        Standoff and force on the plate are included if a plate moved by a known force.
+
+        Args:
+            viscosity_over_tension: Viscosity over surface tension [s/m].
         """
         names: tuple[str, ...] = (
             "step",
@@ -137,17 +140,19 @@ def run_to_rest(
     on_snapshot: Callable[[Snapshot], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Run:
-    """Step until surface and energy hardly change for three steps and as long as the rule says, or to the end time.
+    """Advance a flow until the body is at rest, a neck ruptures, or the process ends.
+
+    A body is at rest after three calm steps that last as long as the rule requires.
 
     Args:
-        flow: the flow; advanced in place.
-        rule: when to stop.
-        progress: called with the estimated fraction done, in [0, 1].
-        on_snapshot: called with each new snapshot.
-        checkpoint: where the run continues from, to the last bit, and leaves its state, that at rest included.
+        flow: Flow; advanced in place.
+        rule: Criteria by which the run ends.
+        progress: Function called with the estimated fraction done, in [0, 1].
+        on_snapshot: Function called with each new snapshot.
+        checkpoint: Checkpoint from which the run continues to the bit, and to which it writes its state.
 
     Raises:
-        NotAtRest: too many steps; names step, displacement and time.
+        NotAtRest: The body is not at rest after the allowed steps.
     """
     run, done = _start(flow, on_snapshot, checkpoint), 0.0
     while not run.at_rest and flow.time < rule.end_time and not run.ruptured:
@@ -170,7 +175,7 @@ def run_to_rest(
 
 
 def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, checkpoint: Checkpoint | None) -> Run:
-    """Start a run, or continue that of the checkpoint, whose state the flow takes over."""
+    """Start a run, or restore the run and the flow from the checkpoint."""
     saved = None if checkpoint is None else checkpoint.read((*flow.records, Snapshot))
     if saved is not None:
         flow.restore(saved["flow"])
@@ -181,7 +186,7 @@ def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, che
 
 
 def saved_run(flow: LiquidFlow, run: Run) -> dict[str, Any]:
-    """What a checkpoint keeps of a flow and its run, made of `RECORDS`."""
+    """Return the data that a checkpoint keeps of a flow and its run; its dataclasses are ``RECORDS``."""
     return {"flow": flow.saved(), "run": run.saved()}
 
 
@@ -191,25 +196,25 @@ def _limit_steps(flow: LiquidFlow, run: Run, rule: StopRule) -> None:
     last = run.records[-1]
     raise NotAtRest(
         f"no rest after {last.step} steps (solder.numerics.max_steps) at time {last.time:.3g} s: the surface "
-        f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, at rest it would be "
-        f"{CALM_DISPLACEMENT:g}{_for_how_long(rule)}; {_what_helps(flow)}"
+        f"still moves {_motion(last, rule):.2e} spacings in {rule.calm_time:.3g} s, the limit is "
+        f"{CALM_DISPLACEMENT:g}{_duration(rule)}; try {_remedy(flow)}"
     )
 
 
-def _for_how_long(rule: StopRule) -> str:
+def _duration(rule: StopRule) -> str:
     return f" for {rule.lasting:.3g} s" if rule.lasting > 0.0 else ""
 
 
-def _what_helps(flow: LiquidFlow) -> str:
+def _remedy(flow: LiquidFlow) -> str:
     if flow.physics.momenta:
-        return 'more steps help or, where only the shape at rest matters, solder.effects.inertia = "off"'
-    return "more steps or a larger solder.numerics.time_step_limit help"
+        return 'more steps or, for the shape at rest only, solder.effects.inertia = "off"'
+    return "more steps or a larger solder.numerics.time_step_limit"
 
 
 def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
     start = perf_counter()
     record = _step(flow)
-    _refuse_plates_that_met(flow)
+    _check_standoff(flow)
     run.records.append(record)
     run.profiles.append(flow.profile())
     run.ruptured = len(flow.body.cloud.rings) == 2 and _ruptures(run.profiles, flow.body.cloud.spacing)
@@ -221,7 +226,7 @@ def _advance(run: Run, flow: LiquidFlow, rule: StopRule) -> None:
 
 
 def _step(flow: LiquidFlow) -> StepRecord:
-    """Advance one step; an error of the solver tells where it happened and what may help."""
+    """Advance one step; name step, time and remedies in errors of the solver."""
     where = f"step {flow.steps + 1} at time {flow.time:.4g} s"
     try:
         with threads_for(len(flow.body.points)):
@@ -231,31 +236,38 @@ def _step(flow: LiquidFlow) -> StepRecord:
             raise SchemeUnstable(f"{where}: {flow.solver.traits.flaw} ({type(error).__name__}: {error})") from error
         if not isinstance(error, SolveFailed | ZeroDivisionError):
             raise
-        raise SolveFailed(f"{where}: {error}; a smaller spacing or solder.numerics.time_step_limit may help") from error
+        raise SolveFailed(
+            f"{where}: {error}; try a smaller spacing or a smaller solder.numerics.time_step_limit"
+        ) from error
 
 
-def _refuse_plates_that_met(flow: LiquidFlow) -> None:
+def _check_standoff(flow: LiquidFlow) -> None:
     low, high = flow.body.span()
     if len(flow.body.cloud.rings) == 2 and high <= low:
         raise NotAtRest(
-            f"step {flow.steps} at time {flow.time:.4g} s: the package has sunk to the board, the solder does not bear "
-            "it; a smaller joint.package.load or a larger joint.volume helps"
+            f"step {flow.steps} at time {flow.time:.4g} s: the package has sunk to the board; "
+            "try a smaller joint.package.load or a larger joint.volume"
         )
 
 
 def _ruptures(profiles: list[Profile], spacing: float) -> bool:
-    """Whether a neck of less than two spacings gets thinner still: the particles cannot follow it any further."""
+    """Return whether a neck below two spacings gets thinner; particles cannot resolve it any further."""
     thin = profiles[-1].waist < RUPTURE_SPACINGS * spacing
     return thin and len(profiles) > 1 and profiles[-1].waist < profiles[-2].waist
 
 
 def _motion(record: StepRecord, rule: StopRule) -> float:
-    """Displacement of the surface in the calm time, over the spacing."""
+    """Return the displacement of the surface in the calm time, over the spacing."""
     return record.displacement * rule.calm_time / record.time_step
 
 
 def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
-    """Whether the last step hardly moved the surface and hardly changed the energy."""
+    """Return whether the surface and the energy hardly changed in the last step.
+
+    Args:
+        records: Records of the steps.
+        rule: Limits of displacement and energy change.
+    """
     if len(records) < 2:
         return False
     before, last = records[-2:]
@@ -264,12 +276,18 @@ def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
 
 
 def is_lasting(records: Sequence[StepRecord], calm: int, rule: StopRule) -> bool:
-    """Whether a body whose last `calm` steps hardly moved it is at rest: three steps, and as long as the rule says."""
+    """Return whether a calm body is at rest: calm for three steps and for the time that the rule requires.
+
+    Args:
+        records: Records of the steps.
+        calm: Number of consecutive calm steps at the end.
+        rule: Criteria of rest.
+    """
     return calm >= CALM_STEPS and sum(record.time_step for record in records[-calm:]) >= rule.lasting
 
 
 def fraction_done(records: Sequence[StepRecord], rule: StopRule) -> float:
-    """Share of the way to rest: the motion dies out exponentially; or share of the process time."""
+    """Return the estimated fraction of the run that is done, in [0, 1], from the exponential decay of the motion."""
     if not records:
         return 0.0
     first, last = _motion(records[0], rule), _motion(records[-1], rule)

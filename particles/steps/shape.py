@@ -1,4 +1,4 @@
-"""The result of a reflow: one joint's shape and how it came about. Plain data."""
+"""Result of a reflow: the shape of one joint with its history, as plain data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,26 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats, Indices
 
 
-def together(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
-    """Values of the particles of several bodies as of one: those on the surfaces first, `counts` of them."""
+def concatenated(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
+    """Concatenate particle arrays of several bodies, surface particles first.
+
+    Args:
+        arrays: Array of each body, shape (n_i, ...).
+        counts: Number of surface particles of each body.
+    """
     pairs = list(zip(arrays, counts, strict=True))
     return np.concatenate([array[:count] for array, count in pairs] + [array[count:] for array, count in pairs])
 
 
-def numbered_on(indices: Sequence[Indices], counts: Sequence[int]) -> list[Indices]:
-    """Indices into each of several arrays, as they are when the arrays, `counts` long, follow each other."""
+def shifted_indices(indices: Sequence[Indices], counts: Sequence[int]) -> list[Indices]:
+    """Shift indices into several arrays to indices into their concatenation.
+
+    Args:
+        indices: Indices into each array.
+        counts: Length of each array.
+    """
     firsts = np.cumsum([0, *counts[:-1]])
-    return [(own + first).astype(np.int32) for own, first in zip(indices, firsts, strict=True)]
+    return [(part + first).astype(np.int32) for part, first in zip(indices, firsts, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +36,9 @@ class Snapshot:
     """Particles and surface at one time.
 
     Attributes:
-        time: [s].
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)` of the free surface, indices of `points`.
+        time: Time [s].
+        points: Particle positions, shape (n, 3) [m].
+        triangles: Triangles of the free surface, shape (t, 3).
     """
 
     time: float
@@ -38,21 +48,21 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class JointShape:
-    """A joint or drop at the end of its reflow, in its own frame: origin at the centre of the board's disc, z up.
+    """Joint or drop at the end of its reflow, in its own frame: origin at the centre of the board pad, z up.
 
     Attributes:
-        points: `(n, 3)` particles [m], the first `s` are the vertices of the free surface.
-        velocity: `(n, 3)` [m/s].
-        pressure: `(n,)` above ambient [Pa].
-        surface_points: `(s, 3)` vertices of the tracked free surface [m].
-        triangles: `(t, 3)` of the free surface, outward oriented, open at the walls.
-        rings: contact lines, the board's first, each `(k,)` vertices of the surface, counter-clockwise seen from +z.
-        history: arrays of equal length: step, time, time_step, binding, height, width, volume, energy,
-            capillary_number, displacement, iterations.
-        snapshots: the first, the last and some states between.
-        metrics: name to value and unit.
-        verdict: "ok", "overflow" (solder on the mask), "dewetted" (left the pad's edge), "open" (neck ruptured, or a
-            drop on the board that does not reach the package), "bridged" (one body on the pads of several joints).
+        points: Particle positions, the s vertices of the free surface first, shape (n, 3) [m].
+        velocity: Velocity, shape (n, 3) [m/s].
+        pressure: Pressure above ambient, shape (n,) [Pa].
+        surface_points: Vertices of the tracked free surface, shape (s, 3) [m].
+        triangles: Triangles of the free surface, outward oriented, open at the walls, shape (t, 3).
+        rings: Contact lines, the board's first: vertices counter-clockwise seen from +z, shape (k,) each.
+        history: Columns step, time, time_step, binding, height, width, volume, energy, capillary_number, displacement
+            and iterations.
+        snapshots: First, last and intermediate snapshots.
+        metrics: Value and unit of each metric.
+        verdict: "ok", "overflow" (solder on the mask), "dewetted" (off the pad's edge), "open" (neck ruptured, or the
+            drop does not reach the package), "bridged" (one body on the pads of several joints).
     """
 
     points: Floats
@@ -68,10 +78,10 @@ class JointShape:
 
     @property
     def ring_board(self) -> Indices:
-        """Contact line on the board `(k,)`."""
+        """Contact line on the board, shape (k,)."""
         return self.rings[0]
 
     @property
     def ring_package(self) -> Indices:
-        """Contact line on the package `(k,)`; a joint has one."""
+        """Contact line on the package, shape (k,)."""
         return self.rings[1]

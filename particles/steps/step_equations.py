@@ -1,8 +1,8 @@
-"""The linear equations of one step: forces, implicit operators, constraints, in the velocities that walls admit.
+"""Linear equations of a step on tetrahedra or on the surface alone, in admissible velocities.
 
-Admissible velocities are v = B q + v0, q the degrees of freedom. A particle off the walls has three, one on a wall two
-along its plate (free slip), one that an edge holds none; a floating plate has its own and takes along what it carries.
-v0 is the part that prescribed motion gives.
+Admissible velocities are v = B q + v0 with degrees of freedom q. A particle off the walls has three, one on a wall two
+along its plate (free slip), a pinned one none; a floating plate has its own and carries the particles on it. v0 is the
+velocity of prescribed motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,29 +22,29 @@ from reflowshock.particles.physics.plate_motion import PlateMotion
 
 
 class Admissible:
-    """The admissible velocities of a body at its current positions, components one after the other."""
+    """Admissible velocities of a body at its current positions, stored by component."""
 
     def __init__(self, body: Body, pinned: NDArray[np.bool_], motions: Sequence[PlateMotion]) -> None:
         """Build the basis.
 
         Args:
-            body: the liquid body.
-            pinned: `(n,)` particles that the edges hold.
-            motions: motions of the plates.
+            body: Liquid body.
+            pinned: Whether each particle is pinned at an edge, shape (n,).
+            motions: Motions of the plates.
         """
         self._body, self._pinned, self._motions = body, pinned, motions
         twists = [(motion.wall, twist) for motion in motions for twist in motion.directions]
-        own = self._slip()
-        self.basis = _append(own, [self._carried(*twist) for twist in twists])
-        self.slip_basis = _append(own, [self._left_behind(*twist) for twist in twists])
+        slip = self._slip()
+        self.basis = _append(slip, [self._carried(*twist) for twist in twists])
+        self.slip_basis = _append(slip, [self._relative(*twist) for twist in twists])
         self._plate_count = len(twists)
 
     def _slip(self) -> sparse.csr_matrix:
-        """Columns of the particles' own motion, relative to their plates."""
+        """Return the columns of particle motion relative to the plates."""
         body, count = self._body, len(self._body.points)
         free = np.ones((3, count), bool)
         free[2, body.cloud.wall >= 0] = False
-        for across in body.cloud.symmetry:  # then the plates are horizontal, and their frame is that of space
+        for across in body.cloud.symmetry:  # with symmetry the plates are horizontal
             free[across, on_plane(body.cloud, across)] = False
         free[:, self._pinned] = False
         frames = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
@@ -59,16 +59,16 @@ class Admissible:
         return turn[:, free.ravel()].tocsr()
 
     def _carried(self, wall: int, twist: Floats) -> Floats:
-        """Velocity `(3 n,)` with which a plate takes particles along: pinned ones wholly, others along its normal."""
+        """Return the velocity that a plate gives its particles, the normal one if not pinned, shape (3 n,)."""
         field = self._rigid(wall, twist)
         return (field - self._sliding(field)).T.ravel()
 
-    def _left_behind(self, wall: int, twist: Floats) -> Floats:
-        """Velocity `(3 n,)` relative to a plate of the particles that slide on it and stay where they are."""
+    def _relative(self, wall: int, twist: Floats) -> Floats:
+        """Return the velocity relative to a moving plate of sliding particles at rest, shape (3 n,)."""
         return -self._sliding(self._rigid(wall, twist)).T.ravel()
 
     def _rigid(self, wall: int, twist: Floats) -> Floats:
-        """Velocity `(n, 3)` of a plate at the particles on it."""
+        """Return the velocity of a plate at the particles on it, zero elsewhere, shape (n, 3)."""
         body = self._body
         on_plate = body.cloud.wall == wall
         field = np.zeros_like(body.points)
@@ -76,44 +76,56 @@ class Admissible:
         return field
 
     def _sliding(self, field: Floats) -> Floats:
-        """The part of a field `(n, 3)` along the plates, where nothing is pinned."""
+        """Return the tangential part of a field on the plates, zero for pinned particles, shape (n, 3)."""
         body = self._body
         return np.where(self._pinned[:, None], 0.0, slide(body.plates, body.cloud.wall, field))
 
-    def given(self, time_step: float) -> Floats:
-        """The velocity v0 `(3 n,)` [m/s] of prescribed motion over a time step [s]."""
-        return self._prescribed(self._carried, time_step)
+    def prescribed(self, time_step: float) -> Floats:
+        """Return the velocity v0 of prescribed motion over a time step [s], shape (3 n,) [m/s]."""
+        return self._sum_of_prescribed(self._carried, time_step)
 
-    def slip_given(self, time_step: float) -> Floats:
-        """Velocity relative to the plates `(3 n,)` [m/s] that prescribed motion over a time step [s] gives."""
-        return self._prescribed(self._left_behind, time_step)
+    def prescribed_slip(self, time_step: float) -> Floats:
+        """Return the slip velocity on plates by their prescribed motion over a time step [s], shape (3 n,) [m/s]."""
+        return self._sum_of_prescribed(self._relative, time_step)
 
-    def _prescribed(self, field: Callable[[int, Floats], Floats], time_step: float) -> Floats:
-        """Sum of a field of all plates that move along a prescribed path."""
+    def _sum_of_prescribed(self, field: Callable[[int, Floats], Floats], time_step: float) -> Floats:
+        """Return the sum of a velocity field over all plates with prescribed motion."""
         plates = self._body.plates
         twists = ((motion.wall, motion.given(plates[motion.wall], time_step)) for motion in self._motions)
         return sum((field(wall, twist) for wall, twist in twists), np.zeros(3 * len(self._body.points)))
 
     def reduce(self, load: Floats) -> Floats:
-        """Generalised forces `(d,)` of forces on the particles `(3 n,)`, with the loads on floating plates [N]."""
+        """Return the generalised forces of particle forces and of the loads on floating plates.
+
+        Args:
+            load: Forces on the particles by component, shape (3 n,) [N].
+
+        Returns:
+            Generalised forces, shape (d,) [N].
+        """
         plates = [motion.directions[:, :3] @ motion.load for motion in self._motions]
-        own = np.zeros(self.basis.shape[1] - self._plate_count)
-        return self.basis.T @ load + np.concatenate([own, *plates])
+        particles = np.zeros(self.basis.shape[1] - self._plate_count)
+        return self.basis.T @ load + np.concatenate([particles, *plates])
 
     def twists(self, unknowns: Floats, time_step: float) -> dict[int, Floats]:
-        """Twist `(6,)` of each plate that moves, by its index."""
+        """Return the twist of each moving plate by its index, shape (6,) [m/s, rad/s].
+
+        Args:
+            unknowns: Degrees of freedom, shape (d,).
+            time_step: Time step [s].
+        """
         rates = unknowns[len(unknowns) - self._plate_count :]
         result, start = {}, 0
         for motion in self._motions:
             stop = start + len(motion.directions)
-            given = motion.given(self._body.plates[motion.wall], time_step)
-            result[motion.wall] = given + rates[start:stop] @ motion.directions
+            prescribed = motion.given(self._body.plates[motion.wall], time_step)
+            result[motion.wall] = prescribed + rates[start:stop] @ motion.directions
             start = stop
         return result
 
 
 def _append(matrix: sparse.csr_matrix, columns: Sequence[Floats]) -> sparse.csr_matrix:
-    """A matrix with more columns."""
+    """Append columns to a sparse matrix."""
     return sparse.hstack([matrix, *(sparse.csr_matrix(column).T for column in columns)], format="csr")
 
 
@@ -124,12 +136,12 @@ class StepEquations:
     """
 
     def __init__(self, body: Body, physics: Physics, space: Discretisation) -> None:
-        """Build what does not depend on the time step.
+        """Assemble the parts that do not depend on the time step.
 
         Args:
-            body: the liquid body.
-            physics: what acts on it.
-            space: operators at the body's current positions.
+            body: Liquid body.
+            physics: Effects that act on the body.
+            space: Operators at the current positions.
         """
         self._body, self._physics, self._space = body, physics, space
         self._admissible = Admissible(body, physics.pinned(body), physics.motions)
@@ -138,37 +150,45 @@ class StepEquations:
         self._force = physics.force(body)
 
     def problem(self, time_step: float, volume: float) -> SaddlePoint:
-        """Build the saddle-point problem for a time step [s] that ends at a volume [m^3]."""
+        """Assemble the saddle-point problem for a time step [s] that ends at a volume [m^3]."""
         body, physics, space = self._body, self._physics, self._space
         operator = sum(part.matrix(body, space, time_step) for part in physics.operators)
         load = self._force + sum(momentum.load(body, space, time_step) for momentum in physics.momenta)
-        given, basis = self._admissible.given(time_step), self._admissible.basis
-        rate = (volume - self._volume) / time_step * space.volume_share - space.constraint @ given
+        prescribed, basis = self._admissible.prescribed(time_step), self._admissible.basis
+        rate = (volume - self._volume) / time_step * space.volume_share - space.constraint @ prescribed
         reduced, drag = self._friction(time_step)
         return SaddlePoint(
             operator=(basis.T @ operator @ basis + reduced).tocsr(),
             constraint=self._reduced_constraint,
-            load=self._admissible.reduce(load.T.ravel() - operator @ given) + drag,
+            load=self._admissible.reduce(load.T.ravel() - operator @ prescribed) + drag,
             rate=rate,
             stabilisation=self._stabilisation(time_step),
         )
 
     def _stabilisation(self, time_step: float) -> sparse.csr_matrix | None:
-        """S = tau times the space's, 1/tau = 1/dt + the rate of diffusion (Codina 2000)."""
+        """Return S = tau times the stabilisation of the space, with 1/tau = 1/dt + diffusion rate (Codina 2000)."""
         space = self._space
         if space.stabilisation is None:
             return None
         return time_step / (1.0 + time_step * space.diffusion_rate) * space.stabilisation
 
     def _friction(self, time_step: float) -> tuple[sparse.csr_matrix | float, Floats | float]:
-        """Frictions on the degrees of freedom: matrix `(d, d)` [kg/s], and the drag of plates that move `(d,)` [N]."""
+        """Return the friction matrix, shape (d, d) [kg/s], and the drag of moving plates, shape (d,) [N]."""
         parts = [part.matrix(self._body, self._space, time_step) for part in self._physics.frictions]
         if not parts:
             return 0.0, 0.0
         slip = self._admissible.slip_basis
-        return slip.T @ sum(parts) @ slip, -(slip.T @ (sum(parts) @ self._admissible.slip_given(time_step)))
+        return slip.T @ sum(parts) @ slip, -(slip.T @ (sum(parts) @ self._admissible.prescribed_slip(time_step)))
 
     def expand(self, unknowns: Floats, time_step: float) -> tuple[Floats, dict[int, Floats]]:
-        """Velocities `(n, 3)` of the degrees of freedom `(d,)`, and the twists of the plates that move."""
-        full = self._admissible.basis @ unknowns + self._admissible.given(time_step)
+        """Return particle velocities and plate twists for given degrees of freedom.
+
+        Args:
+            unknowns: Degrees of freedom, shape (d,).
+            time_step: Time step [s].
+
+        Returns:
+            Velocity, shape (n, 3) [m/s], and twist of each moving plate by its index, shape (6,) [m/s, rad/s].
+        """
+        full = self._admissible.basis @ unknowns + self._admissible.prescribed(time_step)
         return np.ascontiguousarray(full.reshape(3, -1).T), self._admissible.twists(unknowns, time_step)

@@ -1,4 +1,4 @@
-"""What solves for the motion in a time step: a member of this family for each way to treat pressure and inertia."""
+"""Interface of step solvers: each one treats pressure and inertia in its own way and returns a motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from reflowshock.particles.physics.physics import Physics
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What happens in a time step.
+    """Motion of a body in a time step.
 
     Attributes:
-        velocity: `(n, 3)` of the particles at the end [m/s].
-        transport: `(n, 3)` their mean velocity, which takes them where they go [m/s].
-        pressure: `(n,)` above the ambient pressure [Pa].
-        surface_pressure: pressure that carries the volume constraint [Pa].
-        twists: `(6,)` of each plate that moves, by its index [m/s, rad/s].
-        iterations: of the pressure solve.
-        drift: `(n, 3)` rigid motion that nothing ends, on smooth walls [m/s]; None where there is none.
-        pull: mean force on a plate that is moved, along its way [N]; not a number where none is, or it is not known.
+        velocity: Velocity at the end of the step, shape (n, 3) [m/s].
+        transport: Mean velocity that moves the particles, shape (n, 3) [m/s].
+        pressure: Pressure above ambient, shape (n,) [Pa].
+        surface_pressure: Pressure that enforces the volume constraint [Pa].
+        twists: Mean twist of each moving plate by its index, shape (6,) [m/s, rad/s].
+        iterations: Number of iterations of the pressure solve.
+        drift: Slow rigid-body motion on frictionless walls, which never ends, shape (n, 3) [m/s]; None without any.
+        pull: Mean force on plates with prescribed motion, along it [N]; NaN if unknown or without such motion.
     """
 
     velocity: Floats
@@ -43,27 +43,31 @@ class Motion:
 
 
 class PreparedStep(Protocol):
-    """A step from the body's current positions, for any size."""
+    """Step from the body's current positions, for any time step."""
 
     def solve(self, time_step: float, volume: float) -> Motion:
-        """Return the motion in a time step [s] that ends at a volume [m^3].
+        """Compute the motion in a time step.
+
+        Args:
+            time_step: Time step [s].
+            volume: Enclosed volume at the end of the step [m^3].
 
         Raises:
-            SolveFailed: the linear solve failed.
+            SolveFailed: The linear solve failed.
         """
 
 
 @dataclass(frozen=True, slots=True)
 class SolverTraits:
-    """What a flow has to know of a solver.
+    """Properties of a step solver that a flow uses.
 
     Attributes:
-        support: radius of the neighbour list that it needs, in spacings.
-        smoothing_passes: how often the triangles are evened out after a step; less than once where it is done in part.
-        flip_worth: angle [rad] beyond Delaunay's for which a flip may even out the numbers of triangles at a vertex.
-        descends: whether a short enough step without momentum lowers the energy.
-        keeps_time: whether a motion takes its physical time; else only where it leads to counts.
-        flaw: why the scheme itself breaks, for the message when it does; None where it holds.
+        support: Radius of the neighbour list, in spacings.
+        smoothing_passes: Number of mesh smoothing passes after a step; below one, a pass is done in part.
+        flip_worth: Angle beyond Delaunay for which a flip may balance the numbers of triangles at vertices [rad].
+        descends: Whether a sufficiently short step without inertia lowers the energy.
+        keeps_time: Whether the motion is physical in time; otherwise only its end counts.
+        flaw: Known instability of the scheme, for error messages; None if it is stable.
     """
 
     support: float
@@ -75,17 +79,23 @@ class SolverTraits:
 
 
 class StepSolver(Protocol):
-    """How a step is solved."""
+    """Solver of the motion in a step."""
 
     @property
     def traits(self) -> SolverTraits:
-        """What a flow has to know of it."""
+        """Properties of the solver."""
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> PreparedStep:
-        """Build what does not depend on the size of the step."""
+        """Assemble the parts that do not depend on the time step.
+
+        Args:
+            body: Liquid body.
+            physics: Effects that act on the body.
+            neighbours: Neighbour list with the radius of the solver's ``traits``.
+        """
 
     def saved(self) -> dict[str, Any]:
-        """What it remembers of earlier steps, for a checkpoint."""
+        """Return the data that a checkpoint keeps."""
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that ``saved`` returned."""

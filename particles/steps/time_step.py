@@ -1,4 +1,4 @@
-"""Adaptive time step: bounded by the displacement in a step, the energy, and a multiple of the capillary limit."""
+"""Adaptive time step, bounded by the displacement, the energy, and a multiple of the capillary limit."""
 
 from dataclasses import dataclass
 from math import ceil, pi
@@ -10,36 +10,46 @@ from reflowshock.particles.reference.drop_oscillation import cap_frequency, lamb
 
 LARGEST_DISPLACEMENT = 0.25
 GROWTH = 1.15
-# Shares of the displacement bound at which a step that was cut, and the next one, aim.
+# Shares of the displacement bound that a step that was cut, and the next step, aim at.
 SAFETY = 0.8
 AIM = 0.9
-# Share of the largest step below which no smaller one is tried.
+# Smallest step over the largest one.
 SMALLEST_SHARE = 1e-9
-# Longest step of the scheme ispg, in periods of the drop's swing: it keeps the decay of 1 mm^3 of real solder to 5 %.
+# Longest step of the scheme ispg in periods of a drop's oscillation; the decay of 1 mm^3 of solder is within 5 %.
 LONGEST_OF_SWING = 1.0 / 30.0
-# Steps to rest, where a case does not say how many at most; with ispg, besides, those in which a free drop's swing
-# would decay by exp(-40).
+# Default of the largest number of steps to rest; ispg adds those in which a free drop's oscillation decays by exp(-40).
 MOST_STEPS, DECAYS = 1000, 40.0
 
 
 class StepCollapsed(RuntimeError):
-    """No time step is so small that particles move by less than a quarter of their spacing and energy does not rise."""
+    """Error of a time step that was reduced to a billionth of its upper bound."""
 
 
 def capillary_limit(density: float, spacing: float, surface_tension: float) -> float:
-    """Largest stable step of an explicit surface tension, 0.25 sqrt(rho h^3 / (2 pi gamma)) [s]."""
+    """Return the largest stable step of explicit surface tension, 0.25 sqrt(rho h^3 / (2 pi gamma)) [s].
+
+    Args:
+        density: Density [kg/m^3].
+        spacing: Particle spacing h [m].
+        surface_tension: Surface tension [N/m].
+    """
     return float(0.25 * np.sqrt(density * spacing**3 / (2.0 * np.pi * surface_tension)))
 
 
 def swing_period(solder: Solder, angle: float | None = None) -> float:
-    """Period of the slowest mode of a drop of all the solder, free or with a contact angle [rad] on a wall [s]."""
+    """Return the period of the slowest mode of a drop of all the solder [s].
+
+    Args:
+        solder: Solder of the case.
+        angle: Contact angle of a drop on a wall [rad]; None for a free drop.
+    """
     if angle is not None:
         return 2.0 * pi / cap_frequency(angle, solder.volume, solder.density, solder.surface_tension)
     return 2.0 * pi / rayleigh_frequency(2, _radius(solder), solder.density, solder.surface_tension)
 
 
 def largest_step(solder: Solder, spacing: float) -> tuple[float, str]:
-    """Upper bound of the time step [s] of particles at a spacing [m], and what it is."""
+    """Return the upper bound of the time step [s] for a particle spacing [m], and the name of the bound."""
     largest = solder.numerics.time_step_limit * capillary_limit(solder.density, spacing, solder.surface_tension)
     of_swing = LONGEST_OF_SWING * swing_period(solder)
     if solder.numerics.scheme == "ispg" and largest > of_swing:
@@ -48,7 +58,12 @@ def largest_step(solder: Solder, spacing: float) -> tuple[float, str]:
 
 
 def most_steps(solder: Solder, spacing: float) -> int:
-    """Steps after which a run to rest has failed: what the case says, else what the scheme may need."""
+    """Return the number of steps after which a run to rest has failed, from the case or estimated for the scheme.
+
+    Args:
+        solder: Solder of the case.
+        spacing: Particle spacing [m].
+    """
     numerics = solder.numerics
     if numerics.max_steps is not None:
         return numerics.max_steps
@@ -59,20 +74,20 @@ def most_steps(solder: Solder, spacing: float) -> int:
 
 
 def _radius(solder: Solder) -> float:
-    """Radius of a free drop of all the solder [m]."""
+    """Return the radius of a free drop of all the solder [m]."""
     return float(np.cbrt(0.75 * solder.volume / pi))
 
 
 @dataclass(slots=True)
 class TimeStep:
-    """The step size and what binds it.
+    """Time step and the criterion that bounds it.
 
     Attributes:
-        largest: upper bound [s].
-        spacing: particle spacing [m].
-        size: current step [s].
-        binding: that of the upper bound, "growth", "displacement", "energy" or, for one made longer, "steady motion".
-        bound: what the upper bound is.
+        largest: Upper bound [s].
+        spacing: Particle spacing [m].
+        size: Current time step [s].
+        binding: Criterion that bounds it: ``bound``, "growth", "displacement", "energy" or "steady motion".
+        bound: Name of the upper bound.
     """
 
     largest: float
@@ -82,10 +97,10 @@ class TimeStep:
     bound: str = "capillary multiple"
 
     def accepts(self, speed: float) -> bool:
-        """Whether a largest particle speed [m/s] moves no particle too far; else the step is cut.
+        """Return whether no particle moves too far at a largest speed [m/s]; otherwise reduce the step.
 
         Raises:
-            StepCollapsed: the step would be 1e-9 of its upper bound.
+            StepCollapsed: The step would be 1e-9 of its upper bound.
         """
         displacement = speed * self.size
         if displacement <= LARGEST_DISPLACEMENT * self.spacing:
@@ -95,10 +110,10 @@ class TimeStep:
         return False
 
     def cut_for_energy(self) -> None:
-        """Cut a step that raises the energy; a short enough one does not.
+        """Halve a step that raises the energy; a sufficiently short one does not.
 
         Raises:
-            StepCollapsed: the step would be 1e-9 of its upper bound.
+            StepCollapsed: The step would be 1e-9 of its upper bound.
         """
         self._cut(0.5, "energy", "the energy still rises in it")
 
@@ -111,17 +126,17 @@ class TimeStep:
         self.size, self.binding = share * self.size, binding
 
     def steps_within_reach(self, speed: float) -> float:
-        """How many steps of this size a largest particle speed [m/s] allows in one; one, unless it is at its bound."""
+        """Return the number of steps that a largest particle speed [m/s] allows at once; one below the upper bound."""
         if self.size < self.largest:
             return 1.0
         return AIM * LARGEST_DISPLACEMENT * self.spacing / max(speed * self.size, float(np.finfo(float).tiny))
 
     def prolong(self, steps: float) -> None:
-        """Make this step as long as several; the next one has the bound again."""
+        """Lengthen this step to several steps; the next one is bounded again."""
         self.size, self.binding = steps * self.size, "steady motion"
 
     def grow(self, speed: float) -> None:
-        """Grow after an accepted step, up to the bound and as far as a largest particle speed [m/s] allows."""
+        """Grow after an accepted step, up to the bound and as far as a largest particle speed [m/s] permits."""
         displacement = LARGEST_DISPLACEMENT * self.spacing
         self.size, self.binding = GROWTH * self.size, "growth"
         if self.size * speed > AIM * displacement:

@@ -14,7 +14,7 @@ from reflowshock.fem.coupling.participants import couple
 from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.materials.roles import ELASTIC
+from reflowshock.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.fem.division.tables import model_inputs

@@ -16,7 +16,7 @@ from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.materials.roles import ELASTIC
+from reflowshock.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.division.tables import prepare

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import NodalForces, half_sine_drop
 from reflowshock.fem.loads.pulse import HalfSine
-from reflowshock.fem.materials.roles import ELASTIC
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_levels import joint_on_board, levelled
 from tests.support.fem_program import run_warm
 

@@ -15,7 +15,7 @@ from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.dynamics.modal import natural_modes
-from reflowshock.fem.materials.roles import ELASTIC
+from reflowshock.materials.roles import ELASTIC
 from reflowshock.fem.division.tables import prepare
 from tests.support.fem_models import small_assembly
 

@@ -9,11 +9,11 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel import portable
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.portable import State
+from reflowshock.materials.roles import Materials
 from tests.support.fem_levels import joint_on_board
 from tests.support.fem_program import run_warm
 

@@ -53,6 +53,7 @@ def cooled(tmp_path_factory) -> tuple[Path, dict]:
     return folder, result_of(folder, "cooling")
 
 
+@pytest.mark.long
 def test_cooling_is_the_same_on_more_ranks(cooled):
     folder, result = cooled
     assert all(check["ok"] for check in result["health"].values())
@@ -64,6 +65,7 @@ def test_cooling_is_the_same_on_more_ranks(cooled):
     assert (shown.point_data["displacement"] == here).all()
 
 
+@pytest.mark.long
 def test_a_coupled_shock_begins_in_balance(cooled):
     folder, result = cooled
     found = result_of(folder, "two_scale")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.support.fem_program import run_warm
 
@@ -17,6 +18,7 @@ def own_material(path: Path, ranks: int) -> dict[str, np.ndarray]:
         return dict(arrays)
 
 
+@pytest.mark.long
 def test_two_ranks_equal_one(tmp_path):
     expected, found = (own_material(tmp_path / f"{ranks}.npz", ranks) for ranks in (1, 2))
     assert len(expected["time"]) > 10

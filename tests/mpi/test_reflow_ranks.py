@@ -46,7 +46,7 @@ def test_nothing_to_do_needs_no_rank(ranks):
     assert ranks.run(rank_work.fail, {}, lambda _: None) == {}
 
 
-@pytest.mark.parametrize("solder", [SOLDER, FLOWING], ids=["energy", "ispg"])
+@pytest.mark.parametrize("solder", [SOLDER, pytest.param(FLOWING, marks=pytest.mark.long)], ids=["energy", "ispg"])
 def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processes_give(ranks, tmp_path, solder):
     with pytest.raises(ReflowError, match=r"(?s)mpirun was killed.*unfinished joints: (A1, )?B1"):
         ranks.run(rank_work.be_killed, jobs(tmp_path, solder), lambda _: None)

@@ -2,12 +2,15 @@
 
 import json
 
+import pytest
+
 from reflowshock.particles.scenes.products import read_shapes
 from tests.support.workflow_command import reflowshock
 
 OVERFILLED = ("solder.volume=0.26 mm^3", "solder.numerics.spacing=0.1 mm", "solder.numerics.time_step_limit=100")
 
 
+@pytest.mark.long
 def test_bridged_joints_are_told_and_end_the_run(tmp_path):
     result = reflowshock("run", tmp_path, settings=OVERFILLED)
     assert result.returncode == 1

@@ -28,6 +28,7 @@ def by_ispg(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_run, by_ispg):
     solder = read_case(SMALL_CASE).solder
     found, default = metrics_of(by_ispg), metrics_of(first_run[0])

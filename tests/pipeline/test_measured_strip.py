@@ -46,6 +46,7 @@ def test_peaks_of_the_records_after_cfc_1000(impact, peaks):
     assert list(filtered(impact).peaks_in_g("board").values()) == pytest.approx(peaks, rel=1e-3)
 
 
+@pytest.mark.long
 def test_impact_that_was_not_fitted(tmp_path):
     """The bars of the case: f1 within 5 %, first peak within 20 %, second within 10 % of the measured ones."""
     settings = [item for setting in QUICK for item in ("--set", setting)]

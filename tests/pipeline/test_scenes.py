@@ -64,6 +64,7 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
     assert "nothing to do" in run(name, tmp_path, setting).stdout
 
 
+@pytest.mark.long
 def test_a_drop_in_a_plane_from_case_file_to_report(tmp_path):
     """The drop of the paper as an endless ridge: at rest a segment of a circle of the area of the cube's face."""
     settings = ("drop.section=plane", "drop.particles_per_edge=8", "drop.contact_angle=120 deg")
@@ -197,7 +198,7 @@ def test_a_drop_that_finds_no_rest_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("name", "metrics"),
     [
-        ("young_laplace", {"mean_pressure", "roundness"}),
+        pytest.param("young_laplace", {"mean_pressure", "roundness"}, marks=pytest.mark.long),
         ("static_caps", {"base_over_diameter", "height_over_diameter"}),
         ("drop_impact", {"spread_max", "time_of_spread_max"}),
     ],

@@ -12,10 +12,10 @@ from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import cut_nodes, divide, held
 from reflowshock.fem.division.whole import touching
 from reflowshock.fem.errors import CouplingError
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.roles import ELASTIC
 
 
 def radius(mesh: MeshData, scheme: str) -> float:

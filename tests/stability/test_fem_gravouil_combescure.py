@@ -6,10 +6,10 @@ import pytest
 from reflowshock.cases.hard.trials.coupled import Coupled, models_of
 from reflowshock.cases.hard.trials.pairs import FRACTION, SIZE, Pair
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.roles import Materials
 
 KICK = np.array([0.3, 0.1, 1.0])  # [m/s]
 LINK = Coupling(scheme="gravouil_combescure")

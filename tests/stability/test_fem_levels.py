@@ -13,11 +13,11 @@ from reflowshock.fem.division.chebyshev import Substeps
 from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.damping import RayleighDamping
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.tie import Tie
 from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_levels import joint_on_board, levelled
 
 ELEMENTS, SAMPLES = 12, 60

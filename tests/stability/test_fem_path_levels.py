@@ -12,11 +12,11 @@ from reflowshock.fem.division import path_levels
 from reflowshock.fem.division.path_levels import opaque_ratio
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.portable import values
+from reflowshock.materials.roles import Materials
 from tests.stability.test_fem_window_grid import GROWTH
 from tests.support.fem_levels import joint_on_board
 from tests.support.fem_tangent import flowing_pair

@@ -7,9 +7,9 @@ from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.cases.hard.trials.motion import energies_of, explicit, imbalance, rod
 from reflowshock.fem.errors import InvertedElementError
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
 
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])
 

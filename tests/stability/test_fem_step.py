@@ -14,11 +14,11 @@ from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import HalfSine
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 
 SOFT = Isotropic(density=1200.0, young_modulus=1e9, poisson_ratio=0.45)
 PUSH = np.array([0.6, 0.0, 0.8])

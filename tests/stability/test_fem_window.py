@@ -11,10 +11,10 @@ from reflowshock.cases.hard.trials.coupled import surveyed
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.errors import CouplingError
-from reflowshock.fem.materials.library import SAC405, SILICON
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData, append, merge_nodes
+from reflowshock.materials.library import SAC405, SILICON
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_division import by_patch, naive
 from tests.support.fem_window import Window
 

@@ -83,7 +83,7 @@ def write_whole(folder, the_package, the_board, warpage):
     [
         pytest.param({"rows": 1, "columns": 1}, marks=pytest.mark.long),
         {"rows": 3, "columns": 3, "depopulated": ("B2",)},
-        {"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}},
+        pytest.param({"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}}, marks=pytest.mark.long),
     ],
     ids=["one joint", "centre depopulated", "one row, two layers"],
 )

@@ -54,7 +54,7 @@ def test_the_smallest_volume_covers_its_pad():
 
 
 @pytest.mark.parametrize("inertia", ["off", "on"])
-@pytest.mark.parametrize("viscosity", [1e-3, 10.0])
+@pytest.mark.parametrize("viscosity", [1e-3, pytest.param(10.0, marks=pytest.mark.long)])
 def test_thin_and_thick_liquids(viscosity, inertia):
     effects = SolderEffects(viscosity="on", inertia=inertia)
     numerics = SolderNumerics(spacing=7e-5, time_step_limit=100)

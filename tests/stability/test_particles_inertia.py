@@ -30,6 +30,7 @@ def spread(per_edge, degrees=60.0, end=0.1, **values):
     return metrics, np.array([record.energy for record in run.records])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degrees", [pytest.param(30, marks=pytest.mark.long), 120])
 def test_a_drop_comes_to_rest_as_the_cap(degrees):
     """The values of Hu et al. at 100 times the capillary limit, 125 particles."""

@@ -16,11 +16,11 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import DOWN, BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import HalfSine
 from reflowshock.fem.loads.shock_loads import shock_loads
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Shock
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Material
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics

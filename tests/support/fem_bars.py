@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
 from reflowshock.fem.run.structure import run_structure
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import LIBRARY
 from reflowshock.meshing.board.box import write_box
 from reflowshock.meshing.board.box_plan import Box, BoxLayer
 

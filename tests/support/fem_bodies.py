@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.model.body import Body
+from reflowshock.materials.parameters import Isotropic
 
 STEEL = Isotropic(density=8000.0, young_modulus=200e9, poisson_ratio=0.0)
 

@@ -10,11 +10,11 @@ from reflowshock.fem.division.chebyshev import stabilisation
 from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.roles import Materials
 
 EDGE = 1.5e-3
 FRACTION = 0.9

@@ -7,8 +7,9 @@ from reflowshock.fem.elements.kind import strain_matrix
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.kernels.hexahedron import GAUSS, shape_derivatives
 from reflowshock.fem.kernels.nonlinear import Path
-from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.fem.kernels.plasticity import plastic_increment
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.plasticity import plastic_constants
 
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 

@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.division.tables import joined, model_inputs
-from reflowshock.fem.materials.parameters import Material
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
@@ -18,6 +17,7 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.run.cooling import pinned
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
 from reflowshock.fem.statics.initial_state import begun
+from reflowshock.materials.parameters import Material
 
 SMALL = ForceOptions()
 

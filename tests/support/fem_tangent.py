@@ -16,12 +16,12 @@ from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.forces.force_assembled import AssembledElements
-from reflowshock.fem.materials.parameters import JohnsonCook
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import upper_blocks
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.parameters import JohnsonCook
+from reflowshock.materials.roles import Materials
 
 YIELD, HARDENING = 1e-3, 0.05  # yield stress and hardening modulus over Young's modulus
 AXIS, ANGLE = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5]), 0.7  # [rad]

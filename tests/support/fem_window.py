@@ -6,8 +6,8 @@ from reflowshock.cases.hard.trials.coupled import HELD, Coupled, Divide, models_
 from reflowshock.fem.coupling.held_velocity import HeldVelocity
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.loads.load import Load
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.materials.roles import Materials
 
 
 class Window(Coupled):

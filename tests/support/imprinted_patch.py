@@ -26,13 +26,13 @@ from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_assembled import AssembledElements
-from reflowshock.fem.materials.elasticity import role_of_part
-from reflowshock.fem.materials.library import COPPER, FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.mesh.pad_layer import octant_volumes
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.statics.hencky import HenckyElements
+from reflowshock.materials.library import COPPER, FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.materials.roles import role_of_part
 from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Package, Warpage

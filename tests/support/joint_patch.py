@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.materials.library import COPPER, FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.materials.library import COPPER, FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
 Floats = NDArray[np.float64]
 UM = 1e-6

@@ -20,7 +20,6 @@ from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.lanes import LANES
 from reflowshock.fem.kernels.nonlinear import PLASTIC
-from reflowshock.fem.materials.parameters import JohnsonCook
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
@@ -29,6 +28,7 @@ from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.inputs import INPUT, StructureInput
 from reflowshock.fem.run.dynamics import make_participants
 from reflowshock.fem.run.structure import StructureDynamics
+from reflowshock.materials.parameters import JohnsonCook
 from tests.support.fem_models import write_msh
 from tests.support.joint_patch import Fineness, JointPatch, mesh_patch
 

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem import dolfinx_api
-from reflowshock.fem.materials.parameters import Isotropic, Material
+from reflowshock.materials.parameters import Isotropic, Material
 
 Floats = NDArray[np.float64]
 FLAGS = ["-O2", "-march=native"]

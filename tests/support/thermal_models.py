@@ -8,13 +8,13 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import COPPER, GAP, grid, mesh_of, on
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 LIFT = 1e-3  # height of the layers' lower face

@@ -19,6 +19,7 @@ def test_digest_changes_with_any_file(tmp_path: Path, monkeypatch: pytest.Monkey
     """A constant that is frozen into a kernel is in a file without kernels, as `compiled` kernels do not say njit."""
     monkeypatch.setattr(kernel_place, "ROOT", tmp_path)
     (tmp_path / "fem").mkdir()
+    (tmp_path / "materials").mkdir()
     source = tmp_path / "particles" / "sph" / "constants.py"
     source.parent.mkdir(parents=True)
     found = []

@@ -25,9 +25,7 @@ from reflowshock.fem.estimates.drop_effects import (
 )
 from reflowshock.fem.forces.force import force_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.kernels.plasticity import plastic_constants
 from reflowshock.fem.loads.pretension import Pretension
-from reflowshock.fem.materials.library import FR4, SAC305, SILICON
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.problem.failure import Failure
@@ -35,6 +33,8 @@ from reflowshock.fem.problem.shock import Damping, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.library import FR4, SAC305, SILICON
+from reflowshock.materials.plasticity import plastic_constants
 from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints

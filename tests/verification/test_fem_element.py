@@ -8,9 +8,9 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.elements.element import Elements, element_geometry
 from reflowshock.fem.elements.stress import element_stress
 from reflowshock.fem.forces.force import force_terms
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.parameters import Isotropic
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_models import bar
 

@@ -5,9 +5,9 @@ import pytest
 
 from reflowshock.cases.hard.trials.beams import beam, tip
 from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, frequencies
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, Material
 from reflowshock.fem.mesh.mesh_file import scaled_jacobians
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, Material
 
 HEXAHEDRA = ["incompatible_modes", "one_point"]
 NOT_LOCKING = pytest.mark.parametrize("name", [*HEXAHEDRA, "tetrahedron_quadratic"])

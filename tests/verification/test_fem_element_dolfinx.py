@@ -9,8 +9,8 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, stiffness_matrix
 from reflowshock.fem import dolfinx_api
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4
 
 RANDOM = np.random.default_rng(0)
 

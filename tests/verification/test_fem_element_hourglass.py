@@ -7,8 +7,8 @@ from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.element import Elements, element_kind
 from reflowshock.fem.elements.one_point import ONE_POINT, hourglass_control
 from reflowshock.fem.forces.force import force_terms
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4
 
 RANDOM = np.random.default_rng(5)
 

@@ -11,11 +11,11 @@ from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.elements.element import Elements, critical_steps, element_geometry
 from reflowshock.fem.elements.stress import element_stress, mean_strain
 from reflowshock.fem.forces.force import linear_terms
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import boundary_facets
 from reflowshock.fem.mesh.mesh_file import scaled_jacobians
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.parameters import Isotropic
 
 RANDOM = np.random.default_rng(3)
 LINE = np.linspace(0, 1, 4)

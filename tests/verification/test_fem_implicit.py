@@ -11,9 +11,9 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.body import Body
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import board_mesh, small_assembly
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.run.package import run
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import write_small_assembly
 
 

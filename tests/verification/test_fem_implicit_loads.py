@@ -93,7 +93,7 @@ def test_state_continues_to_the_same_bits():
     assert first.external_work == second.external_work
 
 
-@pytest.mark.parametrize("terms", [(0.1, 0.0), (0.0, 0.1)])
+@pytest.mark.parametrize("terms", [(0.1, 0.0), pytest.param((0.0, 0.1), marks=pytest.mark.long)])
 def test_free_vibration_decays_as_its_ratio_says(terms):
     """One mode of a bar: x = exp(-xi w t) (cos w' t + xi / s sin w' t), s^2 = 1 - xi^2, w' = s w."""
     body, _, _ = model("damped")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
 from tests.support.joint_oracle import Patch, equilibrium, haversine, steps_in_time
 from tests.support.joint_patch import QUADRATIC, TRILINEAR, UM, JointPatch, mesh_patch
 from tests.support.joint_program import Course, ProgramPatch, box_mesh, matching_mesh

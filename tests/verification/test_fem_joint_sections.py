@@ -11,12 +11,12 @@ from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.loads.load import BodyAcceleration, NodalForces
 from reflowshock.fem.loads.pulse import Constant
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 from tests.support.fem_bodies import dense_stiffness
 
 SIDE, HEIGHT, PAD = 0.4e-3, 0.3e-3, 0.05e-3

@@ -14,9 +14,9 @@ from reflowshock.fem.division.division import Division
 from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.step_levels import Levels, SubsteppedElements
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, joint_on_board, levelled
 

@@ -12,11 +12,11 @@ from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import Constant, HalfSine
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.shock import Damping
+from reflowshock.materials.parameters import Isotropic
 from tests.support.fem_bodies import STEEL
 
 LENGTH, WIDTH = 0.02, 2e-3

@@ -8,9 +8,9 @@ from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.dynamics import modal
 from reflowshock.fem.dynamics.modal import natural_modes
-from reflowshock.fem.materials.library import FR4
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.materials.library import FR4
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import bar
 

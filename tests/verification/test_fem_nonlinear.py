@@ -11,8 +11,8 @@ from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, SOLDER, force
 from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of
 from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, Material
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, Material
 
 LINE = np.linspace(0.0, 1.0, 4)
 ELASTIC = Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=0.3)

@@ -12,10 +12,10 @@ from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.division.tables import Tables, model_inputs
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import Pieces
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.roles import Materials
 
 LOADS = [half_sine_drop(peak=1.5e4, duration=1e-5)]
 WINDOWS = 200

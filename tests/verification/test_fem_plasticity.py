@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment, yield_stress
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.kernels.plasticity import plastic_increment, yield_stress
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.materials.plasticity import plastic_constants
 
 RANDOM = np.random.default_rng(11)
 

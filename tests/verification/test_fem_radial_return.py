@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from reflowshock.fem.kernels.plasticity import plastic_constants, plastic_increment
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.fem.kernels.plasticity import plastic_increment
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.materials.plasticity import plastic_constants
 
 ORDER = (0.93, 1.07)
 

@@ -7,11 +7,11 @@ from scipy.optimize import brentq
 from reflowshock.fem.elements.element import Elements, element_kind
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
-from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 from reflowshock.fem.statics.hencky import HenckyElements
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.materials.plasticity import plastic_constants
 from tests.support.fem_residual import cooled, layered
 
 CHANGE = -192.0

@@ -7,11 +7,11 @@ from scipy.spatial.transform import Rotation
 from reflowshock.cases.hard.trials.bodies import LINEAR_HARDENING, motion_of, nonlinear_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.elements.stress import symmetric, von_mises
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic
 
 ELASTIC = Isotropic(density=1.0, young_modulus=1e9, poisson_ratio=0.3)
 both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incompatible_modes"])

@@ -7,14 +7,14 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import append, select
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.fem.statics.thermal_tables import RigidMotions
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 from tests.support.fem_models import write_msh
 from tests.support.thermal_models import (
     LIFT,

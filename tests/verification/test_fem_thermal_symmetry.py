@@ -7,11 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.packages import MM, PLATE, board, package
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.state import Assembly, HeatedState
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.roles import ELASTIC
 from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage

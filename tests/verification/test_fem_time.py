@@ -12,10 +12,10 @@ from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.large_mass import LargeMass
 from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, PrescribedVelocity
 from reflowshock.fem.loads.pulse import HalfSine, Tabulated
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import MeshData
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 from tests.support.fem_bodies import STEEL
 
 SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)

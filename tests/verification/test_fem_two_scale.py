@@ -6,9 +6,9 @@ import pytest
 from reflowshock.cases.hard.trials.bodies import dns_body, motion_of
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.library import SAC405
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.materials.library import SAC405
+from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_division import by_patch
 from tests.support.fem_models import board_mesh, small_assembly
 from tests.support.fem_window import Window

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.loads.pulse import Haversine
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.output.compare import relative_error
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import LIBRARY
 from reflowshock.workflow.structure.exact_layers import Layers
 from tests.support.fem_bars import PEAK, bar_layers, run_bar, speed_of, write_bar
 

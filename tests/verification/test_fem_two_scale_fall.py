@@ -8,9 +8,9 @@ import pytest
 from reflowshock.cases.hard.trials.coupled import Coupled, models_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import small_assembly
 
 PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)

@@ -12,11 +12,11 @@ from reflowshock.cases.hard.trials.motion import random_start
 from reflowshock.cases.own_material import own_material
 from reflowshock.fem.elements.element import Elements, element_stiffness
 from reflowshock.fem.forces.force_ufl import Law, UflElements, tangent_at_rest
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic
 from reflowshock.fem.model.assembly import ForceOptions, make_body
 from reflowshock.fem.model.body import Body
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic
 
 TETRAHEDRA = ["tetrahedron", "tetrahedron_quadratic"]
 RUBBER = Isotropic(density=1000.0, young_modulus=3e6, poisson_ratio=0.3)
@@ -154,6 +154,7 @@ def test_free_vibration_keeps_its_energy():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.4)
 
 
+@pytest.mark.long
 def test_free_vibration_loses_what_a_viscous_law_takes():
     balance, taken = energy_errors(own_material.potting(1e-7), 0.2)
     assert balance < 1e-10

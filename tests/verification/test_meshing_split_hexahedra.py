@@ -11,7 +11,7 @@ from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.cell_shape import TENSOR_ORDER
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.fem.estimates.estimate import box_critical_step
-from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.materials.library import LIBRARY
 from reflowshock.meshing.board.parameters import JointNumerics
 from reflowshock.meshing.core.hexahedra import quad_areas, shortest_lengths
 from reflowshock.meshing.joint.free_form import free_form_solder

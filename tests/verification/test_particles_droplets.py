@@ -48,7 +48,12 @@ def test_drops_on_walls_that_they_wet_or_not_become_caps(degrees, duration):
 
 
 @pytest.mark.parametrize(
-    ("receding", "advancing", "angle"), [(60.0, 120.0, 90.0), (100.0, 130.0, 100.0), (50.0, 80.0, 80.0)]
+    ("receding", "advancing", "angle"),
+    [
+        (60.0, 120.0, 90.0),
+        pytest.param(100.0, 130.0, 100.0, marks=pytest.mark.long),
+        pytest.param(50.0, 80.0, 80.0, marks=pytest.mark.long),
+    ],
 )
 def test_a_contact_line_moves_only_beyond_its_advancing_and_receding_angle(receding, advancing, angle):
     """A half sphere on a wall: it stays, recedes to the receding angle or advances to the advancing one."""
@@ -107,6 +112,7 @@ def test_half_the_spacing_hardly_changes_the_spread_at_weber_30():
     assert coarse == pytest.approx(fine, rel=0.03)
 
 
+@pytest.mark.long
 def test_a_film_thinner_than_its_particles_spreads_on_and_keeps_them():
     """At a Weber number of 100 the liquid left its surface after 0.8 D / U; interFoam spreads to 3.15 D in 2.4."""
     result = struck(100.0, 1000.0, 12, 2.6)

@@ -74,6 +74,7 @@ def test_second_mode_of_four_shells():
     assert second_mode_errors(np.array([2, 3, 4]), 0.05)[-1] < 5e-3
 
 
+@pytest.mark.long
 def test_second_mode_converges_in_time():
     """Second order, from differences of the period between steps of ratio 2."""
     steps = (25, 50, 100)
@@ -82,6 +83,7 @@ def test_second_mode_converges_in_time():
     assert np.log2((coarse - middle) / (middle - fine)) > 1.7
 
 
+@pytest.mark.long
 def test_laplace_pressure_converges():
     """The polyhedron at rest has the pressure 2 A / (3 V): second order."""
     shells = np.array([2, 3, 4, 5])

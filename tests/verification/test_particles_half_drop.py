@@ -19,6 +19,7 @@ SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
 EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "viscosity": True, "inertia": True}
 
 
+@pytest.mark.long
 def test_second_mode_of_half_a_drop():
     """Surface smoothed and tetrahedra made anew in each step: Reid's period within 0.5 %, his decay 5 %.
 

@@ -97,6 +97,7 @@ def let_go(half_sphere, receding, advancing, viscosity):
     return line, 2.0 * np.degrees(np.arctan(np.ptp(flow.body.points[:, 2]) / radius)), radius
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("receding", "advancing", "angle"), [(60.0, 120.0, 90.0), (100.0, 130.0, 100.0), (50.0, 80.0, 80.0)]
 )
@@ -107,6 +108,7 @@ def test_a_line_creeps_to_the_angle_that_it_has_passed(half_sphere, receding, ad
     assert radius == pytest.approx(base_radius(VOLUME, np.radians(angle)), rel=6e-3)
 
 
+@pytest.mark.long
 def test_a_line_that_swings_stands_between_its_angles(half_sphere):
     """Inertia takes the half sphere beyond the cap of 100 degrees, from where no force that is left takes it back."""
     line, found, _ = let_go(half_sphere, 100.0, 130.0, 0.227)

@@ -77,7 +77,7 @@ def test_slow_plates_do_the_work_of_the_surface():
     [
         (place(0.40e-3), "free-slip"),
         pytest.param(place(0.31e-3), "free-slip", marks=pytest.mark.long),
-        (place(0.36e-3, 0.03e-3), "no-slip"),
+        pytest.param(place(0.36e-3, 0.03e-3), "no-slip", marks=pytest.mark.long),
         pytest.param(place(0.36e-3, 0.03e-3), "free-slip", marks=pytest.mark.long),
         pytest.param(place(0.35e-3, 0.0, 3.0), "free-slip", marks=pytest.mark.long),
         pytest.param(place(0.36e-3, 0.0, 3.0), "slip", marks=pytest.mark.long),

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import trapezoid
 
 from reflowshock.fem.loads.pulse import HalfSine, Haversine
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.parameters import Isotropic
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 
 BARS = exact_bar.Bars((0.1, 0.1), (70e9, 200e9), (2700.0, 8000.0), 8e-6)

@@ -1,1 +1,1 @@
-"""The command accuracy: a convergence study of a case, what its runs cost, and what to choose."""
+"""The command ``accuracy``: convergence study of a case, its cost, recommended settings. Start with `command.py`."""

@@ -1,19 +1,22 @@
-"""Which settings to take: the cheapest within a tolerance, or the most accurate within a cost."""
+"""Recommend settings: the cheapest within a tolerance, or the most accurate within a budget.
+
+Candidates are the measured runs and, where error and cost follow a fit, values between and slightly beyond them.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from reflowshock.workflow.convergence.measured import Fit, Measurement, Recommended
-from reflowshock.workflow.convergence.series import ConvergenceStudy, StudyRun
+from reflowshock.workflow.convergence.accuracy_file import Fit, Measurement, Recommended
+from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy, StudyRun
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is wanted.
+    """Goal of a recommendation.
 
     Attributes:
-        tolerance: of the judged error; None: as small as can be.
-        core_seconds: that a run may cost which is still to be made [s]; infinite without a limit.
+        tolerance: Tolerance of the judged error; None to minimise the error.
+        core_seconds: Largest cost of a run that is not measured yet [s]; infinite without a limit.
     """
 
     tolerance: float | None
@@ -22,14 +25,14 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Settings that may be chosen.
+    """Candidate for the recommendation.
 
     Attributes:
-        run: the settings.
-        error: that is expected; of what was measured, the measured one.
-        bound: what the error may be: larger by the scatter of the fit.
-        core_seconds: that are expected [s].
-        measured: whether it was run.
+        run: Run with its settings.
+        error: Measured error where the run exists, otherwise the error predicted by the fit.
+        bound: Upper bound of the error: the prediction times the scatter of the fit.
+        core_seconds: Measured or predicted cost [s].
+        measured: Whether the run exists.
     """
 
     run: StudyRun
@@ -42,66 +45,66 @@ class Candidate:
 def recommend(
     study: ConvergenceStudy, measurements: Mapping[str, Measurement], fits: Mapping[str, Fit], goal: Goal
 ) -> Recommended | None:
-    """Choose settings, also between measured ones.
+    """Recommend settings, measured or interpolated between measured ones.
 
     Args:
-        study: what was measured.
-        measurements: name of run -> what was found.
-        fits: parameter -> how error and cost follow it.
-        goal: what is wanted.
+        study: Convergence study.
+        measurements: Name of run -> its measurement.
+        fits: Parameter -> fits of error and cost.
+        goal: Goal of the recommendation.
 
     Returns:
-        The choice, not yet run, with the error and cost that the fits predict; where it is no value of a parameter,
-        with the measured ones. None where nothing is within the cost.
+        Recommendation with the error and cost that the fits predict; for a choice without a size, with the measured
+        ones. None if no candidate is affordable.
     """
-    every = [*_measured(study, measurements), *_between(study, measurements, fits, goal)]
-    within = [one for one in every if one.measured or one.core_seconds <= goal.core_seconds]
-    if not within:
+    candidates = [*_measured_runs(study, measurements), *_interpolated_runs(study, measurements, fits, goal)]
+    affordable = [c for c in candidates if c.measured or c.core_seconds <= goal.core_seconds]
+    if not affordable:
         return None
-    good = [one for one in within if goal.tolerance is not None and one.bound <= goal.tolerance]
-    if good:
-        chosen, why = min(good, key=lambda one: one.core_seconds), "the cheapest setting within the tolerance"
+    accurate = [c for c in affordable if goal.tolerance is not None and c.bound <= goal.tolerance]
+    if accurate:
+        chosen, why = min(accurate, key=lambda c: c.core_seconds), "the cheapest setting within the tolerance"
     else:
-        chosen = min(within, key=lambda one: one.bound)
+        chosen = min(affordable, key=lambda c: c.bound)
         why = "the most accurate setting" + (" within the budget" if goal.core_seconds < float("inf") else "")
         why += "" if goal.tolerance is None else "; no setting is within the tolerance"
-    place = "measured" if chosen.measured else _place(chosen.run, measurements)
+    source = "measured" if chosen.measured else _relation_to_measured(chosen.run, measurements)
     error, cost = _predicted(chosen, fits, study.judged)
-    return Recommended(chosen.run, f"{why}, {place}", error, cost)
+    return Recommended(chosen.run, f"{why}, {source}", error, cost)
 
 
-def _place(run: StudyRun, measurements: Mapping[str, Measurement]) -> str:
-    finest = min(one.value for one in measurements.values() if one.parameter == run.parameter and one.value)
+def _relation_to_measured(run: StudyRun, measurements: Mapping[str, Measurement]) -> str:
+    finest = min(m.value for m in measurements.values() if m.parameter == run.parameter and m.value)
     return "between measured points" if run.value and run.value >= finest else "finer than all measured points"
 
 
-def _measured(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) -> Iterator[Candidate]:
+def _measured_runs(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) -> Iterator[Candidate]:
     for run in study.runs:
-        found = measurements.get(run.name)
-        if found is not None and study.judged in found.errors and not run.against:
-            error = found.errors[study.judged].value
-            yield Candidate(run, error, error, found.core_seconds, True)
+        measurement = measurements.get(run.name)
+        if measurement is not None and study.judged in measurement.errors and not run.against:
+            error = measurement.errors[study.judged].value
+            yield Candidate(run, error, error, measurement.core_seconds, True)
 
 
-def _between(
+def _interpolated_runs(
     study: ConvergenceStudy, measurements: Mapping[str, Measurement], fits: Mapping[str, Fit], goal: Goal
 ) -> Iterator[Candidate]:
-    """Values of parameters at which the goal is just met, where error and cost are known to follow the parameter."""
+    """Yield the value of each parameter with fits at which the goal is just met."""
     for parameter in study.parameters:
         fit = fits[parameter.name]
         error, cost = fit.errors.get(study.judged), fit.cost
         if error is None or cost is None:
             continue
-        runs = [found for run in parameter.runs if (found := measurements.get(run.name)) and not found.failed]
-        known = [found.value for found in runs if found.value]
-        largest, smallest = max(known), min(known) / parameter.extent
+        measured = [m for run in parameter.runs if (m := measurements.get(run.name)) and not m.failed]
+        values = [measurement.value for measurement in measured if measurement.value]
+        largest, smallest = max(values), min(values) / parameter.extent
         if goal.tolerance is not None:
-            wanted = error.value_for(goal.tolerance)
+            target = error.value_for(goal.tolerance)
         else:
-            wanted = _finest(min(known), parameter.extent, fit, goal.core_seconds)
-        if not wanted >= smallest:
+            target = _finest_affordable(min(values), parameter.extent, fit, goal.core_seconds)
+        if not target >= smallest:
             continue
-        run = parameter.at(min(wanted, largest))
+        run = parameter.run_at(min(target, largest))
         if (
             not run.against
             and run.value is not None
@@ -112,8 +115,15 @@ def _between(
             yield Candidate(run, expected, expected * error.scatter, cost.at(run.value), False)
 
 
-def _finest(finest: float, extent: float, fit: Fit, limit: float) -> float:
-    """Smallest value whose cost is within a limit [core-seconds], that of the finest known one without a limit."""
+def _finest_affordable(finest: float, extent: float, fit: Fit, limit: float) -> float:
+    """Return the smallest value within a cost limit [core-seconds]; without a limit the finest measured value.
+
+    Args:
+        finest: Finest measured value.
+        extent: Factor by which the value may be smaller than the finest one.
+        fit: Fits over the parameter.
+        limit: Cost limit [core-seconds].
+    """
     cost = fit.cost
     if cost is None or limit == float("inf"):
         return finest
@@ -123,7 +133,7 @@ def _finest(finest: float, extent: float, fit: Fit, limit: float) -> float:
 
 
 def _predicted(chosen: Candidate, fits: Mapping[str, Fit], judged: str) -> tuple[float, float]:
-    """Error and cost by the fits of its parameter, where there are any."""
+    """Return error and cost predicted by the fits of the parameter, or the measured ones without fits."""
     fit, value = fits.get(chosen.run.parameter), chosen.run.value
     if fit is None or value is None or judged not in fit.errors or fit.cost is None:
         return chosen.error, chosen.core_seconds

@@ -13,9 +13,9 @@ from reflowshock.fem.estimates.drop_effects import Deflection, SolderPlasticity,
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
 if TYPE_CHECKING:
-    from reflowshock.fem.materials.parameters import Material
-    from reflowshock.fem.materials.roles import Materials
     from reflowshock.fem.problem.shock import Shock
+    from reflowshock.materials.parameters import Material
+    from reflowshock.materials.roles import Materials
     from reflowshock.workflow.package.case import BoardDropCase
 
 SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.materials.roles import Materials
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
 from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.materials.parameters import Material
+from reflowshock.materials.parameters import Material
 
 if TYPE_CHECKING:
     import numpy as np

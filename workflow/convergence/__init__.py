@@ -1,1 +1,1 @@
-"""Convergence studies: the runs of each kind of case, their errors and costs, and how both are shown."""
+"""Convergence studies: measured errors against cost, fits of both, tables, plots. Start with `convergence_study.py`."""

@@ -1,4 +1,7 @@
-"""Errors of answers: against an exact one, a chosen run, a Richardson extrapolation, or else the finest run."""
+"""Errors of computed quantities against an exact solution, a chosen run, a Richardson extrapolation or the finest run.
+
+Richardson extrapolation and the observed order follow Roache, J. Fluids Eng. 116 (1994) 405.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,100 +9,105 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reflowshock.workflow.convergence.series import Quantity, StudyRun, Values
+from reflowshock.workflow.convergence.convergence_study import Quantity, StudyRun, Values
 
-LARGEST_ORDER = 2.5  # that is believed: no method here is of more than second order
-ORDER_MARGIN = 0.5  # of an observed order from theory, beyond which runs are not yet fine enough to extrapolate from
+LARGEST_ORDER = 2.5  # plausible: no method here is of more than second order
+ORDER_MARGIN = 0.5  # largest difference between observed and theoretical order, else the runs are too coarse
 
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Error of an answer, what it was compared with, for readers, and the order by which a limit was found, if any."""
+    """Error of a quantity.
+
+    Attributes:
+        value: Relative error.
+        against: Reference, for readers.
+        order: Observed order of the extrapolation that gave the reference; None without an extrapolation.
+    """
 
     value: float
     against: str
     order: float | None = None
 
 
-Answers = Mapping[str, Quantity]
+Quantities = Mapping[str, Quantity]
 
 
-def errors_of(
-    answers: Mapping[str, Answers], runs: Sequence[StudyRun], main: Sequence[StudyRun], order: float | None
+def compute_errors(
+    results: Mapping[str, Quantities], runs: Sequence[StudyRun], main: Sequence[StudyRun], order: float | None
 ) -> dict[str, dict[str, Error]]:
-    """Find the errors of all runs.
+    """Compute the errors of all runs.
 
     Args:
-        answers: name of a run that came to its end -> its answers.
-        runs: all runs.
-        main: those of the first parameter, the coarsest first.
-        order: of the error in that parameter's value by theory; None without one.
+        results: Name of a completed run -> its quantities.
+        runs: All runs.
+        main: Runs of the first parameter, the coarsest first.
+        order: Theoretical order of the error in that parameter; None without theory.
 
     Returns:
-        Name of run -> quantity -> error. A run that others are compared with has none of its own, nor one whose answer
-        is not finite.
+        Name of run -> quantity -> error. A reference run has no error, nor has a run whose value is not finite.
     """
-    found: dict[str, dict[str, Error]] = {}
+    errors: dict[str, dict[str, Error]] = {}
     for run in runs:
-        for quantity, answer in answers.get(run.name, {}).items():
-            if answer.exact is not None and not run.against:
-                error: Error | None = _exact(answer, answer.exact)
+        for name, quantity in results.get(run.name, {}).items():
+            if quantity.exact is not None and not run.against:
+                error: Error | None = _error_from_exact(quantity, quantity.exact)
             else:
-                error = _compared(quantity, run, answers, _Reference.of(quantity, run, answers, main, order))
+                error = _error_from_run(name, run, results, _Reference.select(name, run, results, main, order))
             if error is not None and math.isfinite(error.value):
-                found.setdefault(run.name, {})[quantity] = error
-    return found
+                errors.setdefault(run.name, {})[name] = error
+    return errors
 
 
 @dataclass(frozen=True, slots=True)
 class _Reference:
-    """What is compared with: its value, in words, and the run that it is, if it is one."""
+    """Reference of a comparison: its value, its description, and the name of its run if it is one run."""
 
     value: Values
-    words: str
+    description: str
     run: str = ""
     order: float | None = None
 
     @classmethod
-    def of(
+    def select(
         cls,
         quantity: str,
         run: StudyRun,
-        answers: Mapping[str, Answers],
+        results: Mapping[str, Quantities],
         main: Sequence[StudyRun],
         order: float | None,
     ) -> "_Reference | None":
-        """Take the named run, else an extrapolation of the three finest of the first parameter, else the finest."""
-        # What a run has compared with an exact answer itself may be an error, no answer.
-        known = [one for one in main if (own := answers.get(one.name, {}).get(quantity)) and own.exact is None]
+        """Return the named run, else an extrapolation of the three finest main runs, else the finest main run."""
+        # A value with an exact solution may be an error that the run computed itself: not comparable.
+        comparable = [m for m in main if (value := results.get(m.name, {}).get(quantity)) and value.exact is None]
         if run.against:
-            answer = answers.get(run.against, {}).get(quantity)
-            return None if answer is None else cls(answer.value, f"run {run.against}", run.against)
-        if not known:
+            named = results.get(run.against, {}).get(quantity)
+            return None if named is None else cls(named.value, f"run {run.against}", run.against)
+        if not comparable:
             return None
-        values = [answers[one.name][quantity].value for one in known]
-        limit = richardson([one.value or 0.0 for one in known[-3:]], values[-3:], order)
+        values = [results[main_run.name][quantity].value for main_run in comparable]
+        limit = richardson([main_run.value or 0.0 for main_run in comparable[-3:]], values[-3:], order)
         if limit is not None:
             return cls(limit[0], f"Richardson, order {limit[1]:.3g}", order=limit[1])
-        return cls(values[-1], f"finest run, {known[-1].name}", known[-1].name)
+        return cls(values[-1], f"finest run, {comparable[-1].name}", comparable[-1].name)
 
 
-def _exact(answer: Quantity, exact: Values) -> Error:
-    return Error(_difference(answer, exact), f"exact: {answer.source}" if answer.source else "exact")
+def _error_from_exact(quantity: Quantity, exact: Values) -> Error:
+    return Error(_difference(quantity, exact), f"exact: {quantity.source}" if quantity.source else "exact")
 
 
-def _compared(
-    quantity: str, run: StudyRun, answers: Mapping[str, Answers], reference: _Reference | None
+def _error_from_run(
+    quantity: str, run: StudyRun, results: Mapping[str, Quantities], reference: _Reference | None
 ) -> Error | None:
     if reference is None or reference.run == run.name:
         return None
-    return Error(_difference(answers[run.name][quantity], reference.value), reference.words, reference.order)
+    return Error(_difference(results[run.name][quantity], reference.value), reference.description, reference.order)
 
 
-def _difference(answer: Quantity, other: Values) -> float:
-    """Euclidean norm of a difference over the scale, or over that of the other answer; nan where that is nothing."""
-    scale = _norm(other) if answer.scale is None else answer.scale
-    return _norm(np.asarray(answer.value) - np.asarray(other)) / scale if scale else math.nan
+def _difference(quantity: Quantity, other: Values) -> float:
+    """Return the Euclidean norm of a difference, divided by the scale or by the norm of ``other``; nan if that is 0."""
+    scale = _norm(other) if quantity.scale is None else quantity.scale
+    return _norm(np.asarray(quantity.value) - np.asarray(other)) / scale if scale else math.nan
 
 
 def _norm(values: Values) -> float:
@@ -107,21 +115,21 @@ def _norm(values: Values) -> float:
 
 
 def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | None) -> tuple[Values, float] | None:
-    """Extrapolate the answers of three runs to size zero (Richardson).
+    """Extrapolate the values of three runs to size zero (Richardson).
 
     Args:
-        sizes: the coarsest first.
-        values: the answers.
-        order: by theory; the observed one then has to be within 0.5 of it.
+        sizes: Sizes of mesh, spacing or time step, the coarsest first.
+        values: Computed values, one per size.
+        order: Theoretical order, which the observed one must match within 0.5; None accepts any order.
 
     Returns:
-        The limit and the observed order; None where the runs show no order.
+        The limit and the observed order; None if the runs show no order.
     """
     if len(sizes) != 3 or not sizes[0] > sizes[1] > sizes[2] > 0.0:
         return None
     coarse, fine = (np.asarray(values[k]) - np.asarray(values[k + 1]) for k in (0, 1))
     if np.sum(coarse * fine) <= 0.0:
-        return None  # the answers oscillate
+        return None  # the values oscillate
     ratio = _norm(coarse) / _norm(fine)
 
     def excess(power: float) -> float:
@@ -129,7 +137,7 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
 
     if excess(ORDER_MARGIN) * excess(LARGEST_ORDER) > 0.0:
         return None
-    from scipy.optimize import brentq  # reports and plans start without it
+    from scipy.optimize import brentq  # deferred: reports and plans do not need SciPy
 
     observed = float(brentq(excess, ORDER_MARGIN, LARGEST_ORDER))
     if order is not None and abs(observed - order) > ORDER_MARGIN:

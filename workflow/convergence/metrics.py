@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.convergence.series import Quantity
+from reflowshock.workflow.convergence.convergence_study import Quantity
 from reflowshock.workflow.store.product import read_record
 
 

@@ -1,4 +1,4 @@
-"""Convergence study of a package that is dropped: its mesh, joints, particles, and how joints and board are coupled."""
+"""Convergence studies of a package: particle spacing; in a drop also meshes and the coupling of board and joints."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -11,71 +11,70 @@ from reflowshock.units import from_si
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
-from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, Quantity, StudyRun, at_same_times
+from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy, Parameter, Quantity, StudyRun, resample
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.product import read_record
 
-REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # sizes of elements over those of the case
+REFINED = (2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.25)  # element sizes relative to the case
 TWO_MODELS = (2.0, 1.5, 1.0, 0.75, 0.5)  # the same with two models
-ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # of board or joints alone, against the finest of them
-FINE = (1, 3)  # most stressed joints that are fine
-FEW = 8  # joints, below which all of them are fine while meshes are varied
+ALONE, FINEST = (1.5, 1.0, 0.75), 0.5  # board or joints alone, and their reference
+FINE = (1, 3)  # numbers of fine joints, the most stressed ones
+FEW = 8  # largest number of joints that are all fine while meshes are varied
 SAME_MESH = "all x 1"  # the mesh of the case
-GRAIN = 0.05  # of sizes that are chosen between the measured ones
-SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # of particles, over that of the case
+GRAIN = 0.05  # step of sizes between the measured ones
+SPACINGS, FINEST_SPACING = (2.0, 1.5, 1.25), 1.0  # particle spacings relative to the case, and their reference
 MESH, BOARD, JOINTS = "element size", "element size of board and package", "element size of joints"
 ROUNDING = 1e-9
 
 ERRORS = {
     "peel_stress": "peel stress of the critical joint, peak",
-    "layer_von_mises": "von Mises stress of its solder layer, peak",
-    "layer_plastic_work": "plastic work density of its solder layer",
-    "section_axial_force": "its axial force, peak",
-    "section_bending_moment": "its bending moment, peak, over axial force times pad radius",
-    "stress_history": "von Mises stress of its solder layers, L2 over time",
+    "layer_von_mises": "von Mises stress of the solder layer, peak",
+    "layer_plastic_work": "plastic work density of the solder layer",
+    "section_axial_force": "axial force of the critical joint, peak",
+    "section_bending_moment": "bending moment of the critical joint, peak, over axial force times pad radius",
+    "stress_history": "von Mises stress of the solder layers, L2 over time",
     "deflection": "deflection of board and die, L2 over time",
 }
 SIDES = ("von_mises_board", "von_mises_package")
 DEFLECTIONS = ("board_centre", "die_centre")
 
 TWO_SCALE = {"shock.numerics.modes": '["two_scale"]', "shock.identical_joints": "false"}
-TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # of copper, whose step two models can do with
+TRUE_MASS = {"shock.numerics.mass_scaled": "[]"}  # two models can use the small step of unscaled copper
 
 Settings = dict[str, str]
 
 
 def package_study(case: PackageCase) -> ConvergenceStudy:
-    """Vary what a package has: all of its shock where it is dropped, else the particles of its joints."""
-    if isinstance(case, BoardDropCase):
-        return _dropped(case)
+    """Return the study of a package without a drop: the particle spacing of its joints."""
     errors = {"joint_width_error_max": "largest width, worst joint"}
     return ConvergenceStudy(
         "reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),)
     )
 
 
-def _dropped(case: BoardDropCase) -> ConvergenceStudy:
-    """Meshes; then what other couplings on the case's mesh lose.
+def board_drop_study(case: BoardDropCase) -> ConvergenceStudy:
+    """Return the study of a board drop: element sizes, particle spacing, and couplings on the mesh of the case.
 
-    Where all is linear, meshes are varied by one model in implicit steps. One that yields or turns takes small explicit
-    steps everywhere: there two models vary them. All joints are fine as long as they are few: coarse ones are tied to
-    boxes, and the softer the finer these are. Where masses are scaled to a step, this is as long as the elements are.
+    In a linear case one model in implicit steps varies the meshes. With plasticity or finite rotations one model would
+    take small explicit steps everywhere, so two models vary the meshes. If there are few joints all are fine: coarse
+    joints are tied to boxes, which become softer as they are refined. Where masses are scaled to a time step, the step
+    is proportional to the element size.
     """
     linear = _is_linear(case)
     whole = _one_model(case) if linear else _mostly_fine(case)
     parts = [
-        _board(case, whole).apart(FINEST),
-        _joints(case, whole).apart(FINEST),
-        _particles(case, whole, SPACINGS).apart(FINEST_SPACING),
+        _board(case, whole).with_reference(FINEST),
+        _joints(case, whole).with_reference(FINEST),
+        _particles(case, whole, SPACINGS).with_reference(FINEST_SPACING),
     ]
     meshes = (_mesh(case, whole), _critical(case)) if linear else (_mesh(case, whole),)
     parameters = (*meshes, *(parameter for parameter, _ in parts))
     choices = (*(finest for _, finest in parts), *_couplings(case, whole))
-    if case.shock.duration == "auto":  # runs are compared over the same time
-        given = {"shock.duration": from_si(longest_duration(case), "ms", digits=6)}
-        parameters = tuple(parameter.under(given) for parameter in parameters)
-        choices = tuple(run.under(given) for run in choices)
+    if case.shock.duration == "auto":  # all runs must cover the same time
+        duration = {"shock.duration": from_si(longest_duration(case), "ms", digits=6)}
+        parameters = tuple(parameter.with_settings(duration) for parameter in parameters)
+        choices = tuple(run.with_settings(duration) for run in choices)
     return ConvergenceStudy("shock", ("shock",), ERRORS, _motion, parameters, choices)
 
 
@@ -86,7 +85,7 @@ def _widths(case: Any, run_folder: Path) -> dict[str, Quantity]:
 
 
 def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
-    """Peaks and history of the critical joint, and histories of the board's and the die's centre."""
+    """Return peaks and history of the critical joint, and deflection histories of board and die."""
     import numpy as np
 
     folder = next(folder for mode in MODES if (folder := run_folder / "shock" / mode).is_dir())
@@ -102,8 +101,8 @@ def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
     scale = force * sqrt(force / peel / pi) if force > 0.0 < peel else None
     return peaks | {
         "section_bending_moment": replace(moment, scale=scale),
-        "stress_history": Quantity(at_same_times(stress, SIDES, duration, count)),
-        "deflection": Quantity(at_same_times(history, DEFLECTIONS, duration, count)),
+        "stress_history": Quantity(resample(stress, SIDES, duration, count)),
+        "deflection": Quantity(resample(history, DEFLECTIONS, duration, count)),
     }
 
 
@@ -112,7 +111,10 @@ def _is_linear(case: BoardDropCase) -> bool:
 
 
 def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
-    """One model with all joints fine, to the end; where all is linear, in implicit steps, copper at its true mass."""
+    """Return settings of one model with all joints fine over the full duration.
+
+    A linear case uses implicit steps and the true mass of copper.
+    """
     implicit = _is_linear(case)
     settings = {
         "shock.numerics.modes": '["dns"]',
@@ -125,68 +127,68 @@ def _one_model(case: BoardDropCase, solver: str = "") -> Settings:
 
 
 def _mesh(case: BoardDropCase, whole: Settings) -> Parameter:
-    """All elements of board, package and joints."""
-    return _sized(MESH, "all", REFINED, lambda size: whole | _of_board(case, size) | _of_joints(case, size))
+    """Return the size of all elements as a parameter."""
+    return _sized(MESH, "all", REFINED, lambda size: whole | _board_elements(case, size) | _joint_elements(case, size))
 
 
 def _critical(case: BoardDropCase) -> Parameter:
-    """All elements, with two models of which one has the critical joint alone fine."""
+    """Return the size of all elements as a parameter of two models with only the critical joint fine."""
     fine = _fine(1)
     return _sized(
         f"{MESH}, one fine joint",
         "1 fine",
         TWO_MODELS,
-        lambda size: fine | _of_board(case, size) | _of_joints(case, size),
+        lambda size: fine | _board_elements(case, size) | _joint_elements(case, size),
     )
 
 
 def _fine(count: int) -> Settings:
-    """Two models, as many joints fine as are given, the most stressed ones."""
+    """Return settings of two models with ``count`` fine joints, the most stressed ones."""
     key = "shock.coupling"
     return TWO_SCALE | {f"{key}.fine_joints": "critical", f"{key}.critical_joints": f"{count}"}
 
 
 def _mostly_fine(case: BoardDropCase) -> Settings:
-    """Two models, all joints fine where they are few, else as many as the study tries."""
+    """Return settings of two models with all joints fine if they are few, else the largest number of the study."""
     few = len(pad_table(case.package, case.board, case.warpage)) <= FEW
     return TWO_SCALE | {"shock.coupling.fine_joints": "all"} if few else _fine(max(FINE))
 
 
 def _board(case: BoardDropCase, whole: Settings) -> Parameter:
-    """Elements of board and package, joints as they are."""
-    return _sized(BOARD, "board", ALONE, lambda size: whole | _of_board(case, size))
+    """Return the element size of board and package as a parameter; joints keep their mesh."""
+    return _sized(BOARD, "board", ALONE, lambda size: whole | _board_elements(case, size))
 
 
 def _joints(case: BoardDropCase, whole: Settings) -> Parameter:
-    """Elements of joints, board and package as they are."""
-    return _sized(JOINTS, "joints", ALONE, lambda size: whole | _of_joints(case, size))
+    """Return the element size of joints as a parameter; board and package keep their mesh."""
+    return _sized(JOINTS, "joints", ALONE, lambda size: whole | _joint_elements(case, size))
 
 
 def _particles(case: PackageCase, settings: Settings, values: tuple[float, ...]) -> Parameter:
-    """Spacing of the particles of the joints, on which their shape depends."""
-    own = case.solder.numerics.spacing
+    """Return the particle spacing of the joints, which determines their shape, as a parameter."""
+    case_spacing = case.solder.numerics.spacing
 
-    def at(value: float) -> StudyRun:
-        spacing = from_si(value * own, "mm", digits=3)
+    def run_at(value: float) -> StudyRun:
+        spacing = from_si(value * case_spacing, "mm", digits=3)
         return StudyRun(
             f"spacing {spacing}", "particle spacing", settings | {"solder.numerics.spacing": spacing}, value
         )
 
-    return Parameter("particle spacing", values, at)
+    return Parameter("particle spacing", values, run_at)
 
 
 def _sized(parameter: str, word: str, sizes: tuple[float, ...], settings: Callable[[float], Settings]) -> Parameter:
-    """A parameter whose values are sizes over those of the case, as finely as ``GRAIN``."""
+    """Return a parameter whose values are element sizes relative to the case, in steps of ``GRAIN``."""
 
-    def at(value: float) -> StudyRun:
+    def run_at(value: float) -> StudyRun:
         size = GRAIN * floor(value / GRAIN + ROUNDING)
         return StudyRun(f"{word} x {size:.3g}", parameter, settings(size), size)
 
-    return Parameter(parameter, sizes, at)
+    return Parameter(parameter, sizes, run_at)
 
 
-def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
-    """Elements of board, substrate and die that are so many times as large."""
+def _board_elements(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Return settings that multiply the element size of board, substrate and die by ``size``."""
     board, package = case.board.numerics, case.package
     layers = _count(board.layers, size)
     return {
@@ -200,26 +202,26 @@ def _of_board(case: BoardDropCase, size: float) -> dict[str, str]:
     }
 
 
-def _of_joints(case: BoardDropCase, size: float) -> dict[str, str]:
-    """Elements of fine joints that are so many times as large."""
-    own, key = case.package.joint_numerics, "package.joint_numerics"
+def _joint_elements(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Return settings that multiply the element size of fine joints by ``size``."""
+    numerics, key = case.package.joint_numerics, "package.joint_numerics"
     settings = {
-        f"{key}.core": f"{_count(own.core, size)}",
-        f"{key}.rings": f"{_count(own.rings, size)}" if own.rings else "0",
-        f"{key}.layers": f"{max(2, _count(own.layers, size))}",
+        f"{key}.core": f"{_count(numerics.core, size)}",
+        f"{key}.rings": f"{_count(numerics.rings, size)}" if numerics.rings else "0",
+        f"{key}.layers": f"{max(2, _count(numerics.layers, size))}",
     }
-    if own.copper_layers > 1:
-        settings |= {f"{key}.copper_layers": f"{_count(own.copper_layers, size)}"}
-    if own.pad_layer is not None:
-        settings |= {f"{key}.pad_layers": f"{_count(own.pad_layers, size)}"}
+    if numerics.copper_layers > 1:
+        settings |= {f"{key}.copper_layers": f"{_count(numerics.copper_layers, size)}"}
+    if numerics.pad_layer is not None:
+        settings |= {f"{key}.pad_layers": f"{_count(numerics.pad_layers, size)}"}
     scaled = case.shock.numerics.mass_scaled_step
-    if scaled is not None:  # the same share of mass is added then; at one step it would grow with the mesh
+    if scaled is not None:  # keeps the added share of mass; at a fixed step it would grow with refinement
         settings |= {"shock.numerics.mass_scaled_step": from_si(size * scaled, "ns", digits=4)}
-    return settings | _of_columns(case, size)
+    return settings | _column_elements(case, size)
 
 
-def _of_columns(case: BoardDropCase, size: float) -> dict[str, str]:
-    """Elements of the columns of fine joints that are so many times as large, where there are columns."""
+def _column_elements(case: BoardDropCase, size: float) -> dict[str, str]:
+    """Return settings that multiply the element size of the columns of fine joints, if there are columns."""
     imprint, key = case.package.imprint, "package.imprint"
     if imprint is None:
         return {}
@@ -230,8 +232,8 @@ def _of_columns(case: BoardDropCase, size: float) -> dict[str, str]:
     }
 
 
-def _count(own: int, size: float) -> int:
-    return max(1, floor(own / size + 0.5))
+def _count(elements: int, size: float) -> int:
+    return max(1, floor(elements / size + 0.5))
 
 
 def _length(value: float) -> str:
@@ -239,31 +241,31 @@ def _length(value: float) -> str:
 
 
 def _couplings(case: BoardDropCase, whole: Settings) -> Iterator[StudyRun]:
-    """Two models, or one in explicit steps, on the mesh of the case; also against the run that varies that mesh."""
+    """Yield couplings on the mesh of the case, each against the finest run and against one model on the same mesh."""
     for name, settings in (_two_models(case) | _explicit(case)).items():
         if settings == whole:
             continue
-        if settings != _fine(1) or not _is_linear(case):  # else it is on the way of all meshes
+        if settings != _fine(1) or not _is_linear(case):  # else it is already a run of the element size
             yield StudyRun(name, "coupling", settings)
         yield StudyRun(f"{name}: alone", "coupling, same mesh", settings, None, SAME_MESH)
 
 
 def _two_models(case: BoardDropCase) -> dict[str, Settings]:
-    """Extent of the fine region, schemes, one way; name -> settings."""
+    """Return two-model variants, name -> settings: number of fine joints, coupling schemes, one-way coupling."""
     key, joints = "shock.coupling", len(pad_table(case.package, case.board, case.warpage))
-    every = TWO_SCALE | {f"{key}.fine_joints": "all"}
+    all_fine = TWO_SCALE | {f"{key}.fine_joints": "all"}
     few = {f"{count} fine": _fine(count) for count in FINE if count < joints}
-    ways = few | {f"{name}, one way": settings | {f"{key}.direction": "one_way"} for name, settings in few.items()}
-    ways |= {"all fine": every, "all fine, held velocity": every | {f"{key}.scheme": "held_velocity"}}
+    variants = few | {f"{name}, one way": settings | {f"{key}.direction": "one_way"} for name, settings in few.items()}
+    variants |= {"all fine": all_fine, "all fine, held velocity": all_fine | {f"{key}.scheme": "held_velocity"}}
     if _is_linear(case) and not case.shock.numerics.mass_scaled:
-        ways["all fine, one level"] = every | {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
+        variants["all fine, one level"] = all_fine | {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
     if case.shock.numerics.mass_scaled:
-        ways |= {f"{name}, true mass": settings | TRUE_MASS for name, settings in few.items()}
-    return ways
+        variants |= {f"{name}, true mass": settings | TRUE_MASS for name, settings in few.items()}
+    return variants
 
 
 def _explicit(case: BoardDropCase) -> dict[str, Settings]:
-    """One model in explicit steps; name -> settings."""
+    """Return one-model variants in explicit steps, name -> settings."""
     if not _is_linear(case):
         return {"one model": _one_model(case)}
     explicit, scaled = _one_model(case, "explicit"), case.shock.numerics.mass_scaled

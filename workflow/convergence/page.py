@@ -1,4 +1,4 @@
-"""accuracy.html, accuracy.png (the Pareto plot) and accuracy.md; the same as a section of the report of a run."""
+"""Pages of a convergence study: accuracy.html, the Pareto plot accuracy.png, accuracy.md, and a section of a report."""
 
 from pathlib import Path
 from textwrap import fill
@@ -6,29 +6,29 @@ from textwrap import fill
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import CASES, Case
 from reflowshock.workflow.convergence import tables
-from reflowshock.workflow.convergence.known import is_of, own_accuracy
-from reflowshock.workflow.convergence.measured import FILE, Accuracy, Measurement, read_accuracy
-from reflowshock.workflow.convergence.tables import compared, every_run, front
+from reflowshock.workflow.convergence.accuracy_file import FILE, Accuracy, Measurement, read_accuracy
+from reflowshock.workflow.convergence.discretisation import is_current, read_case_accuracy
+from reflowshock.workflow.convergence.tables import all_measurements, compared, front
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLACK, GREY, RED
 from reflowshock.workflow.report.template import write_page
 
 COLOURS = ("#0b5fa5", "#d1495b", "#2a7d4f", "#7a5ea8", "#e09f3e", "#5f6c7b", "#1b998b", "#8c564b")
 MARKERS = "osD^vP*X"
-LABELLED = 14  # runs that are written beside their marks
-WIDTH = 48  # letters of a line along the axis of errors
+MOST_LABELS = 14  # run names in the plot
+WIDTH = 48  # characters in a line of the label of the error axis
 
 
 PAGE, PICTURE, TEXT = "accuracy.html", "accuracy.png", "accuracy.md"
 
 
 def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ()) -> None:
-    """Write page, picture and Markdown table of a measurement.
+    """Write the page, the plot and the Markdown tables of a convergence study.
 
     Args:
-        folder: where they go.
-        accuracy: what was measured.
-        remarks: further notes.
+        folder: Folder to write to.
+        accuracy: Convergence study.
+        remarks: Further notes.
     """
     write_page(folder / PAGE, "accuracy.html.j2", {"version": __version__, "accuracy": section(accuracy, remarks)})
     save_picture(accuracy, folder / PICTURE)
@@ -36,13 +36,13 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
 
 
 def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: bool = False, stale: bool = False) -> dict:
-    """Return what the section of a page tells.
+    """Return the context of the template of a study's section.
 
     Args:
-        accuracy: what was measured.
-        remarks: further notes.
-        elsewhere: whether it was measured of another case than the page is on.
-        stale: whether the case has changed since.
+        accuracy: Convergence study.
+        remarks: Further notes.
+        elsewhere: Whether the study belongs to another case than the page.
+        stale: Whether the case has changed since the study was run.
     """
     chosen = accuracy.recommended
     advice = (
@@ -55,7 +55,7 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: boo
             "options": tables.as_options(chosen.run.settings),
         }
     )
-    stages = dict.fromkeys(stage for one in accuracy.measurements for stage in one.stages)
+    stages = dict.fromkeys(stage for measurement in accuracy.measurements for stage in measurement.stages)
     return advice | {
         "case": accuracy.case,
         "command": accuracy.command,
@@ -74,22 +74,27 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: boo
 
 
 def section_for(run_folder: Path, case: Case) -> dict | None:
-    """Return the section of a case's report: what was measured of the case itself, beside its run folder.
+    """Return the section on accuracy for the report of a run.
 
-    Without that, what a case of the same kind that comes with the program has; None where none does.
+    Args:
+        run_folder: Run folder; the study of the case is searched next to it.
+        case: Case of the run.
+
+    Returns:
+        Context of the study of the case, else of the study of a shipped case of the same kind; None without either.
     """
-    own = own_accuracy(run_folder, case)
-    if own is not None:
-        return section(own, stale=not is_of(own, case))
+    accuracy = read_case_accuracy(run_folder, case)
+    if accuracy is not None:
+        return section(accuracy, stale=not is_current(accuracy, case))
     for path in sorted(CASES.glob(f"*/{FILE}")):
-        found = read_accuracy(path)
-        if found is not None and found.kind == case.kind:
-            return section(found, elsewhere=found.case != case.case.name)
+        accuracy = read_accuracy(path)
+        if accuracy is not None and accuracy.kind == case.kind:
+            return section(accuracy, elsewhere=accuracy.case != case.case.name)
     return None
 
 
 def markdown(accuracy: Accuracy) -> str:
-    """Return tables of runs, orders and the recommendation in Markdown."""
+    """Return the tables of runs, orders and recommendation in Markdown."""
     legend = tables.legend(accuracy).replace(tables.ON_FRONT, f"\\{tables.ON_FRONT}")
     blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
     predicted = tables.prediction(accuracy)
@@ -105,7 +110,7 @@ def _markdown(table: dict) -> str:
 
 
 def charts(accuracy: Accuracy) -> list[Chart]:
-    """Return the judged error over wall time and core-seconds, the name of each run under the pointer."""
+    """Return charts of the judged error over wall time and over core-seconds, with run names as labels."""
     level = Axis("error [%]", log=True)
     return [
         Chart(Axis(label, log=True), level, _series(accuracy, cost))
@@ -114,14 +119,14 @@ def charts(accuracy: Accuracy) -> list[Chart]:
 
 
 def _series(accuracy: Accuracy, cost: str) -> list[Series]:
-    """Return marks of one colour for each parameter, the front, the tolerance, the recommended run."""
-    known = sorted(compared(accuracy), key=lambda one: getattr(one, cost))
-    costs, errors = [getattr(one, cost) for one in known], [_error(one, accuracy) for one in known]
+    """Return marks coloured by parameter, the Pareto front, the tolerance and the recommended run."""
+    measured = sorted(compared(accuracy), key=lambda m: getattr(m, cost))
+    costs, errors = [getattr(m, cost) for m in measured], [_error(m, accuracy) for m in measured]
     lines = []
-    for number, parameter in enumerate(dict.fromkeys(one.parameter for one in known)):
-        here = [place for place, one in enumerate(known) if one.parameter == parameter]
-        values = [costs[k] for k in here], [errors[k] for k in here]
-        names, colour = [known[k].run for k in here], COLOURS[number % len(COLOURS)]
+    for number, parameter in enumerate(dict.fromkeys(m.parameter for m in measured)):
+        rows = [k for k, m in enumerate(measured) if m.parameter == parameter]
+        values = [costs[k] for k in rows], [errors[k] for k in rows]
+        names, colour = [measured[k].run for k in rows], COLOURS[number % len(COLOURS)]
         lines.append(Series(parameter, *values, colour, line="none", marks=True, labels=names))
     best = sorted(front(costs, errors), key=lambda k: costs[k])
     lines.append(Series("Pareto front", [costs[k] for k in best], [errors[k] for k in best], BLACK, line="step"))
@@ -135,7 +140,7 @@ def _series(accuracy: Accuracy, cost: str) -> list[Series]:
 
 
 def save_picture(accuracy: Accuracy, path: Path) -> None:
-    """Write the plot as PNG."""
+    """Write the Pareto plot as PNG."""
     from reflowshock.workflow.report.drawing import pyplot
 
     drawing = figure(accuracy)
@@ -147,8 +152,8 @@ def figure(accuracy: Accuracy):
     """Plot the judged error against wall time and core-seconds, both logarithmic.
 
     Returns:
-        A figure of matplotlib: marks of one colour for each parameter, the front as a line, tolerance,
-        recommendation, and the cost of the finest run where others are compared with it.
+        Matplotlib figure with marks coloured by parameter, the Pareto front, tolerance, recommendation, and the cost of
+        a reference run.
     """
     from reflowshock.workflow.report.drawing import STYLE, plain_ticks, pyplot
 
@@ -168,22 +173,22 @@ def figure(accuracy: Accuracy):
 
 
 def _panel(axis, accuracy: Accuracy, cost: str) -> None:
-    known = compared(accuracy)
-    costs, errors = [getattr(one, cost) for one in known], [_error(one, accuracy) for one in known]
-    for number, parameter in enumerate(dict.fromkeys(one.parameter for one in known)):
-        here = [place for place, one in enumerate(known) if one.parameter == parameter]
+    measured = compared(accuracy)
+    costs, errors = [getattr(m, cost) for m in measured], [_error(m, accuracy) for m in measured]
+    for number, parameter in enumerate(dict.fromkeys(m.parameter for m in measured)):
+        rows = [k for k, m in enumerate(measured) if m.parameter == parameter]
         style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
-        axis.plot([costs[k] for k in here], [errors[k] for k in here], ls="", ms=5, label=parameter, **style)
+        axis.plot([costs[k] for k in rows], [errors[k] for k in rows], ls="", ms=5, label=parameter, **style)
     best = front(costs, errors)
     line = {"color": "#333333", "lw": 0.9, "alpha": 0.6, "zorder": 1, "label": "Pareto front"}
     axis.step([costs[k] for k in best], [errors[k] for k in best], where="post", **line)
-    for place in best[:LABELLED]:
-        position = (costs[place], errors[place])
-        axis.annotate(known[place].run, position, (4, 3), textcoords="offset points", fontsize=6)
-    for one in every_run(accuracy):
-        if one.value is not None and one.stages and not one.errors:  # the finest, whose own error is not known
-            label = f"cost of the finest run, {one.run}"
-            axis.axvline(getattr(one, cost), color="#5f6c7b", lw=1.2, ls=":", label=label)
+    for index in best[:MOST_LABELS]:
+        position = (costs[index], errors[index])
+        axis.annotate(measured[index].run, position, (4, 3), textcoords="offset points", fontsize=6)
+    for m in all_measurements(accuracy):
+        if m.value is not None and m.stages and not m.errors:  # a reference run, whose error is unknown
+            label = f"cost of the finest run, {m.run}"
+            axis.axvline(getattr(m, cost), color="#5f6c7b", lw=1.2, ls=":", label=label)
     if accuracy.tolerance is not None:
         axis.axhline(100.0 * accuracy.tolerance, color="#b3261e", lw=0.9, ls="--", label="tolerance")
     chosen = accuracy.recommended
@@ -193,6 +198,6 @@ def _panel(axis, accuracy: Accuracy, cost: str) -> None:
     axis.margins(x=0.12)
 
 
-def _error(one: Measurement, accuracy: Accuracy) -> float:
-    """Judged error [%]."""
-    return 100.0 * one.errors[accuracy.judged].value
+def _error(measurement: Measurement, accuracy: Accuracy) -> float:
+    """Return the error of the judged quantity [%]."""
+    return 100.0 * measurement.errors[accuracy.judged].value

@@ -9,13 +9,13 @@ from typing import Any
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.convergence.series import (
+from reflowshock.workflow.convergence.convergence_study import (
     ConvergenceStudy,
     Parameter,
     Quantity,
     StudyRun,
-    at_same_times,
-    common_times,
+    resample,
+    sample_times,
 )
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.store.product import read_record
@@ -25,16 +25,16 @@ from reflowshock.workflow.structure.references import BarWave, Cantilever, Layer
 from reflowshock.workflow.structure.stages import solver_folders
 
 SECOND = 2.0  # order of central differences and of trilinear elements (Hughes, The Finite Element Method, 9.2)
-REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 4.0)  # times the numbers of elements of the case
-ALONE = (0.3, 0.5, 0.8, 1.2)  # of one model, where the case has two
+REFINED = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 4.0)  # factors on the numbers of elements of the case
+ALONE = (0.3, 0.5, 0.8, 1.2)  # the same for one model if the case has two
 IMPLICIT = (0.5, 0.7, 1.0, 1.4)
-GRAIN = 0.05  # of refinements that are chosen between the measured ones
-COARSE = 0.5  # refinement of the mesh on which steps are varied
-FRACTIONS = (0.9, 0.64, 0.45, 0.32)  # of the critical step
-SMALLEST = 0.1  # the step that others are compared with, in critical steps
-LENGTHENED = (2.0, 1.4, 1.0, 0.7)  # times the implicit step of the case
-SHORTENED = 0.2
-SCHEMES_AT = 0.8  # refinement of the mesh on which they are compared, one of ALONE
+GRAIN = 0.05  # step of refinements between the measured ones
+COARSE = 0.5  # refinement of the mesh on which time steps are varied
+FRACTIONS = (0.9, 0.64, 0.45, 0.32)  # explicit steps over the critical step
+REFERENCE_FRACTION = 0.1
+IMPLICIT_FACTORS = (2.0, 1.4, 1.0, 0.7)  # factors on the implicit step of the case
+REFERENCE_FACTOR = 0.2
+SCHEMES_AT = 0.8  # refinement of the mesh on which schemes are compared, one of ALONE
 SCHEMES = ("local_steps", "held_velocity", "impulse", "gravouil_combescure")
 SHAPES = {"tetrahedron": "tet4", "tetrahedron_quadratic": "tet10"}
 ELEMENT_SIZE, TIME_STEP = "element size", "time step"
@@ -48,47 +48,46 @@ Settings = dict[str, str]
 
 
 def structure_study(case: StructureCase) -> ConvergenceStudy:
-    """Vary what a structure has; what is not there (two models, an implicit solver) is no parameter."""
-    errors, measure = _answers(case)
-    own = _own_solver(case)
-    steps, smallest = _steps(case, own)
-    parameters = (_elements(ELEMENT_SIZE, "", own, REFINED, case), *_other_solvers(case), steps)
-    choices = (smallest, *_schemes(case, own), *_shapes(case, own))
+    """Return the study of a structure: element size, time step, and the solvers and schemes that the case supports."""
+    errors, measure = _judged_quantities(case)
+    solver = _single_solver(case)
+    steps, smallest = _steps(case, solver)
+    parameters = (_elements(ELEMENT_SIZE, "", solver, REFINED, case), *_other_solvers(case), steps)
+    choices = (smallest, *_schemes(case, solver), *_shapes(case, solver))
     return ConvergenceStudy("comparison", ("shock",), errors, measure, parameters, choices)
 
 
 Measure = Callable[[Any, Path], Mapping[str, Quantity]]
 
 
-def _answers(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
-    """Return what is judged: exact waves or bending where the case has them, else motion and strain of watch points.
+def _judged_quantities(case: StructureCase) -> tuple[Mapping[str, str], Measure]:
+    """Return names of errors and their measure: exact waves or bending if available, else histories of watch points.
 
     Raises:
-        CaseError: there are none.
+        CaseError: The case has neither an exact reference nor a watch point.
     """
     for reference in case.references.values():
-        if isinstance(reference, BarWave | LayeredBar):
-            return WAVE, partial(_wave, reference)
-        if isinstance(reference, Cantilever):
-            return SWING, _swing
+        if reference.kind in EXACT_MEASURES:
+            errors, measure = EXACT_MEASURES[reference.kind]
+            return errors, partial(measure, reference)
     if not case.watch:
-        message = "has no watch point, and there is no exact reference: nothing can be compared"
+        message = "a convergence study requires an exact reference or a watch point"
         raise CaseError("case", [Problem("watch", message, None, "tables [watch.NAME]")])
     return CURVES, _curves
 
 
 def _wave(reference: BarWave | LayeredBar, case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
-    """Velocities along the bar, and the exact ones where each of them is recorded."""
+    """Return the velocities along the bar with the exact ones at the recorded nodes."""
     folder = _folder(run_folder)
     history, count = read_history(folder), case.dynamics.numerics.history_samples + 1
     axial = {f"{point}": history[f"velocity@{point}"][:, 2] for point in wave_points(reference)}
-    found = at_same_times({"time": history["time"], **axial}, axial, case.dynamics.duration, count)
-    times = common_times(case.dynamics.duration, count)
+    velocities = resample({"time": history["time"], **axial}, axial, case.dynamics.duration, count)
+    times = sample_times(case.dynamics.duration, count)
     exact = exact_velocities(case, reference, read_places(folder), times)
-    return {"wave_error": Quantity(found, exact, None, "waves in layers")}
+    return {"wave_error": Quantity(velocities, exact, None, "waves in layers")}
 
 
-def _swing(case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
+def _swing(_reference: Cantilever, _case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
     record = read_record(run_folder / "comparison") or {"metrics": {}}
     return {
         name: Quantity(record["metrics"][name]["value"], 0.0, 1.0, "beam theory")
@@ -100,20 +99,26 @@ def _swing(case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
 def _curves(case: StructureCase, run_folder: Path) -> dict[str, Quantity]:
     history, count = read_history(_folder(run_folder)), case.dynamics.numerics.history_samples + 1
     return {
-        name: Quantity(
-            at_same_times(history, [f"{name}@{point}" for point in case.watch], case.dynamics.duration, count)
-        )
+        name: Quantity(resample(history, [f"{name}@{point}" for point in case.watch], case.dynamics.duration, count))
         for name in CURVES
     }
 
 
+# Kind of an exact reference -> names of errors, function of reference, case and run folder.
+EXACT_MEASURES: dict[str, tuple[Mapping[str, str], Callable[[Any, Any, Path], Mapping[str, Quantity]]]] = {
+    "bar_wave": (WAVE, _wave),
+    "layered_bar": (WAVE, _wave),
+    "cantilever": (SWING, _swing),
+}
+
+
 def _folder(run_folder: Path) -> Path:
-    """Folder of the solver whose figures count."""
+    """Return the results folder of the first solver."""
     return next(iter(solver_folders(run_folder / "shock").values()))
 
 
-def _own_solver(case: StructureCase) -> Settings:
-    """The solver of the case, alone."""
+def _single_solver(case: StructureCase) -> Settings:
+    """Return settings that run only the main solver of the case."""
     solver = "explicit" if case.dynamics.solver == "both" else case.dynamics.solver
     alone = {"dynamics.solver": solver} if solver != case.dynamics.solver else {}
     compared = case.dynamics.coupling is not None and case.dynamics.coupling.compare
@@ -121,18 +126,18 @@ def _own_solver(case: StructureCase) -> Settings:
 
 
 def _elements(name: str, suffix: str, base: Settings, refined: tuple[float, ...], case: StructureCase) -> Parameter:
-    """Numbers of elements along all axes; the explicit step follows."""
+    """Return the element size along all axes as a parameter; the explicit step is proportional to it."""
 
-    def at(value: float) -> StudyRun:
+    def run_at(value: float) -> StudyRun:
         factor = GRAIN * ceil(1.0 / (GRAIN * value) - ROUNDING)
         return StudyRun(f"elements x {factor:.3g}{suffix}", name, base | _refine(case, factor), 1.0 / factor)
 
-    return Parameter(name, tuple(1.0 / factor for factor in refined), at, _order(case))
+    return Parameter(name, tuple(1.0 / factor for factor in refined), run_at, _order(case))
 
 
 def _order(case: StructureCase) -> float | None:
-    """Order in the size of elements; none where a half-sine runs along a bar, whose kinks are no smooth motion."""
-    return None if any(isinstance(one, BarWave) for one in case.references.values()) else SECOND
+    """Return the order in the element size; None for a half-sine pulse in a bar, whose kinks are not smooth."""
+    return None if any(reference.kind == "bar_wave" for reference in case.references.values()) else SECOND
 
 
 def _refine(case: StructureCase, factor: float) -> Settings:
@@ -140,7 +145,7 @@ def _refine(case: StructureCase, factor: float) -> Settings:
 
 
 def _other_solvers(case: StructureCase) -> list[Parameter]:
-    """One model where the case has two; where it has one that is linear, the solver that it has not."""
+    """Return the element size with one model instead of two, or with the other solver if one linear model is used."""
     if case.dynamics.coupling is not None:
         return [_elements(f"{ELEMENT_SIZE}, one model", ", one model", {"dynamics.solver": "dns"}, ALONE, case)]
     if not _is_linear(case):
@@ -154,27 +159,27 @@ def _is_linear(case: StructureCase) -> bool:
     return not yielding and case.dynamics.kinematics == "small"
 
 
-def _steps(case: StructureCase, own: Settings) -> tuple[Parameter, StudyRun]:
-    """The time step by itself, on one mesh, and the much smaller one that it is compared with."""
+def _steps(case: StructureCase, solver: Settings) -> tuple[Parameter, StudyRun]:
+    """Return the time step on a fixed mesh as a parameter, and the run with the reference step."""
     implicit = case.dynamics.solver == "implicit"
-    values, smallest = (LENGTHENED, SHORTENED) if implicit else (FRACTIONS, SMALLEST)
+    values, smallest = (IMPLICIT_FACTORS, REFERENCE_FACTOR) if implicit else (FRACTIONS, REFERENCE_FRACTION)
     setting = _implicit_step(case) if implicit else _step_fraction
-    base = own | _refine(case, COARSE)
+    base = solver | _refine(case, COARSE)
 
-    def at(value: float) -> StudyRun:
+    def run_at(value: float) -> StudyRun:
         size, settings = setting(value)
         return StudyRun(f"step {size}", TIME_STEP, base | settings, value)
 
-    return Parameter(TIME_STEP, values, at, SECOND).apart(smallest)
+    return Parameter(TIME_STEP, values, run_at, SECOND).with_reference(smallest)
 
 
 def _step_fraction(value: float) -> tuple[str, Settings]:
-    """An explicit step in critical steps."""
+    """Return name and settings of an explicit step, given over the critical step."""
     return f"{value:.3g} critical", {"dynamics.numerics.step_fraction": f"{value:.3g}"}
 
 
 def _implicit_step(case: StructureCase) -> Callable[[float], tuple[str, Settings]]:
-    """An implicit step, relative to that of the case."""
+    """Return the function from a factor on the implicit step of the case to the name and settings of a step."""
     from reflowshock.workflow.structure.forecast import forecast_layers, forecast_steps
 
     length = forecast_steps(case, forecast_layers(case))["implicit"]
@@ -186,32 +191,32 @@ def _implicit_step(case: StructureCase) -> Callable[[float], tuple[str, Settings
     return setting
 
 
-def _schemes(case: StructureCase, own: Settings) -> list[StudyRun]:
-    """Other ways to couple two models; each against the exact motion, and against one model on the same mesh."""
+def _schemes(case: StructureCase, solver: Settings) -> list[StudyRun]:
+    """Return other coupling schemes, each against the exact motion and against one model on the same mesh."""
     if case.dynamics.coupling is None:
         return []
     mesh, key = _refine(case, SCHEMES_AT), "dynamics.coupling"
     usual = "local_steps" if _is_linear(case) else "held_velocity"
     chosen = case.dynamics.coupling.scheme
-    ways: dict[str, Settings] = {"own scheme": {}} | {
+    variants: dict[str, Settings] = {"own scheme": {}} | {
         name.replace("_", " "): {f"{key}.scheme": name}
         for name in SCHEMES
         if name != (usual if chosen == "auto" else chosen) and (_is_linear(case) or name != "local_steps")
     }
-    if _is_linear(case) and "own scheme" in ways and chosen in ("auto", "local_steps"):
-        ways["one level"] = {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
+    if _is_linear(case) and "own scheme" in variants and chosen in ("auto", "local_steps"):
+        variants["one level"] = {f"{key}.scheme": "local_steps", f"{key}.levels": "1"}
     one_model = f"elements x {SCHEMES_AT:.3g}, one model"
     runs = []
-    for name, settings in ways.items():
-        every = own | mesh | settings
+    for name, settings in variants.items():
+        run_settings = solver | mesh | settings
         if settings:
-            runs.append(StudyRun(f"{name} x {SCHEMES_AT:.3g}", "scheme", every))
-        runs.append(StudyRun(f"{name} alone", "scheme, same mesh", every, None, one_model))
-    return runs + _placements(own | mesh)
+            runs.append(StudyRun(f"{name} x {SCHEMES_AT:.3g}", "scheme", run_settings))
+        runs.append(StudyRun(f"{name} alone", "scheme, same mesh", run_settings, None, one_model))
+    return runs + _placements(solver | mesh)
 
 
 def _placements(base: Settings) -> list[StudyRun]:
-    """Both models on both ranks, or one on each."""
+    """Return placements of two models on two ranks: both models on each rank, or one model per rank."""
     if available_cores() < 2:
         return []
     ranks = base | {"dynamics.ranks": "2"}
@@ -221,15 +226,15 @@ def _placements(base: Settings) -> list[StudyRun]:
     ]
 
 
-def _shapes(case: StructureCase, own: Settings) -> list[StudyRun]:
-    """Tetrahedra in place of hexahedra, where no layers are tied."""
+def _shapes(case: StructureCase, solver: Settings) -> list[StudyRun]:
+    """Return runs with tetrahedra instead of hexahedra, if no layers are tied."""
     body = case.structure
     tied = case.dynamics.coupling is not None or any(layer.in_plane for layer in body.layers.values())
     if tied or body.element != "hexahedron":
         return []
     return [
         StudyRun(
-            f"{name} x {factor:g}", "shape of elements", own | _refine(case, factor) | {"structure.element": element}
+            f"{name} x {factor:g}", "shape of elements", solver | _refine(case, factor) | {"structure.element": element}
         )
         for element, name in SHAPES.items()
         for factor in (0.5, 1.0)

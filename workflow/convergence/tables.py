@@ -1,4 +1,4 @@
-"""Tables of what accuracy costs, with the Pareto front: for the terminal, the page, a report and a README."""
+"""Tables of errors and costs with the Pareto front, for the terminal, the page, a report and Markdown."""
 
 import shlex
 from collections import Counter
@@ -7,63 +7,63 @@ from collections.abc import Mapping, Sequence
 from reflowshock.problem import as_toml
 from reflowshock.workflow.case.scales import override_value
 from reflowshock.workflow.case.text import number, percent
-from reflowshock.workflow.convergence.measured import Accuracy, Fit, Measurement
+from reflowshock.workflow.convergence.accuracy_file import Accuracy, Fit, Measurement
 
 
 def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Return which runs are on the front, the cheapest first.
+    """Return the indices of the runs on the Pareto front, the cheapest first.
 
     Args:
-        costs: of each run.
-        errors: of each run, equally many.
+        costs: Cost of each run.
+        errors: Error of each run.
     """
-    best, chosen = float("inf"), []
-    for place in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
-        if errors[place] < best:
-            best = errors[place]
-            chosen.append(place)
-    return chosen
+    smallest_error, indices = float("inf"), []
+    for index in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
+        if errors[index] < smallest_error:
+            smallest_error = errors[index]
+            indices.append(index)
+    return indices
 
 
 LONGEST_MESSAGE = 90
 ON_FRONT = "*"
-SMALLEST_ERROR = 5e-5  # that is told
+SMALLEST_ERROR = 5e-5  # smallest error that is written as a number
 
 
-def every_run(accuracy: Accuracy) -> list[Measurement]:
-    """Return the runs that were run and, where it is none of them, the recommendation."""
-    chosen = accuracy.recommended
-    found = chosen.found if chosen else None
-    extra = [] if found is None or found.run in {one.run for one in accuracy.measurements} else [found]
-    return [*accuracy.measurements, *extra]
+def all_measurements(accuracy: Accuracy) -> list[Measurement]:
+    """Return all measurements, including the recommended run."""
+    recommended = accuracy.recommended.found if accuracy.recommended else None
+    if recommended is None or recommended.run in {measurement.run for measurement in accuracy.measurements}:
+        return list(accuracy.measurements)
+    return [*accuracy.measurements, recommended]
 
 
 def compared(accuracy: Accuracy) -> list[Measurement]:
-    """Return the runs whose judged error is known, and is that of the whole answer."""
-    return [one for one in every_run(accuracy) if accuracy.judged in one.errors and not one.against]
+    """Return the measurements with a total error of the judged quantity."""
+    return [m for m in all_measurements(accuracy) if accuracy.judged in m.errors and not m.against]
 
 
 def on_front(accuracy: Accuracy) -> set[str]:
-    """Return the names of the runs that no other beats in both error and core-seconds."""
-    known = compared(accuracy)
-    chosen = front([one.core_seconds for one in known], [one.errors[accuracy.judged].value for one in known])
-    return {known[place].run for place in chosen}
+    """Return the names of the runs on the Pareto front of error and core-seconds."""
+    measured = compared(accuracy)
+    best = front([m.core_seconds for m in measured], [m.errors[accuracy.judged].value for m in measured])
+    return {measured[index].run for index in best}
 
 
 def runs(accuracy: Accuracy) -> dict:
-    """Head and rows of text: runs, errors and costs, what they are compared with if not the usual, why they failed."""
-    best, usual = on_front(accuracy), usually_against(accuracy)
+    """Return the table of runs: setting, errors, costs, and a remark on an unusual reference or a failure."""
+    best, usual = on_front(accuracy), usual_reference(accuracy)
     head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
     rows = []
-    for one in sorted(every_run(accuracy), key=lambda one: (bool(one.failed), bool(one.against), one.core_seconds)):
-        errors = [_error(one.errors[name].value) if name in one.errors else "" for name in accuracy.errors]
-        cost = ["", ""] if one.failed else [number(float(f"{cost:.3g}")) for cost in (one.seconds, one.core_seconds)]
-        name = f"{one.run} {ON_FRONT}" if one.run in best else one.run
-        rows.append([name, *errors, *cost, _remark(one, accuracy, usual)])
+    for m in sorted(all_measurements(accuracy), key=lambda m: (bool(m.failed), bool(m.against), m.core_seconds)):
+        errors = [_error(m.errors[name].value) if name in m.errors else "" for name in accuracy.errors]
+        cost = ["", ""] if m.failed else [number(float(f"{cost:.3g}")) for cost in (m.seconds, m.core_seconds)]
+        name = f"{m.run} {ON_FRONT}" if m.run in best else m.run
+        rows.append([name, *errors, *cost, _remark(m, accuracy, usual)])
     last = len(head) - 1
-    shown = [column for column in range(len(head)) if column in {0, last} or any(row[column] for row in rows)]
-    picked = [[row[column] for column in shown] for row in rows]
-    return {"head": [head[column] for column in shown], "rows": picked, "prose": True}
+    filled = [column for column in range(len(head)) if column in {0, last} or any(row[column] for row in rows)]
+    cells = [[row[column] for column in filled] for row in rows]
+    return {"head": [head[column] for column in filled], "rows": cells, "prose": True}
 
 
 def _error(share: float) -> str:
@@ -72,45 +72,45 @@ def _error(share: float) -> str:
 
 
 def remarks(accuracy: Accuracy) -> list[str]:
-    """Return what the last column of `runs` says, each remark once with the runs that it is about."""
-    about: dict[str, list[str]] = {}
+    """Return the remarks of the table of runs, each once, followed by the names of its runs."""
+    names_of: dict[str, list[str]] = {}
     for row in runs(accuracy)["rows"]:
-        about.setdefault(row[-1], []).append(row[0].removesuffix(f" {ON_FRONT}"))
-    return [f"{remark}: {', '.join(names)}" for remark, names in about.items() if remark]
+        names_of.setdefault(row[-1], []).append(row[0].removesuffix(f" {ON_FRONT}"))
+    return [f"{remark}: {', '.join(names)}" for remark, names in names_of.items() if remark]
 
 
 def short(quantity: str) -> str:
-    """Name of a quantity at the head of a column."""
+    """Return the short name of a quantity for the head of a column."""
     return quantity.removesuffix("_error").replace("_", " ")
 
 
-def usually_against(accuracy: Accuracy) -> str:
-    """Return what most runs are compared with that have the error of the whole answer."""
-    against = Counter(one.errors[accuracy.judged].against for one in compared(accuracy))
+def usual_reference(accuracy: Accuracy) -> str:
+    """Return the reference of most total errors."""
+    against = Counter(m.errors[accuracy.judged].against for m in compared(accuracy))
     return against.most_common(1)[0][0] if against else ""
 
 
-def _remark(one: Measurement, accuracy: Accuracy, usual: str) -> str:
-    """Say what a run is compared with, if it is not the usual, or why it failed."""
-    if one.failed:
-        words = " ".join(one.failed.split())
+def _remark(measurement: Measurement, accuracy: Accuracy, usual: str) -> str:
+    """Return the reference of a run if it is unusual, or the reason of its failure."""
+    if measurement.failed:
+        words = " ".join(measurement.failed.split())
         return f"failed: {words if len(words) <= LONGEST_MESSAGE else words[:LONGEST_MESSAGE] + ' …'}"
-    error = one.errors.get(accuracy.judged)
+    error = measurement.errors.get(accuracy.judged)
     if error is None:
-        return "not compared, nothing finer was run"
+        return "reference run"
     return "" if error.against == usual else f"compared with {error.against.removeprefix('run ')}"
 
 
 def legend(accuracy: Accuracy) -> str:
-    """Say what marks and errors mean."""
+    """Return the explanation of marks and error names."""
     names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
-    usual = usually_against(accuracy)
+    usual = usual_reference(accuracy)
     reference = [f"compared with {usual} unless stated otherwise"] if usual else []
     return "; ".join([f"{ON_FRONT} on the Pareto front", *reference, *names])
 
 
 def orders(accuracy: Accuracy) -> dict:
-    """Observed orders beside theory, and how cost grows."""
+    """Return the table of observed and theoretical orders, and of the growth of the cost."""
     rows = [
         [
             parameter,
@@ -126,7 +126,7 @@ def orders(accuracy: Accuracy) -> dict:
 
 
 def _growth(fit: Fit) -> str:
-    """Write the fit of the cost; h is the value of the parameter."""
+    """Write the fit of the cost over the value h of the parameter."""
     if fit.cost is None:
         return ""
     cost = fit.cost
@@ -134,7 +134,7 @@ def _growth(fit: Fit) -> str:
 
 
 def prediction(accuracy: Accuracy) -> dict | None:
-    """Error and cost of the recommendation: predicted and found; None where none was run."""
+    """Return the table of predicted and measured error and cost of the recommendation; None if it was not run."""
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return None
@@ -148,16 +148,16 @@ def prediction(accuracy: Accuracy) -> dict | None:
         ],
         ["core-seconds", f"{chosen.core_seconds:.2f} s", f"{seconds:.2f} s", change(seconds, chosen.core_seconds)],
     ]
-    return {"head": ["", "predicted", "found", "difference"], "rows": rows}
+    return {"head": ["", "predicted", "measured", "difference"], "rows": rows}
 
 
-def change(found: float, predicted: float) -> str:
-    """Write by how much what was found differs from what was predicted."""
-    return f"{100.0 * (found / predicted - 1.0):+.0f} %"
+def change(measured: float, predicted: float) -> str:
+    """Write the relative difference between a measured and a predicted value."""
+    return f"{100.0 * (measured / predicted - 1.0):+.0f} %"
 
 
 def as_lines(settings: Mapping[str, str]) -> list[str]:
-    """Write settings as lines of a case file, each table once."""
+    """Return settings as lines of a case file, grouped by table."""
     lines: list[str] = []
     table = None
     for key, text in sorted(settings.items()):
@@ -170,5 +170,5 @@ def as_lines(settings: Mapping[str, str]) -> list[str]:
 
 
 def as_options(settings: Mapping[str, str]) -> str:
-    """Write settings as options of the command line."""
+    """Return settings as options of the command line."""
     return " ".join(f"--set {shlex.quote(f'{key}={text}')}" for key, text in settings.items())

@@ -3,8 +3,8 @@
 from functools import partial
 from math import ceil
 
+from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy, Parameter, StudyRun
 from reflowshock.workflow.convergence.metrics import read_metric_errors
-from reflowshock.workflow.convergence.series import ConvergenceStudy, Parameter, StudyRun
 from reflowshock.workflow.flows.flow_kind import STAGE, FlowCase, FlowKind
 
 FEWEST_ACROSS = 8

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from reflowshock.workflow.report.charts import Chart
 
 LEAST_PITCH = 0.25  # over the diameter of a drop: with less, drops pile up in one place
-# Volume drift is the ink in particles and solid bodies; volume error that of the printed part.
+# Volume drift compares particles and solid bodies with the printed ink; volume error compares the part with it.
 LIMITS = {"volume_drift": 0.01, "volume_error": 0.01, "spray_share": SPRAY}
 # One core of an Intel Xeon, cases/printing, 64 drops: cured ink next to a drop, per step and relative to its particles;
 # measurement of the printed part, per drop and reported layer.

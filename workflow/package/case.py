@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.problem.fittings import BoardFittings
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.thermal import Thermal
+from reflowshock.materials.roles import Materials
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
 from reflowshock.parameters import changed
 from reflowshock.particles.parameters.solder import Reflow, Solder

@@ -67,7 +67,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
     """Say what small kinematics leave out, where that matters; else nothing."""
-    from reflowshock.fem.materials.kinematics import NEGLIGIBLE_STRAIN
+    from reflowshock.fem.problem.kinematics import NEGLIGIBLE_STRAIN
 
     left_out = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
     if kinematics != "small" or left_out <= NEGLIGIBLE_STRAIN:

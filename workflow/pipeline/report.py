@@ -8,7 +8,7 @@ from typing import Any
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.fields import display_values
-from reflowshock.workflow.convergence.known import discretisation
+from reflowshock.workflow.convergence.discretisation import discretisation
 from reflowshock.workflow.convergence.page import section_for
 from reflowshock.workflow.effects.table import report_table
 from reflowshock.workflow.kinds import kind_of

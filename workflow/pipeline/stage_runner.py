@@ -7,7 +7,7 @@ from pathlib import Path
 
 from reflowshock.workflow.case.run import Run, StageError, StageFunction
 from reflowshock.workflow.case.stage import Stage
-from reflowshock.workflow.convergence.measured import this_host
+from reflowshock.workflow.convergence.accuracy_file import this_host
 from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.process.kernel_cache import compilation
 from reflowshock.workflow.process.last_word import in_words, is_interrupt

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from reflowshock.fem.materials.roles import ByName
+from reflowshock.materials.roles import ByName
 from reflowshock.names import nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import CASES, Case, Title

@@ -1,1 +1,1 @@
-"""Solder alone: drops, a joint, drops that merge or oscillate."""
+"""Cases of solder alone: a drop, a joint, two drops, an oscillating drop. Start with `case.py`."""

@@ -1,4 +1,6 @@
-"""Cases of molten solder alone: a drop, a joint, two drops, an oscillating drop; what does not fit together in them."""
+"""Cases of molten solder alone, and their checks: a drop, a joint, two drops, an oscillating drop."""
+
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -10,26 +12,37 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 
 
-def _one_body(scene: str) -> Pipeline:
-    """Reflow of one scene, and its report."""
+def _pipeline(scene: str) -> Pipeline:
+    """Return the pipeline of a scene: its reflow and the report."""
     reflow = Stage("reflow", (scene, "solder", "gravity"), (), ("reflow/shape.h5", "reflow/particles.vtu"))
     return Pipeline((reflow, report_of("reflow")))
 
 
 class SolderCase(Case):
-    """Molten solder alone, without package and board; the table that names the kind holds its scene."""
+    """Case of molten solder without package and board; the table that names its kind is the scene.
+
+    Attributes:
+        is_centred: Whether the body stands around the z axis.
+    """
+
+    is_centred: ClassVar[bool] = True
 
     gravity: Switch = "auto"
     solder: Fluid = Field(default_factory=Fluid)
 
     @property
     def molten(self) -> Solder:
-        """The solder as the solver takes it."""
+        """Parameters of the solder for the solver."""
         return self.decided[0]
 
     @property
+    def is_plane(self) -> bool:
+        """Whether the scene is a plane section, the same along y."""
+        return False
+
+    @property
     def decided(self) -> tuple[Solder, str]:
-        """The solder as the solver takes it, and why it has its scheme; no words where the case says it."""
+        """Parameters of the solder for the solver, and the reason for its scheme; empty if the case sets the scheme."""
         from reflowshock.particles.parameters.scene_checks import with_scheme
 
         scene = getattr(self, self.kind)
@@ -37,70 +50,76 @@ class SolderCase(Case):
 
 
 class DropCase(SolderCase):
-    """A drop of solder on a wall or pad."""
+    """Case of a drop of solder on a wall or pad, or without a wall."""
 
     kind = "drop"
-    stages = _one_body("drop")
+    stages = _pipeline("drop")
 
     drop: Drop
 
+    @property
+    def is_plane(self) -> bool:
+        """Whether the drop is a plane section, the same along y."""
+        return self.drop.section == "plane"
+
 
 class JointCase(SolderCase):
-    """A joint of solder between two pads."""
+    """Case of a joint of solder between two pads."""
 
     kind = "joint"
-    stages = _one_body("joint")
+    stages = _pipeline("joint")
 
     joint: Joint
 
 
 class DropsCase(SolderCase):
-    """Two drops that become one, or stay apart."""
+    """Case of two drops that merge or stay apart."""
 
     kind = "drops"
-    stages = _one_body("drops")
+    is_centred = False
+    stages = _pipeline("drops")
 
     drops: Drops
 
 
 class OscillationCase(Case):
-    """A free drop that oscillates."""
+    """Case of a free drop that oscillates."""
 
     kind = "oscillation"
-    stages = _one_body("oscillation")
+    stages = _pipeline("oscillation")
 
     oscillation: Oscillation
     solder: Liquid = Liquid()
 
     @property
     def molten(self) -> Solder:
-        """The liquid as the solver takes it."""
+        """Parameters of the liquid for the solver."""
         return self.oscillation.resolve(self.solder)
 
 
-def of_drop(case: DropCase) -> list[Problem]:
-    """Find parameters that make no possible drop together."""
+def check_drop(case: DropCase) -> list[Problem]:
+    """Find contradictions between the parameters of a drop."""
     from reflowshock.particles.parameters.scene_checks import drop_problems
 
     return drop_problems(case.drop, case.molten)
 
 
-def of_joint(case: JointCase) -> list[Problem]:
-    """Find parameters that make no possible joint together."""
+def check_joint(case: JointCase) -> list[Problem]:
+    """Find contradictions between the parameters of a joint."""
     from reflowshock.particles.parameters.joint_checks import joint_problems
 
     return joint_problems(case.joint, case.molten)
 
 
-def of_drops(case: DropsCase) -> list[Problem]:
-    """Find parameters that make no possible pair together."""
+def check_drops(case: DropsCase) -> list[Problem]:
+    """Find contradictions between the parameters of two drops."""
     from reflowshock.particles.parameters.scene_checks import pair_problems
 
     return pair_problems(case.drops, case.molten)
 
 
-def of_oscillation(case: OscillationCase) -> list[Problem]:
-    """Find a drop that does not oscillate."""
+def check_oscillation(case: OscillationCase) -> list[Problem]:
+    """Find parameters with which a drop would not oscillate."""
     from reflowshock.particles.parameters.scene_checks import oscillation_problems
 
     return oscillation_problems(case.oscillation, case.molten)

@@ -1,4 +1,4 @@
-"""Effects, size and cost of the reflow of solder alone, and its table of the plan."""
+"""Forecast of the reflow of solder alone: effects, size and cost, and its table of the plan."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,26 +17,26 @@ SCHEMES = {
     "energy": "minimum energy of the tracked surface at constant volume",
     "inertia": "moving tetrahedra, second order in space and time; cost of the maximum number of steps",
     "ispg": "Galerkin form of the paper's method, second order in time; cost of the maximum number of steps",
-    "gripc": "pressure correction of Hu et al., for comparison only; its steps are not part of the predicted cost",
+    "gripc": "pressure correction of Hu et al., for comparison only; the predicted cost does not include its steps",
 }
 
 
-SECONDS_TO_START = 2.0  # until a stage has loaded its libraries and kernels
+SECONDS_TO_START = 2.0  # loading of libraries and compiled kernels
 
 
 @dataclass(frozen=True, slots=True)
 class SolderForecast:
-    """What the reflow of one body will be like.
+    """Forecast of the reflow of one body.
 
     Attributes:
-        effects: effect -> {"on", "why"}.
-        particles: number of particles.
-        scheme: how steps are solved.
-        why: why so, where the case leaves it open.
-        spacing: their distance at the start [m].
-        capillary_limit: largest stable time step of an explicit surface tension [s].
-        largest_step: largest time step that will be taken [s].
-        seconds: stage -> predicted wall time [s].
+        effects: Effect -> {"on", "why"}.
+        particles: Number of particles.
+        scheme: Time integration scheme.
+        spacing: Initial particle spacing [m].
+        capillary_limit: Largest stable time step of explicit surface tension [s].
+        largest_step: Largest expected time step [s].
+        seconds: Stage -> predicted wall time [s].
+        why: Reason for the scheme; empty if the case sets it.
     """
 
     effects: Mapping[str, Any]
@@ -54,7 +54,7 @@ def forecast_solder(case: Case) -> SolderForecast:
     return FORECASTS[case.kind](case)
 
 
-def _of_drop(case: DropCase) -> SolderForecast:
+def _forecast_drop(case: DropCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_drop
     from reflowshock.particles.parameters.estimate import drop_seconds, section_seconds
 
@@ -65,27 +65,27 @@ def _of_drop(case: DropCase) -> SolderForecast:
     return _towards_rest(case, effects, drop.particles, 0.0, section_seconds)
 
 
-def _of_joint(case: JointCase) -> SolderForecast:
+def _forecast_joint(case: JointCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import ispg_seconds, particle_count, reflow_seconds
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
     seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
-    found, path = _towards_rest(case, decide_effects(geometry, solder), particles, seconds), case.joint.path
+    forecast, path = _towards_rest(case, decide_effects(geometry, solder), particles, seconds), case.joint.path
     if path is None or path.speed is None:
-        return found
-    on_the_way = ispg_seconds(particles, ceil(case.joint.way / path.speed / found.largest_step))
-    return replace(found, seconds={"reflow": 2.0 * found.seconds["reflow"] + on_the_way})  # at rest before and after
+        return forecast
+    moving = ispg_seconds(particles, ceil(case.joint.way / path.speed / forecast.largest_step))
+    return replace(forecast, seconds={"reflow": 2.0 * forecast.seconds["reflow"] + moving})  # at rest before and after
 
 
-def _of_drops(case: DropsCase) -> SolderForecast:
+def _forecast_drops(case: DropsCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_drop
     from reflowshock.particles.parameters.estimate import drop_seconds
 
     drops = case.drops
     merged = (drops.volume,) if drops.merge else ()
-    flowing = merged if drops.is_free and drops.merge else (*drops.volumes, *merged)  # free ones touch at once
+    flowing = merged if drops.is_free and drops.merge else (*drops.volumes, *merged)  # free drops touch from the start
     seconds = sum(drop_seconds(drops.per_edge(volume) ** 3) for volume in flowing)
     return _towards_rest(case, decide_drop(case.molten, drops.is_free), drops.particles, seconds)
 
@@ -95,8 +95,17 @@ def _towards_rest(
     effects: Mapping[str, Any],
     particles: int,
     seconds: float,
-    of_ispg: Callable[[int, int], float] | None = None,
+    ispg_cost: Callable[[int, int], float] | None = None,
 ) -> SolderForecast:
+    """Return the forecast of a body that comes to rest.
+
+    Args:
+        case: Case of the body.
+        effects: Decided effects.
+        particles: Number of particles.
+        seconds: Wall time of the quasi-static scheme [s].
+        ispg_cost: Function of particles and steps that returns the wall time of ISPG [s].
+    """
     from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
     from reflowshock.particles.steps.time_step import capillary_limit, largest_step, most_steps
 
@@ -109,13 +118,13 @@ def _towards_rest(
     if scheme == "energy" and (effects["inertia"]["on"] or effects["viscosity"]["on"]):
         scheme, seconds = "inertia", inertial_seconds(particles, steps)
     if scheme == "ispg":
-        seconds = (of_ispg or ispg_seconds)(particles, steps)
+        seconds = (ispg_cost or ispg_seconds)(particles, steps)
     cost = {"reflow": SECONDS_TO_START + seconds}
     why = case.decided[1] if effects["inertia"]["on"] else ""
     return SolderForecast(effects, particles, scheme, numerics.spacing, limit, largest, cost, why)
 
 
-def _of_oscillation(case: OscillationCase) -> SolderForecast:
+def _forecast_oscillation(case: OscillationCase) -> SolderForecast:
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.parameters.estimate import inertial_seconds, ispg_seconds
     from reflowshock.particles.parameters.scenes import rayleigh_period
@@ -137,28 +146,28 @@ def _of_oscillation(case: OscillationCase) -> SolderForecast:
 
 
 FORECASTS: dict[str, Callable[[Any], SolderForecast]] = {
-    DropCase.kind: _of_drop,
-    JointCase.kind: _of_joint,
-    DropsCase.kind: _of_drops,
-    OscillationCase.kind: _of_oscillation,
+    DropCase.kind: _forecast_drop,
+    JointCase.kind: _forecast_joint,
+    DropsCase.kind: _forecast_drops,
+    OscillationCase.kind: _forecast_oscillation,
 }
 
 
 def solder_size(case: Case) -> Size:
-    """Predict what the stages of a case take."""
-    outlook = forecast_solder(case)
-    return Size(outlook.seconds, 1, BYTES_OF_PARTICLE * outlook.particles)
+    """Predict wall times and memory of the stages of a case."""
+    forecast = forecast_solder(case)
+    return Size(forecast.seconds, 1, BYTES_OF_PARTICLE * forecast.particles)
 
 
-def solder_tables(case: Case, outlook: SolderForecast) -> Iterator[RenderableType]:
-    """Yield particles, scheme and time steps; then what the costs assume."""
-    table = new_table("\nReflow", "what", "value", "remark")
-    table.add_row("particles", f"{outlook.particles}", f"{1e6 * outlook.spacing:.3g} µm spacing at the start")
-    table.add_row("scheme", outlook.scheme, SCHEMES[outlook.scheme] + (f"; {outlook.why}" if outlook.why else ""))
+def solder_tables(_case: Case, forecast: SolderForecast) -> Iterator[RenderableType]:
+    """Yield the table of particles, scheme and time steps, and the assumption behind the predicted cost."""
+    table = new_table("\nReflow", "quantity", "value", "remark")
+    table.add_row("particles", f"{forecast.particles}", f"{1e6 * forecast.spacing:.3g} µm initial spacing")
+    table.add_row("scheme", forecast.scheme, SCHEMES[forecast.scheme] + (f"; {forecast.why}" if forecast.why else ""))
     table.add_row(
-        "capillary limit", short(outlook.capillary_limit), "largest stable time step of explicit surface tension"
+        "capillary limit", short(forecast.capillary_limit), "largest stable time step of explicit surface tension"
     )
-    ratio = outlook.largest_step / outlook.capillary_limit
-    table.add_row("largest time step", short(outlook.largest_step), f"{ratio:.3g} times the limit")
+    ratio = forecast.largest_step / forecast.capillary_limit
+    table.add_row("largest time step", short(forecast.largest_step), f"{ratio:.3g} times the limit")
     yield table
     yield styled("\n[dim]{}", REFLOW_SPEED)

@@ -1,19 +1,22 @@
-"""Report of solder alone: pictures, profile or oscillation against the exact one, histories, metrics with errors."""
+"""Report of solder alone: shape, profile or oscillation with the exact one, histories, metrics with limits."""
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.text import number, percent, quantity
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.curves import MICRO, MILLI, TIME
 from reflowshock.workflow.report.particles import particle_scene
 from reflowshock.workflow.report.tables import figures_of, limited_metrics
-from reflowshock.workflow.solder.case import DropCase
+from reflowshock.workflow.solder.case import OscillationCase, SolderCase
+
+if TYPE_CHECKING:
+    from reflowshock.particles.steps.shape import JointShape
 
 DEGREE = np.pi / 180.0
 HEADLINE = (
@@ -23,39 +26,55 @@ HEADLINE = (
 )  # fmt: skip
 
 
-def add_solder(run_folder: Path, case: Case, context: dict, summary: dict) -> None:
-    """Add the section on solder alone."""
-    if not (run_folder / "reflow" / "shape.h5").exists():
-        return
+def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict) -> None:
+    """Add the section of a body at rest to the context of the report.
+
+    Args:
+        run_folder: Run folder with the products.
+        case: Case of the run.
+        context: Context of the page's template, changed in place.
+        summary: Content of ``summary.json``.
+    """
+    shape, meridian = _add_body(run_folder, context, summary)
+    if shape.verdict != "apart":
+        axis = 0.0 if case.is_centred else vertical_axis(shape.surface_points)
+        context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian, case.is_plane)
+    moves = summary["effects"].get("inertia", {}).get("on", False)
+    context["curves"]["body_history"] = history_curve(shape.history, moves)
+    path = run_folder / "reflow" / "path.json"
+    if path.exists() and "pull" not in shape.history:
+        context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
+
+
+def add_oscillation(run_folder: Path, _case: OscillationCase, context: dict, summary: dict) -> None:
+    """Add the section of an oscillating drop to the context of the report; arguments as in `add_solder`."""
+    shape, _ = _add_body(run_folder, context, summary)
+    context["curves"]["swing"] = oscillation_curve(shape.history, summary["metrics"])
+
+
+def _add_body(run_folder: Path, context: dict, summary: dict) -> "tuple[JointShape, np.ndarray | None]":
+    """Add headline, metrics and particles; return the shape and the exact meridian, shape (2, k) [m]."""
     from reflowshock.particles.scenes.products import read_body
 
     shape, meridian = read_body(run_folder / "reflow")
     context["headline"] = figures_of(HEADLINE, summary["metrics"], _text)
     context["tables"]["body"] = limited_metrics(summary["metrics"], summary["health"], _text)
-    if case.kind == "oscillation":
-        context["curves"]["swing"] = swing_curve(shape.history, summary["metrics"])
-    else:
-        if shape.verdict != "apart":
-            axis = middle(shape.surface_points) if case.kind == "drops" else 0.0
-            is_plane = isinstance(case, DropCase) and case.drop.section == "plane"
-            context["curves"]["profile"] = profile_curve(shape.surface_points - axis, meridian, is_plane)
-        moves = summary["effects"].get("inertia", {}).get("on", False)
-        context["curves"]["body_history"] = history_curve(shape.history, moves)
-    path = run_folder / "reflow" / "path.json"
-    if path.exists() and "pull" not in shape.history:
-        context["curves"]["path"] = path_curve(json.loads(path.read_text(encoding="utf-8")))
     context["scenes"]["body"] = particle_scene(shape)
+    return shape, meridian
 
 
-def middle(points: np.ndarray) -> np.ndarray:
-    """Place `(3,)` of the vertical axis through the middle of a drop that stands anywhere."""
+def vertical_axis(points: np.ndarray) -> np.ndarray:
+    """Return the horizontal centre of a body's bounding box, shape (3,) [m], with z = 0."""
     return 0.5 * (points.min(axis=0) + points.max(axis=0)) * np.array([1.0, 1.0, 0.0])
 
 
 def profile_curve(points: np.ndarray, meridian: np.ndarray | None, is_plane: bool = False) -> list[Chart]:
-    """Return radius against height of the surface particles `(s, 3)` [m], and the exact meridian `(2, k)` [m].
+    """Return the chart of radius over height with the exact meridian.
 
-    Of a drop that is the same along y the distance from its middle.
+    Args:
+        points: Surface particles around the z axis, shape (s, 3) [m].
+        meridian: Radius and height of the exact meridian, shape (2, k) [m]; None if it is unknown.
+        is_plane: Whether the body is the same along y; the radius is then the distance from the plane x = 0.
     """
     order, sideways = np.argsort(points[:, 2]), 0.0 if is_plane else 1.0
     radius, height = np.hypot(points[:, 0], sideways * points[:, 1])[order] / MILLI, points[order, 2] / MILLI
@@ -63,28 +82,30 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None, is_plane: boo
     if meridian is not None:
         upwards = np.argsort(meridian[1], kind="stable")
         lines.append(Series("Young-Laplace", meridian[1][upwards] / MILLI, meridian[0][upwards] / MILLI, RED))
-    label = "distance from the middle [mm]" if is_plane else "radius [mm]"
+    label = "distance from the centre [mm]" if is_plane else "radius [mm]"
     return [Chart(Axis("height [mm]"), Axis(label), lines, is_upright=True)]
 
 
 def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]:
-    """Return height and width, potential energy, capillary number and time step; the force of a pull first.
+    """Return charts of size, energy, capillary number and time step, and of the force of a pull.
 
-    Over the time of a liquid that moves by its inertia; else over the steps, whose times mean nothing.
+    Args:
+        history: Arrays of the shape's history.
+        moves: Whether the liquid has inertia. Without it, the charts are over steps, since times have no meaning.
     """
-    axis, at = (TIME, history["time"] / MILLI) if moves else (Axis("step"), history["step"])
+    axis, x = (TIME, history["time"] / MILLI) if moves else (Axis("step"), history["step"])
     sizes = [
-        Series(name, at, history[name] / MILLI, colour)
+        Series(name, x, history[name] / MILLI, colour)
         for name, colour in (("height", BLUE), ("width", ORANGE))
         if name in history
     ]
-    energy = [Series("energy", at, history["energy"] / MICRO)]
-    capillary = [Series("capillary number", at, history["capillary_number"])]
+    energy = [Series("energy", x, history["energy"] / MICRO)]
+    capillary = [Series("capillary number", x, history["capillary_number"])]
     charts = [
         Chart(axis, Axis("size [mm]"), sizes),
         Chart(axis, Axis("energy of surface, wetting and weight [µJ]"), energy),
         Chart(axis, Axis("capillary number", log=True), capillary),
-        Chart(axis, Axis("time step [µs]", log=True), [Series("time step", at, history["time_step"] / MICRO)]),
+        Chart(axis, Axis("time step [µs]", log=True), [Series("time step", x, history["time_step"] / MICRO)]),
     ]
     if "pull" in history:
         charts.insert(0, pull_chart(history))
@@ -92,43 +113,48 @@ def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]
 
 
 def pull_chart(history: Mapping[str, np.ndarray]) -> Chart:
-    """Return the force that moves the package, beside that of balance, over the standoff, or over time if it stays."""
-    standoff, (axis, way) = history["standoff"], (TIME, history["time"] / MILLI)
+    """Return the chart of pulling and equilibrium force, over the standoff, or over time if it is fixed."""
+    standoff, (axis, x) = history["standoff"], (TIME, history["time"] / MILLI)
     if np.ptp(standoff) > 1e-6 * standoff.max():
-        axis, way = Axis("standoff [mm]"), standoff / MILLI
-    order = np.argsort(way, kind="stable")  # downwards the standoff falls
-    forces = [Series("particles", way[order], history["pull"][order] / MILLI)]
+        axis, x = Axis("standoff [mm]"), standoff / MILLI
+    order = np.argsort(x, kind="stable")  # the standoff may decrease
+    forces = [Series("particles", x[order], history["pull"][order] / MILLI)]
     if not np.isnan(exact := history["pull_exact"]).all():
-        forces.append(Series("Young-Laplace", way[order], exact[order] / MILLI, RED))
-    return Chart(axis, Axis("force that moves the package [mN]"), forces)
+        forces.append(Series("Young-Laplace", x[order], exact[order] / MILLI, RED))
+    return Chart(axis, Axis("pulling force on the package [mN]"), forces)
 
 
-def path_curve(places: Sequence[Mapping]) -> list[Chart]:
-    """Return force and waist of a joint in the places of a path, over what changes first: standoff, offset or tilt."""
+def path_curve(positions: Sequence[Mapping]) -> list[Chart]:
+    """Return charts of force and widths of a joint along the path of the package.
+
+    Args:
+        positions: Results at each position of the package; the x axis is the first of standoff, offset and tilt that
+            varies.
+    """
     axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [deg]", DEGREE)}
-    name = next((name for name in axis_of if places[0][name] != places[-1][name]), "standoff")
-    label, scale = axis_of[name]
-    ordered = sorted(places, key=lambda place: place[name])
-    way = [place[name] / scale for place in ordered]
+    name = next((name for name in axis_of if positions[0][name] != positions[-1][name]), "standoff")
+    axis_label, scale = axis_of[name]
+    ordered = sorted(positions, key=lambda position: position[name])
+    x = [position[name] / scale for position in ordered]
 
     def values(key: str) -> list[float]:
-        return [np.nan if place[key] is None else place[key] / MILLI for place in ordered]
+        return [np.nan if position[key] is None else position[key] / MILLI for position in ordered]
 
-    force = [Series("particles", way, values("axial_force"), line="none", marks=True)]
+    force = [Series("particles", x, values("axial_force"), line="none", marks=True)]
     if not np.isnan(exact := values("axial_force_exact")).all():
-        force.append(Series("Young-Laplace", way, exact, RED, marks=True))
+        force.append(Series("Young-Laplace", x, exact, RED, marks=True))
     widths = [
-        Series(shown, way, values(key), colour, marks=True)
-        for key, shown, colour in (("waist", "waist", BLUE), ("max_width", "width", ORANGE))
+        Series(label, x, values(key), colour, marks=True)
+        for key, label, colour in (("waist", "waist", BLUE), ("max_width", "width", ORANGE))
     ]
     return [
-        Chart(Axis(label), Axis("force on the package, upwards [mN]"), force),
-        Chart(Axis(label), Axis("size [mm]"), widths),
+        Chart(Axis(axis_label), Axis("upward force on the package [mN]"), force),
+        Chart(Axis(axis_label), Axis("size [mm]"), widths),
     ]
 
 
-def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> list[Chart]:
-    """Return the amplitude of the second mode beside that of Reid at small amplitude, and the energies."""
+def oscillation_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> list[Chart]:
+    """Return charts of the second mode's amplitude, with Reid's solution for small amplitude, and of the energies."""
     time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
     period = value["period"] / (1.0 + value["period_error"])
     decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])
@@ -148,7 +174,7 @@ def swing_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) 
     ]
     return [
         Chart(TIME, Axis("amplitude of the second mode / R"), swing),
-        Chart(TIME, Axis("energy above that at rest / at the start"), energies),
+        Chart(TIME, Axis("energy above rest / initial kinetic energy"), energies),
     ]
 
 

@@ -151,7 +151,7 @@ def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict,
 
 def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
     """Return the two layers as bars."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
     lower, upper = (float(elasticity_matrix(material)[2, 2]) for material in materials)
@@ -162,7 +162,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
 def layers_of(case: StructureCase) -> exact_layers.Layers:
     """Return all layers as bars."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     materials = case.problem.layer_materials.values()
     return exact_layers.Layers(
@@ -187,7 +187,7 @@ def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
     """Return the only layer as a strip."""
-    from reflowshock.fem.materials.elasticity import elasticity_matrix
+    from reflowshock.materials.elasticity import elasticity_matrix
 
     (material,) = case.problem.layer_materials.values()
     pressure, body = case.loads[reference.load].peak or 0.0, case.structure

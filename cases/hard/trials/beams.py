@@ -12,9 +12,9 @@ from reflowshock.cases.hard.trials.grids import CYCLIC
 from reflowshock.fem.elements.element import critical_steps, element_geometry
 from reflowshock.fem.elements.kind import ElementKind
 from reflowshock.fem.elements.stress import mean_strain
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import boundary_facets
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
 YOUNG = 1e9  # of beams [Pa]; nothing depends on it
 CURVATURE = 6.0  # of the hinge, over that at which the beam yields

@@ -8,14 +8,14 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
-from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
+from reflowshock.materials.plasticity import plastic_constants
+from reflowshock.materials.roles import ELASTIC, Materials
 
 SOLDER = Isotropic(
     density=7400.0,

@@ -13,9 +13,9 @@ from reflowshock.fem.elements.box_step import diagonal_tetrahedra
 from reflowshock.fem.elements.element import Elements, element_geometry, element_kind, element_stiffness, lumped_mass
 from reflowshock.fem.elements.kind import ElementKind
 from reflowshock.fem.elements.tetrahedron import EDGES
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.parameters import Isotropic, Material, Orthotropic
 from reflowshock.fem.mesh.mesh_file import scaled_jacobians
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.parameters import Isotropic, Material, Orthotropic
 
 KINDS = {
     "incompatible_modes": element_kind(8),

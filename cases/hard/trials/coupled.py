@@ -21,9 +21,6 @@ from reflowshock.fem.dynamics.energy_balance import ENERGIES, energy_sums
 from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
-from reflowshock.fem.materials.elasticity import role_of_part
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
@@ -32,6 +29,8 @@ from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.roles import ELASTIC, Materials, role_of_part
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = ELASTIC, Coupling(scheme="held_velocity", levels=1)

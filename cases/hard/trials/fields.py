@@ -16,11 +16,11 @@ from reflowshock.fem.elements.element import Elements, element_geometry
 from reflowshock.fem.elements.stress import element_stress, symmetric
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.roles import Materials
 
 AXIS = np.array([0.48, -0.6, 0.64])
 LARGE = 0.3  # largest component of a displacement gradient of finite strain

@@ -8,9 +8,9 @@ from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.cases.hard.trials.pairs import FRACTION
 from reflowshock.cases.hard.trials.windows import through
 from reflowshock.fem.coupling.scheme import scheme_of
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.roles import ELASTIC
 
 SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
 

@@ -19,9 +19,6 @@ from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
-from reflowshock.fem.materials.library import COPPER
-from reflowshock.fem.materials.parameters import Material
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
@@ -29,6 +26,9 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.library import COPPER
+from reflowshock.materials.parameters import Material
+from reflowshock.materials.roles import Materials
 
 HEIGHT = 1e-3  # of a box [m]
 SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]

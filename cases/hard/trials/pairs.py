@@ -14,13 +14,13 @@ from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.parameters import Isotropic, Orthotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.library import FR4
+from reflowshock.materials.parameters import Isotropic, Orthotropic
+from reflowshock.materials.roles import Materials
 
 SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
 FRACTION = 0.9  # of the critical step of elements, the program's default

@@ -11,14 +11,14 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.cases.hard.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.parameters import Isotropic
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.parallel.exchange import InterfaceChannels
 from reflowshock.fem.parallel.portable import values
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.roles import Materials
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
 SAMPLES = 200  # of a run

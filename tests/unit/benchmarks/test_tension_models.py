@@ -21,6 +21,7 @@ def pulls(model):
     return points, simulation.fields.mass, simulation.surface.accelerations(points, simulation.fields)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("model", "slack"), [("colour function", 0.1), ("free-surface pressure", 0.1)])
 def test_forces_have_the_virial_of_the_tension_of_a_sphere(model, slack):
     """The sum of F . x is -2 gamma A, whatever the thickness of the layer in which the forces act."""

@@ -8,8 +8,8 @@ from reflowshock.fem.elements.element import Elements, element_kind, element_sti
 from reflowshock.fem.forces.box_rows import BoxRows
 from reflowshock.fem.forces.force_congruent import CongruentElements
 from reflowshock.fem.kernels.box_rows import LONGEST
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
 
 MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(SAC405)])
 

@@ -6,7 +6,7 @@ import pytest
 from reflowshock.fem.elements.box_step import box_element_step, diagonal_tetrahedra, with_middle_nodes
 from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.estimates.estimate import box_critical_step
-from reflowshock.fem.materials.library import COPPER, FR4
+from reflowshock.materials.library import COPPER, FR4
 
 SIZE = np.array([2e-3, 1.5e-3, 0.25e-3])
 

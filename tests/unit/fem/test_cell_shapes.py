@@ -10,7 +10,6 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.tetrahedron import EDGES
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.kernels.hexahedron import SIDES
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
@@ -18,6 +17,7 @@ from reflowshock.fem.mesh.mesh_file import read_mesh, scaled_jacobians
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.roles import ELASTIC
 
 SIZE = np.array([3.0, 2.0, 1.0])
 SHAPES = [HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

@@ -7,10 +7,10 @@ import pytest
 from reflowshock.fem.division.tables import joined
 from reflowshock.fem.division.whole import Treatment, survey
 from reflowshock.fem.errors import MeshError, StepError
-from reflowshock.fem.materials.library import FR4
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh import column
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
+from reflowshock.materials.library import FR4
+from reflowshock.materials.roles import ELASTIC
 from tests.support.imprinted_patch import IMPRINTED, Mesh, Problem, boxes, data_of, patch
 from tests.unit.meshing.test_column import MM, standing
 from tests.unit.meshing.test_tied_column import hollow

@@ -18,9 +18,9 @@ from reflowshock.fem.forces.force_corotational import (
     corotational_boxes,
 )
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import COPPER, FR4, SAC405
 from reflowshock.fem.model.stress_recovery import polar
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import COPPER, FR4, SAC405
 
 MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(COPPER)])
 TURN = Rotation.from_rotvec([0.7, -1.1, 2.0]).as_matrix()

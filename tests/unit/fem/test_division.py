@@ -11,11 +11,11 @@ from reflowshock.fem.division.divide import divide, grown, scheme_for
 from reflowshock.fem.division.split import interface_between, part_of
 from reflowshock.fem.division.tables import model_inputs
 from reflowshock.fem.errors import CouplingError
-from reflowshock.fem.materials.library import SAC305
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.steps import steps_of_division
 from reflowshock.fem.problem.shock import Coupling
+from reflowshock.materials.library import SAC305
+from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_models import small_assembly
 
 ELASTIC, YIELDING = ELASTIC, Materials(solder=SAC305)

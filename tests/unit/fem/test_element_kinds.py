@@ -9,8 +9,8 @@ from reflowshock.fem.elements.one_point import ONE_POINT, OnePoint, hourglass_co
 from reflowshock.fem.elements.tetrahedron import EDGES, TETRAHEDRON, TETRAHEDRON_QUADRATIC
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.kernels.hexahedron import SIDES
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
 
 RANDOM = np.random.default_rng(11)
 KINDS = [HEXAHEDRON, ONE_POINT, TETRAHEDRON, TETRAHEDRON_QUADRATIC]

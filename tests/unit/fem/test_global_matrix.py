@@ -5,11 +5,11 @@ from petsc4py import PETSc
 
 from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.fem.errors import AgreedError
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_bodies import STEEL, dense_stiffness
 from tests.support.fem_models import bar, small_assembly
 

@@ -9,11 +9,11 @@ from reflowshock.fem.elements.element import Elements, element_kind, element_sti
 from reflowshock.fem.elements.stress import symmetric, voigt
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.kernels.hencky import PointLaw, hencky, largest_of
-from reflowshock.fem.kernels.plasticity import plastic_constants
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook
 from reflowshock.fem.statics.hencky import HenckyElements
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.parameters import Isotropic, JohnsonCook
+from reflowshock.materials.plasticity import plastic_constants
 
 IDEAL = SAC405.model_copy(update={"plasticity": JohnsonCook(A=30e6)})
 SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])

@@ -10,8 +10,8 @@ from reflowshock.fem.estimates.estimate import box_critical_step, skewed_critica
 from reflowshock.fem.forces.force_assembled import AssembledElements
 from reflowshock.fem.forces.force_congruent import CongruentElements, is_box, parity_blocks
 from reflowshock.fem.kernels.hexahedron import GAUSS, SIDES, shape_derivatives
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import COPPER, FR4, SAC405, SILICON
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import COPPER, FR4, SAC405, SILICON
 
 RANDOM = np.random.default_rng(7)
 

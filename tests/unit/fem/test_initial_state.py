@@ -10,12 +10,12 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.pretension import Pretension
-from reflowshock.fem.materials.library import FR4, SAC405, SILICON
 from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import portable
 from reflowshock.fem.run.cooling import pins, rigid_motions
+from reflowshock.materials.library import FR4, SAC405, SILICON
 from tests.support.fem_residual import Cooled, cooled, layered
 
 CHANGE = -192.0

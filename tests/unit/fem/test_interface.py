@@ -9,7 +9,6 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import COPPER, GAP
 from reflowshock.fem.estimates.estimate import WindowPlan, shortened
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.output.joint_interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
@@ -17,6 +16,7 @@ from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run.package import run
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import SITES, write_small_assembly
 
 TIMES = 4e-6, 1e-5

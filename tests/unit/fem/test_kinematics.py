@@ -1,6 +1,6 @@
 """What small kinematics leave out, in words."""
 
-from reflowshock.fem.materials.kinematics import finite_rotation
+from reflowshock.fem.problem.kinematics import finite_rotation
 
 
 def test_finite_kinematics_leave_nothing_out():

@@ -8,10 +8,10 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.errors import AgreedError
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.run.package import run
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import BOARD_X, BOARD_Y, small_assembly, write_msh
 
 SIZE = 0.5e-3

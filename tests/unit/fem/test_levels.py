@@ -17,10 +17,10 @@ from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.load import PrescribedVelocity
 from reflowshock.fem.loads.pulse import HalfSine
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.tie import Tie, net_load
 from reflowshock.fem.model.step_levels import Levels, SubsteppedElements, check_elastic, levels_of
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_bodies import dense_stiffness
 from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_on_board, levelled
 

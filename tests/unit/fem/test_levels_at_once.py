@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.step_levels import SubsteppedElements, levels_of
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_levels import joint_on_board, levelled
 
 

@@ -7,9 +7,9 @@ import pytest
 from reflowshock.effect import decided
 from reflowshock.fem.estimates.drop_effects import Failing
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS
-from reflowshock.fem.materials.library import SAC305, SILICON, SNPB
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.problem.failure import Failure, Life
+from reflowshock.materials.library import SAC305, SILICON, SNPB
+from reflowshock.materials.roles import ELASTIC
 
 
 def test_joints_are_judged_where_there_is_a_limit():

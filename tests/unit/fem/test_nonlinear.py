@@ -16,7 +16,7 @@ from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.forces.nonlinear_blocks import TEN_NODES, elastic_constants
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.plasticity import yield_stress
-from reflowshock.fem.materials.library import FR4
+from reflowshock.materials.library import FR4
 from tests.support.fem_nonlinear import HexahedronTwin, PointTwin
 
 LINE = np.linspace(0.0, 1.0, 4)

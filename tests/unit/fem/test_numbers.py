@@ -19,14 +19,14 @@ from reflowshock.fem.estimates.estimate import (
     window_plan,
 )
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.elasticity import elasticity_matrix, material_of_part, role_of_part
-from reflowshock.fem.materials.library import COPPER, FR4, SILICON
-from reflowshock.fem.materials.parameters import Isotropic, Orthotropic
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.mesh.watch_table import centre_nodes, whole_watch
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.problem.shock import Ranks
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import COPPER, FR4, SILICON
+from reflowshock.materials.parameters import Isotropic, Orthotropic
+from reflowshock.materials.roles import ELASTIC, material_of_part, role_of_part
 from tests.support.fem_models import BOARD_Z, small_assembly
 
 

@@ -10,11 +10,11 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.errors import AgreedError
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run.package import run
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
 SHOCK = {

@@ -29,9 +29,9 @@ from reflowshock.fem.estimates.placement import (
     shared,
     window_seconds,
 )
-from reflowshock.fem.materials.library import LIBRARY
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.problem.shock import Ranks
+from reflowshock.materials.library import LIBRARY
 
 EVEN = WindowCost(ModelCost(1e-3, 0.0, 1), ModelCost(1e-3, 0.0, 8), 1e-5)
 KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 1e-8)

@@ -15,9 +15,9 @@ from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.materials.roles import Materials
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.materials.roles import Materials
 from tests.support.fem_levels import joint_on_board
 
 STEP, STEPS = 1e-9, 6

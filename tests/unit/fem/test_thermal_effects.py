@@ -18,13 +18,13 @@ from reflowshock.fem.estimates.thermal_effects import (
     solder_force_number,
     warpage_number,
 )
-from reflowshock.fem.materials.library import FR4, SILICON
-from reflowshock.fem.materials.roles import ELASTIC, Materials
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.pads import Pads
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.state import Assembly
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.library import FR4, SILICON
+from reflowshock.materials.roles import ELASTIC, Materials
 from reflowshock.meshing.board.assembly import write_heated_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
@@ -145,7 +145,10 @@ def test_a_whole_package_is_held_level_by_four_corners(tmp_path):
         assert force @ corners == pytest.approx(-load[:, 1, 2] @ pads.centres[:, 1, :2])
 
 
-@pytest.mark.parametrize(("side", "thickness"), [(8.0, 0.4), (6.0, 0.775), (4.0, 0.4)])
+@pytest.mark.parametrize(
+    ("side", "thickness"),
+    [(8.0, 0.4), pytest.param(6.0, 0.775, marks=pytest.mark.long), pytest.param(4.0, 0.4, marks=pytest.mark.long)],
+)
 def test_warpage_of_a_package_with_a_ring_of_substrate_around_its_die(tmp_path, side, thickness):
     parts = package(
         rows=10,

@@ -7,10 +7,10 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.errors import AgreedError, MeshError
-from reflowshock.fem.materials.roles import ELASTIC
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.statics.pads import disc_rule, pad_matrix
 from reflowshock.fem.statics.structure import ThermalStructure
+from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import board_mesh, package_mesh
 from tests.support.thermal_models import REFERENCE, Layers, pads_at, small_pads, small_structure, structure_of
 

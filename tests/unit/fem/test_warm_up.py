@@ -6,9 +6,9 @@ import pytest
 from reflowshock.cases.hard.trials.grids import grid
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.force import force_terms
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import SAC305
 from reflowshock.fem.model.assembly import warm_up
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import SAC305
 
 
 @pytest.mark.parametrize(("kinematics", "rounding"), [("small", 0.0), ("finite", 1e-4)])

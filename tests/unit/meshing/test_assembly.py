@@ -122,7 +122,7 @@ def test_copper_plates_lie_under_and_above_the_joints(tmp_path):
     assert plates.points[plates.cells("package_side", "quad")][:, :, 2] == pytest.approx(0.33 * MM)
 
 
-@pytest.mark.parametrize("symmetry", ["quarter", "full"])
+@pytest.mark.parametrize("symmetry", ["quarter", pytest.param("full", marks=pytest.mark.long)])
 @pytest.mark.parametrize("copper", [PLATE, {"layout": "pads"}])
 def test_estimate_counts_what_is_meshed(tmp_path, symmetry, copper):
     odd = {"length": 3.3 * MM, "width": 5.0 * MM, "thickness": 0.4 * MM, "elements": 1}

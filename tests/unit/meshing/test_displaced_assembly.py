@@ -74,7 +74,7 @@ def test_only_what_the_package_does_beyond_the_board_counts(flat):
         displacement(np.array([[0.0, 0.0, 9.0]]))
 
 
-@pytest.mark.parametrize("symmetry", ["quarter", "full"])
+@pytest.mark.parametrize("symmetry", ["quarter", pytest.param("full", marks=pytest.mark.long)])
 def test_the_underside_is_that_of_the_facets(tmp_path, symmetry):
     """Heights at points of displaced facets, found by their shape functions, are those of the object."""
     write_assembly(package(), board(symmetry=symmetry), tmp_path / "flat.msh")

@@ -1,4 +1,4 @@
-"""Particles that come and go in the scheme ispg, and the edges of the surface that split and collapse."""
+"""Insertion and removal of particles in the scheme ispg, and edges of the surface that split and collapse."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ LIQUID = Physics((TENSION,), (Mass(1.0), TENSION), (Inertia(1.0),), (), ())
 
 
 def moving(stretch=1.0, keep=None):
-    """A ball that flies and spins after two steps, then stretched along z and squeezed beside it, and its event."""
+    """Return the flow of a spinning ball, stretched along z after two steps at constant volume, and its event."""
     body = Body.at_rest(BALL if keep is None else keep(BALL))
     body.velocity = np.array([0.2, -0.1, 0.1]) + np.cross([0.1, 0.3, 0.2], body.points)
     flow = LiquidFlow(body, LIQUID, TimeStep(0.02, body.cloud.spacing, 0.02), IspgStep())
@@ -83,10 +83,10 @@ def test_short_edges_collapse_and_the_event_keeps_what_it_must():
     assert pdist(flow.body.points).min() > 0.35 * BALL.spacing
 
 
-def test_a_gap_is_filled_and_the_event_keeps_what_it_must():
+def test_a_gap_is_filled_with_the_conserved_quantities_unchanged():
     def without_centre(cloud):
-        kept = np.linalg.norm(cloud.points, axis=1) > 0.1
-        return replace(cloud, points=cloud.points[kept], wall=cloud.wall[kept])
+        is_outer = np.linalg.norm(cloud.points, axis=1) > 0.1
+        return replace(cloud, points=cloud.points[is_outer], wall=cloud.wall[is_outer])
 
     flow, event = moving(keep=without_centre)
     check_kept(flow, event)
@@ -159,14 +159,14 @@ def test_a_tip_of_three_triangles_on_a_narrow_base_is_cut_off():
 
 @pytest.mark.parametrize("change", [split_long, collapse_short])
 def test_contact_lines_change_only_where_they_may(change):
-    """Tents: three long edges on the wall, or six of which one is short."""
+    """Cones with three long edges on the wall, or with six edges of which one is short."""
     splits = change is split_long
     angle = 2.0 * np.pi / 3.0 * np.arange(3) if splits else np.array([0.0, 0.1, 1.2, 2.4, 3.6, 4.8])
     foot, count = np.column_stack((np.cos(angle), np.sin(angle), 0.0 * angle)), len(angle)
     points, ring = np.concatenate((foot, [[0.0, 0.0, 0.3]])), np.arange(count, dtype=np.int32)
     triangles = np.array([(k, (k + 1) % count, count) for k in range(count)], np.int32)
-    kept = change(points, triangles, (ring,), 1.5 if splits else 0.3, on_rings=False)
-    assert np.array_equal(kept.triangles, triangles)
+    unchanged = change(points, triangles, (ring,), 1.5 if splits else 0.3, on_rings=False)
+    assert np.array_equal(unchanged.triangles, triangles)
     new = change(points, triangles, (ring,), 1.5 if splits else 0.3, on_rings=True)
     (loop,), line = boundary_loops(new.triangles), new.rings[0]
     assert len(line) == (6 if splits else 5)

@@ -65,7 +65,7 @@ def test_a_travelling_plate_arrives_with_its_particles(body, pinned):
     time_step = 0.1 * way / SPEED
     while np.abs(body.plates[1].motion_to(target)).max() > 1e-12:
         admissible = Admissible(body, pinned, (travel,))
-        body.velocity = admissible.given(time_step).reshape(3, -1).T
+        body.velocity = admissible.prescribed(time_step).reshape(3, -1).T
         body.move(time_step, body.velocity, admissible.twists(np.zeros(admissible.basis.shape[1]), time_step))
         arrived += 1
     assert arrived == pytest.approx(10, abs=1)

@@ -88,6 +88,7 @@ def test_a_killed_process_is_continued_to_the_last_bit(tmp_path, uninterrupted, 
     assert checkpoint.continued
 
 
+@pytest.mark.long
 def test_momentum_and_contact_lines_are_part_of_the_state(tmp_path):
     break_off(INERTIAL, tmp_path / "joint", 10)
     continued = solve_joint(JOINT, INERTIAL, checkpoint=Checkpoint(tmp_path / "joint", (JOINT, INERTIAL)))

@@ -10,7 +10,7 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.scenes.metrics import verdict
-from reflowshock.particles.steps.descent import Start
+from reflowshock.particles.steps.descent import StepStart
 from reflowshock.particles.surface.contact_line import (
     ADVANCING,
     ON_MASK,
@@ -103,7 +103,7 @@ def test_vertices_near_an_edge_are_put_onto_it_on_trial(body):
     wetting = Wetting(1.0, (line,), (SimpleNamespace(force=lambda _: load),))
     wetting.update(body)
     assert (line.state == ON_MASK).all()
-    before, start = body.points.copy(), Start.of(body, (line,))
+    before, start = body.points.copy(), StepStart.of(body, (line,))
     assert wetting.attempt(body)
     assert (line.state == PINNED).all()
     assert not wetting.attempt(body)

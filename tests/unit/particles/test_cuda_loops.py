@@ -85,11 +85,13 @@ def found_of(simulation: Simulation) -> dict[str, np.ndarray]:
     return found | {"viscosity": simulation.fields.viscosity[None], "builds": np.array([[simulation.particles.builds]])}
 
 
-# The second impact has all that the first has, and more terms.
-LONG = {"small_impact": pytest.mark.long}
+# The simulator takes minutes for the others, whose kernels are compiled for the channel as well.
+QUICK = ("small_channel",)
 
 
-@pytest.mark.parametrize("scene", [pytest.param(name, marks=LONG.get(name, ())) for name in SCENES])
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in SCENES]
+)
 def test_a_gpu_computes_what_threads_compute(scene, tmp_path):
     simulation = stirred(scene, "cpu")
     simulation.step(1e-3 * simulation.time_step())

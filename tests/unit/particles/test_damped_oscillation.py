@@ -1,4 +1,4 @@
-"""Frequency and decay of oscillations whose samples are known."""
+"""Frequency and decay fitted to exact damped oscillations."""
 
 import numpy as np
 import pytest

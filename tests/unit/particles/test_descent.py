@@ -1,4 +1,4 @@
-"""Smoothing and flips take no more energy than a step has given."""
+"""Mesh smoothing and flips do not raise the energy above that before the step."""
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import Travel
-from reflowshock.particles.steps.descent import MeshSmoothing, Start, correct_volume, highest_energy, smooth_surface
+from reflowshock.particles.steps.descent import MeshSmoothing, StepStart, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.step_solver import SolverTraits
@@ -52,8 +52,8 @@ def lowered(body, physics, steps):
     return body
 
 
-def evened(body, physics, highest, flips):
-    """Energy, volume and flips of a copy of the body that was evened out."""
+def smoothed(body, physics, highest, flips):
+    """Return energy, relative volume and flips of a smoothed copy of the body."""
     copy, volume = replace(body), body.volume()[0]
     done = smooth_surface(copy, physics, volume, MeshSmoothing(12, flips, 0.0, highest))
     return physics.energy(copy), copy.volume()[0] / volume, done
@@ -64,14 +64,14 @@ def test_smoothing_uses_up_the_energy_that_it_may_take_and_no_more():
     start, physics = joint()
     body = lowered(start, physics, 150)
     low = physics.energy(body)
-    rise = evened(body, physics, np.inf, flips=False)[0] - low
+    rise = smoothed(body, physics, np.inf, flips=False)[0] - low
     assert rise > 5e-5 * low
     for given in (0.0, 0.3, 0.9):
-        energy, volume, flips = evened(body, physics, low + given * rise, flips=False)
+        energy, volume, flips = smoothed(body, physics, low + given * rise, flips=False)
         assert given - 1.1e-4 * given - 1e-9 <= (energy - low) / rise <= given
         assert volume == pytest.approx(1.0, abs=1e-12)
         assert flips == 0
-    assert evened(body, physics, low - 0.1 * rise, flips=True)[2] is None
+    assert smoothed(body, physics, low - 0.1 * rise, flips=True)[2] is None
 
 
 def test_flips_that_raise_the_energy_are_left_out():
@@ -79,10 +79,10 @@ def test_flips_that_raise_the_energy_are_left_out():
     start, physics = drop()
     body = lowered(start, physics, 400)
     low = physics.energy(body)
-    free, _, flips = evened(body, physics, np.inf, flips=True)
+    free, _, flips = smoothed(body, physics, np.inf, flips=True)
     assert flips > 0
     assert free > low + 1e-4 * low
-    energy, volume, flips = evened(body, physics, low, flips=True)
+    energy, volume, flips = smoothed(body, physics, low, flips=True)
     assert flips == 0
     assert energy <= low
     assert volume == pytest.approx(1.0, abs=1e-12)
@@ -152,7 +152,7 @@ def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull,
 
 def test_a_step_that_begins_again_starts_where_it_did():
     body, physics = joint()
-    points, start = body.points.copy(), Start.of(body, physics.lines)
+    points, start = body.points.copy(), StepStart.of(body, physics.lines)
     for _ in range(2):
         body.move(0.1, np.ones_like(points), {1: np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])})
         body.velocity, body.triangles = np.ones_like(points), body.triangles[::-1].copy()

@@ -1,4 +1,4 @@
-"""The Galerkin space of the scheme ispg against exact sums, and the spectrum of its linearised step."""
+"""Galerkin space and equations of the scheme ispg, and the spectrum of its linearised step."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ from reflowshock.particles.steps.time_step import TimeStep
 
 
 def shaken(cloud):
-    """A body whose particles off the walls are not on a lattice."""
+    """Return a body whose particles off the walls are displaced from the lattice."""
     body = Body.at_rest(cloud)
     shake = np.random.default_rng(5).uniform(-0.15, 0.15, cloud.points.shape) * cloud.spacing
     body.points = cloud.points + np.where((cloud.wall < 0)[:, None], shake, 0.0)
@@ -60,7 +60,7 @@ def test_linear_velocities_along_the_wall_are_exact(body, space):
     assert space.divergence(body.points @ slope.T) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_loads_are_the_transposed(body, space):
+def test_loads_are_transposes(body, space):
     """Virtual power: f . (v - N v), of viscous stress and of p div v."""
     random = np.random.default_rng(3)
     field, force = random.normal(size=(2, len(body.points), 3))
@@ -73,7 +73,7 @@ def test_loads_are_the_transposed(body, space):
 
 
 def test_volumes_have_the_moments_of_the_body(body, space):
-    """Those of inertia are soft: next to nothing is missing where particles fill a body well."""
+    """Second moments are soft: their error is small for particles that fill the body evenly."""
     volume, first, second = body_moments(body)
     assert volume == pytest.approx(body.volume()[0])
     assert space.volumes.sum() == pytest.approx(volume)
@@ -84,7 +84,7 @@ def test_volumes_have_the_moments_of_the_body(body, space):
 
 
 def test_particles_of_a_thin_film_keep_their_volumes():
-    """One spacing thick, its inner particles near its surfaces: with exact moments 4e-4 of the mean are left."""
+    """The film is one spacing thick; with exact moments the smallest volume would be 4e-4 of the mean."""
     film = Body.at_rest(box_cloud(1.0, 6))
     inner = (film.cloud.wall < 0) & (np.arange(len(film.points)) >= film.cloud.surface_count)
     above = film.points[:, 2] > 0.5
@@ -96,13 +96,13 @@ def test_particles_of_a_thin_film_keep_their_volumes():
 
 
 def test_a_uniform_pressure_pushes_the_surface_only(body):
-    """B^T 1 is the gradient of the enclosed volume, whatever nodal integration misses."""
+    """B^T 1 is the gradient of the enclosed volume in spite of nodal integration."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     assert equations.pressure_forces(np.ones(len(body.points))) == pytest.approx(body.volume()[1], abs=1e-12)
 
 
 def test_linear_velocities_have_the_energy_of_the_body(body):
-    """A stretch: sum of m v v, by the moments, which are soft."""
+    """Kinetic energy of a stretching motion, by the soft second moments."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     second = np.diag(body_moments(body)[2])
     assert equations.kinetic_energy(body.points * [1.0, 1.0, -2.0]) == pytest.approx(
@@ -111,7 +111,7 @@ def test_linear_velocities_have_the_energy_of_the_body(body):
 
 
 def test_the_projection_keeps_the_volumes(ball):
-    """B v is met, pressures push masses and surface, and none moves or turns the whole."""
+    """The correction meets B v = 0, accelerates masses and surface, and has no resultant and no moment."""
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 0.1)
     start = np.random.default_rng(4).normal(size=body.points.shape)
@@ -129,14 +129,14 @@ def test_the_projection_keeps_the_volumes(ball):
 
 @pytest.fixture(scope="module")
 def between_plates():
-    """A joint whose plates move: the lower one along its normal, the upper one lifts and leans; its equations."""
+    """Joint with a lower plate that moves along its normal and an upper one that lifts and tilts, and its equations."""
     joint = shaken(joint_cloud(JointGeometry(1.0, 1.0, 1.0), 3.0, 0.3))
     twists = {0: np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]), 1: np.array([0.0, 0.0, -0.3, 0.1, 0.2, 0.0])}
     return joint, twists, IspgStep().prepare(joint, water(), NeighbourList(1.0, 0.0)).equations(joint, 1e-3, twists)
 
 
 def test_walls_that_move_change_the_volume(between_plates):
-    """Rates of volume add up to that of the body; together with the liquid plates change none."""
+    """Rates of volume sum to the rate of the body; a uniform motion of liquid and plates changes none."""
     joint, twists, equations = between_plates
     field = (
         equations.prescribed
@@ -151,7 +151,7 @@ def test_walls_that_move_change_the_volume(between_plates):
 
 
 def test_plates_do_the_work_that_liquid_gains(between_plates):
-    """What the momentum of a step takes, less what the surface, viscosity and smoothing do."""
+    """The power of the plates balances inertia, tension, viscosity and smoothing."""
     joint, twists, equations = between_plates
     before = np.random.default_rng(7).normal(size=joint.points.shape)
     before = projected(equations.admitted, before) + equations.prescribed
@@ -172,8 +172,8 @@ def test_plates_do_the_work_that_liquid_gains(between_plates):
     assert power + expansion == pytest.approx(inertia + resisted + lost.viscous + lost.smoothing, rel=1e-4)
 
 
-def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
-    """Lift and shift, without an edge: the motion that is left takes along what lies on the plate, across it."""
+def test_a_plate_without_edges_floats_along_its_normal_only(between_plates):
+    """Without a pad edge only the lift remains as a mode; it moves the particles on the plate along its normal."""
     joint, _, equations = between_plates
     free = Floating(1, np.vstack([LIFT, SHIFT]), np.array([0.0, 0.0, -2.0]))
     parts = joint, equations.admitted, equations.masses, equations.space.drift_of
@@ -188,7 +188,7 @@ def test_a_plate_that_nothing_holds_is_free_to_lift_only(between_plates):
 
 
 def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
-    """The projection with a plate free to lift meets volumes; what changes momentum has no power in the result."""
+    """With a floating plate the correction keeps the volumes, and its momentum change has no power in the result."""
     joint, _, _ = between_plates
     physics = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     equations = IspgStep().prepare(joint, physics, NeighbourList(1.0, 0.0)).equations(joint, 1e-3)
@@ -204,7 +204,7 @@ def test_a_plate_that_floats_takes_its_share_of_the_pressure(between_plates):
 
 
 def test_the_pressure_equation_is_that_of_its_parts(body, between_plates):
-    """With implicit tension, walls, and a plate that floats: B of what B^T p drives."""
+    """The operator is B times the response to B^T p, with implicit tension, walls and a floating plate."""
     joint, _, _ = between_plates
     lifts = replace(water(), motions=(Floating(1, LIFT, np.zeros(3)),))
     for drop, physics in ((body, water()), (joint, lifts)):
@@ -212,12 +212,12 @@ def test_the_pressure_equation_is_that_of_its_parts(body, between_plates):
         pressure, respond = np.random.default_rng(11).normal(size=len(drop.points)), equations.response()
         whole = respond(equations.pressure_forces(pressure), equations.ghost_pressure_forces(pressure))
         operator, _ = equations.pressure_equation(respond)
-        wanted = equations.volume_rates(whole)
-        assert operator(pressure) == pytest.approx(wanted, abs=1e-10 * np.abs(wanted).max())
+        expected = equations.volume_rates(whole)
+        assert operator(pressure) == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
 
 
 def test_the_pressure_matrix_is_that_of_its_operator(body, space):
-    """In single precision, scaled; walls admit no velocity across them."""
+    """The band holds the operator in single precision, scaled to a unit diagonal."""
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-6)
     balanced, count = replace(equations, unbalanced=np.zeros_like(body.points)), len(body.points)
     operator, matrix = balanced.pressure_equation(balanced.response())
@@ -225,18 +225,18 @@ def test_the_pressure_matrix_is_that_of_its_operator(body, space):
     assert band.rows[:, -1] == pytest.approx(1.0, abs=1e-6)
     width = band.rows.shape[1]
     assert width < count
-    found = np.zeros((count, width + count))
+    lower = np.zeros((count, width + count))
     for rank, row in enumerate(band.rows):
-        found[rank, rank + 1 : rank + 1 + width] = row
+        lower[rank, rank + 1 : rank + 1 + width] = row
     whole = np.array([operator(unit) for unit in np.eye(count)])
-    assert found[:, :width] == pytest.approx(0.0, abs=0.0)
-    assert found[:, width:] / np.outer(band.scale[order], band.scale[order]) == pytest.approx(
+    assert lower[:, :width] == pytest.approx(0.0, abs=0.0)
+    assert lower[:, width:] / np.outer(band.scale[order], band.scale[order]) == pytest.approx(
         np.tril(whole[np.ix_(order, order)]), abs=1e-6 * np.abs(whole).max()
     )
 
 
 def test_factors_of_an_earlier_matrix_solve_and_are_restored():
-    """A matrix that has changed since takes iterations; the solution does not depend on the factors."""
+    """A changed matrix takes more iterations; the solution does not depend on the factors."""
     random = np.random.default_rng(8)
     half, right = random.normal(size=(30, 60)), random.normal(size=30)
     first, now = half @ half.T, (half + 0.02 * random.normal(size=half.shape)) @ (half.T)
@@ -269,14 +269,14 @@ def test_a_lonely_particle_is_named():
 
 
 def water(inertia=True):
-    """Density and surface tension are one."""
+    """Return the physics of a liquid with unit density and surface tension."""
     tension = SurfaceTension(1.0)
     return Physics((tension,), (Mass(1.0), tension), (Inertia(1.0),) if inertia else (), (), ())
 
 
 @pytest.fixture(scope="module")
 def ball():
-    """A ball of 147 particles at rest."""
+    """Ball of 147 particles at rest."""
     rest = Body.at_rest(sphere_cloud(4.0 / 3.0 * np.pi, 3))
     flow = LiquidFlow(rest, water(inertia=False), TimeStep(10.0, rest.cloud.spacing, 10.0), Relaxation(1.0))
     for _ in range(30):
@@ -285,7 +285,7 @@ def ball():
 
 
 def stiffness(ball):
-    """Minus the derivative of the force and the pressure of the body by the positions, `(3 n, 3 n)`, by differences."""
+    """Return minus the derivative of the forces at constant pressure by finite differences, shape (3 n, 3 n)."""
     count, size = ball.cloud.surface_count, 3 * len(ball.points)
     slope, tension = ball.volume()[1][:count], water()
     pressure = -(tension.force(ball)[:count] * slope).sum() / (slope**2).sum()
@@ -304,16 +304,16 @@ def stiffness(ball):
 
 
 def shaken_inside(ball):
-    """The ball with particles below its surface that are not on shells: the surface stays at rest."""
+    """Return the ball with displaced particles below its surface, which stays at rest."""
     shake = np.random.default_rng(1).uniform(-0.1, 0.1, ball.points.shape) * ball.cloud.spacing
     shake[: ball.cloud.surface_count] = 0.0
     return replace(ball, points=ball.points + shake)
 
 
 def test_no_mode_of_the_linearised_scheme_grows(ball):
-    """Squares of the frequencies of m v' = -K x + B^T p, x' = v, B v = 0 at rest; those of order two: 8.
+    """Squared frequencies of m v' = -K x + B^T p, x' = v, B v = 0 are positive; those of the second mode are 8.
 
-    A mode counts by its share of the linear velocities without divergence; modes of the grid have next to none.
+    A mode is weighted by its share of the divergence-free linear velocities; grid modes have almost none.
     """
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
@@ -333,7 +333,7 @@ def test_no_mode_of_the_linearised_scheme_grows(ball):
 
 
 def test_a_swing_keeps_its_momenta(ball):
-    """Uneven particles, large steps: the implicit tension has no moment, and levers are those of the forces."""
+    """With uneven particles and large steps the implicit tension has no moment."""
     body = shaken_inside(replace(ball, points=ball.points @ np.diag([1.2, 0.9, 0.8])))
     flow = LiquidFlow(body, water(), TimeStep(0.3, body.cloud.spacing, 0.3), IspgStep())
     for _ in range(12):
@@ -345,7 +345,7 @@ def test_a_swing_keeps_its_momenta(ball):
 
 
 def test_a_swing_keeps_its_centre(ball):
-    """Triangles that are evened out give volume to one side and take it from another."""
+    """Mesh smoothing transfers volume from one side to another, which must not move the centre."""
     body = shaken_inside(replace(ball, points=ball.points @ np.diag([1.2, 0.9, 0.8])))
     flow = LiquidFlow(body, water(), TimeStep(0.3, body.cloud.spacing, 0.3), IspgStep())
     start = centre(body)
@@ -356,7 +356,7 @@ def test_a_swing_keeps_its_centre(ball):
 
 
 def test_a_zigzag_of_the_surface_dies_away(ball):
-    """One that the shape functions hardly show; 98 % were left when particles moved with N v."""
+    """The shape functions hardly resolve the zigzag; with particles that move with N v, 98 % of it remained."""
     body = shaken_inside(ball)
     equations = IspgStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, 1e-3)
     count, zigzag = body.cloud.surface_count, np.zeros_like(body.points)
@@ -364,8 +364,8 @@ def test_a_zigzag_of_the_surface_dies_away(ball):
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     signs = np.linalg.svd(equations.space.shape.toarray()[:count, :count])[2][-1]
     zigzag[:count] = signs[:, None] * normals
-    shown = zigzag - equations.space.unresolved(zigzag)
-    assert np.abs((shown[:count] * normals).sum(axis=1)).max() < 0.1 * np.abs(signs).max()
+    resolved = zigzag - equations.space.unresolved(zigzag)
+    assert np.abs((resolved[:count] * normals).sum(axis=1)).max() < 0.1 * np.abs(signs).max()
     height = 0.02 * body.cloud.spacing / np.abs(signs).max()
 
     def moved(displacement):
@@ -379,25 +379,25 @@ def test_a_zigzag_of_the_surface_dies_away(ball):
 
 
 def time_step(body):
-    """One that hardly changes."""
+    """Return a time step control that hardly changes the step."""
     return TimeStep(0.1, body.cloud.spacing, 0.1)
 
 
 @pytest.mark.parametrize("basis", ["linear", "quadratic"])
 def test_modes_of_the_collocated_scheme_grow(ball, basis):
-    """Eigenvalues of x'' = -grad p, lap p = 0 below the surface, p given on it, gradient and Laplacian collocated."""
+    """Eigenvalues of x'' = -grad p, lap p = 0 with collocated operators and prescribed surface pressure."""
     body, count = shaken_inside(ball), ball.cloud.surface_count
     size = body.points.size
-    given = np.zeros((len(body.points), size))
+    boundary = np.zeros((len(body.points), size))
     for column in range(3 * count):
         step = np.zeros(size)
         step[column] = 1e-5
         ends = [force_pressure(replace(body, points=body.points + s * step.reshape(-1, 3)), water()) for s in (1, -1)]
-        given[:count, column] = (ends[0] - ends[1]) / 2e-5
+        boundary[:count, column] = (ends[0] - ends[1]) / 2e-5
     operators = collocate(body.points, (), body.cloud.spacing, basis)
     poisson = operators.laplacian.toarray()
     poisson[:count] = operators.values.toarray()[:count]
-    pressure = np.linalg.solve(poisson, given)
+    pressure = np.linalg.solve(poisson, boundary)
     slope = np.stack([part @ pressure for part in operators.gradient], axis=1).reshape(size, size)
     growth = np.sqrt(np.linalg.eigvals(-slope).astype(complex)).real
     assert growth.max() > 0.05

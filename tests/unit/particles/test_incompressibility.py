@@ -15,25 +15,25 @@ def problem(size=60, rows=20, seed=11):
 
 
 def test_solution_equals_the_dense_solution():
-    given = problem()
-    a, c = given.operator.toarray(), given.constraint.toarray()
+    system = problem()
+    a, c = system.operator.toarray(), system.constraint.toarray()
     zero = np.zeros((len(c), len(c)))
-    expected = np.linalg.solve(np.block([[a, -c.T], [c, zero]]), np.concatenate((given.load, given.rate)))
-    found = solve(given)
-    assert np.concatenate((found.velocity, found.pressure)) == pytest.approx(expected, abs=1e-7)
+    expected = np.linalg.solve(np.block([[a, -c.T], [c, zero]]), np.concatenate((system.load, system.rate)))
+    solution = solve(system)
+    assert np.concatenate((solution.velocity, solution.pressure)) == pytest.approx(expected, abs=1e-7)
 
 
 def test_stabilised_solution_equals_the_dense_solution():
-    given = replace(problem(), stabilisation=0.3 * sparse.identity(20, format="csr"))
-    a, c, s = given.operator.toarray(), given.constraint.toarray(), given.stabilisation.toarray()
-    expected = np.linalg.solve(np.block([[a, -c.T], [c, s]]), np.concatenate((given.load, given.rate)))
-    found = solve(given)
-    assert np.concatenate((found.velocity, found.pressure)) == pytest.approx(expected, abs=1e-7)
+    system = replace(problem(), stabilisation=0.3 * sparse.identity(20, format="csr"))
+    a, c, s = system.operator.toarray(), system.constraint.toarray(), system.stabilisation.toarray()
+    expected = np.linalg.solve(np.block([[a, -c.T], [c, s]]), np.concatenate((system.load, system.rate)))
+    solution = solve(system)
+    assert np.concatenate((solution.velocity, solution.pressure)) == pytest.approx(expected, abs=1e-7)
 
 
 def test_dependent_constraints_are_an_error():
-    given = problem()
-    twice = sparse.vstack((given.constraint, given.constraint[:1]), format="csr")
-    contradiction = np.append(given.rate, given.rate[0] + 1.0)
+    system = problem()
+    twice = sparse.vstack((system.constraint, system.constraint[:1]), format="csr")
+    contradiction = np.append(system.rate, system.rate[0] + 1.0)
     with pytest.raises(SolveFailed, match="residuals"):
-        solve(SaddlePoint(given.operator, twice, given.load, contradiction))
+        solve(SaddlePoint(system.operator, twice, system.load, contradiction))

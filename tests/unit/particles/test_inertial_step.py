@@ -1,4 +1,4 @@
-"""Inertial steps with plates that move."""
+"""Inertial steps with moving plates."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tetrahedra bounded by the tracked surface; velocities of shifted particles."""
+"""Tetrahedra bounded by the tracked surface, and velocities of shifted particles."""
 
 import numpy as np
 import pytest
@@ -37,10 +37,10 @@ def test_volume_and_its_gradient_are_those_of_the_surface(name, amount):
     cells = fill(body)
     volume, gradient = body.volume()
     assert cell_volumes(body.points, cells).sum() == pytest.approx(volume, rel=1e-12)
-    found = np.zeros_like(body.points)
-    np.add.at(found, cells, volume_gradients(body.points, cells))
-    found[body.cloud.wall >= 0, 2] = gradient[body.cloud.wall >= 0, 2]
-    assert found == pytest.approx(gradient, abs=1e-12)
+    result = np.zeros_like(body.points)
+    np.add.at(result, cells, volume_gradients(body.points, cells))
+    result[body.cloud.wall >= 0, 2] = gradient[body.cloud.wall >= 0, 2]
+    assert result == pytest.approx(gradient, abs=1e-12)
     assert len(np.unique(cells)) == len(body.points)
 
 
@@ -64,9 +64,9 @@ def test_winding_numbers_tell_inside_from_outside():
     walls = [wall_corners(body.points, *on_wall) for on_wall in zip(body.cloud.rings, body.plates, strict=True)]
     corners = np.concatenate([body.points[body.triangles], *walls])
     points = np.array([[0.0, 0.0, 0.5], [0.45, 0.0, 0.05], [0.45, 0.0, 0.5], [0.0, 0.0, -0.1]])
-    found = winding_numbers.at_points(points, corners)
-    assert found == pytest.approx([1.0, 1.0, 0.0, 0.0], abs=1e-9)
-    assert found == pytest.approx([winding_number_by_numpy(point, corners) for point in points], abs=1e-12)
+    result = winding_numbers.at_points(points, corners)
+    assert result == pytest.approx([1.0, 1.0, 0.0, 0.0], abs=1e-9)
+    assert result == pytest.approx([winding_number_by_numpy(point, corners) for point in points], abs=1e-12)
 
 
 def test_linear_fields_are_transferred_exactly():

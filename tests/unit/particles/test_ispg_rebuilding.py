@@ -1,4 +1,4 @@
-"""Bodies made anew in the scheme ispg: what an event keeps, and what it takes of the energy."""
+"""Remeshing in the scheme ispg: conserved quantities and the loss of energy."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ BALL = 4.0 / 3.0 * np.pi
 
 
 def liquid():
-    """Density and surface tension are one."""
+    """Return the physics of a liquid with unit density and surface tension."""
     tension = SurfaceTension(1.0)
     return Physics((tension,), (Mass(1.0), tension, Viscosity(0.05)), (Inertia(1.0),), (), ())
 
@@ -36,7 +36,7 @@ def started(body):
 
 
 def spinning(cloud, shift, velocity, spin, steps=2):
-    """A body that flies and spins, after some steps."""
+    """Return the flow of a translating and spinning body after some steps."""
     body = Body.at_rest(cloud)
     body.velocity = np.array(velocity) + np.cross(spin, body.points)
     body.points = body.points + np.array(shift)
@@ -47,20 +47,20 @@ def spinning(cloud, shift, velocity, spin, steps=2):
 
 
 def totals(flows):
-    """Volume, first moments, and momenta of flows that have stepped."""
+    """Return the total volume, first moment and momenta of some flows."""
     moments = [body_moments(flow.body) for flow in flows]
     momenta = sum(flow.solver.state.momenta for flow in flows)
-    return sum(one[0] for one in moments), sum(one[1] for one in moments), momenta
+    return sum(part[0] for part in moments), sum(part[1] for part in moments), momenta
 
 
 def energy(flows):
-    """Surface, kinetic and lost energy."""
-    kept = sum(flow.physics.energy(flow.body) + flow.solver.state.kinetic for flow in flows)
-    return kept + sum(flow.solver.state.losses.total for flow in flows)
+    """Return the sum of surface, kinetic and lost energy."""
+    mechanical = sum(flow.physics.energy(flow.body) + flow.solver.state.kinetic for flow in flows)
+    return mechanical + sum(flow.solver.state.losses.total for flow in flows)
 
 
 def merged(old):
-    """The flow of the body that flows become."""
+    """Return the flow of the body into which some flows merge."""
     body = rebuild(*(flow.body for flow in old))
     flow = started(body)
     hand_over(old, [flow])
@@ -69,7 +69,7 @@ def merged(old):
 
 @pytest.fixture(scope="module")
 def pair():
-    """Two balls of 147 particles that fly at each other beside their centres, and spin."""
+    """Two spinning balls of 147 particles in an off-centre collision."""
     first = spinning(sphere_cloud(BALL, 3), (-1.05, 0.1, 0.0), (0.2, 0.05, 0.0), (0.0, 0.1, 0.2))
     second = spinning(sphere_cloud(BALL, 3), (1.05, -0.1, 0.0), (-0.3, 0.0, 0.02), (0.0, 0.0, 0.2))
     assert touch(first.body, second.body)
@@ -77,32 +77,32 @@ def pair():
 
 
 def test_drops_that_become_one_keep_volume_centre_and_momenta(pair):
-    one = merged(pair)
-    before, after = totals(pair), totals([one])
+    drop = merged(pair)
+    before, after = totals(pair), totals([drop])
     assert after[0] == pytest.approx(before[0], rel=1e-12)
     assert after[1] == pytest.approx(before[1], abs=1e-12)
     assert np.abs(before[2]).min() > 1e-3
     assert after[2] == pytest.approx(before[2], abs=1e-12)
-    assert (one.time, one.steps) == (pair[0].time, 2)
+    assert (drop.time, drop.steps) == (pair[0].time, 2)
 
 
-def test_what_an_event_takes_stands_in_the_ledger(pair):
-    one = merged(pair)
-    state = one.solver.state
-    assert one.solver.first_energy == sum(flow.solver.first_energy for flow in pair)
+def test_the_energy_budget_contains_the_remeshing_loss(pair):
+    drop = merged(pair)
+    state = drop.solver.state
+    assert drop.solver.first_energy == sum(flow.solver.first_energy for flow in pair)
     lost = state.losses.rebuilding
-    assert 0.03 < lost / one.solver.first_energy < 0.12  # the neck, 2.5 spacings wide at this resolution
+    assert 0.03 < lost / drop.solver.first_energy < 0.12  # the neck, 2.5 spacings wide at this resolution
     evened = sum(flow.solver.state.potential - flow.physics.energy(flow.body) for flow in pair)
-    assert energy([one]) == pytest.approx(energy(pair) + evened, rel=1e-12)
-    start = energy([one])
+    assert energy([drop]) == pytest.approx(energy(pair) + evened, rel=1e-12)
+    start = energy([drop])
     momenta = state.momenta
     for _ in range(4):
-        one.step()
-    assert energy([one]) == pytest.approx(start, rel=2e-3)
-    assert one.solver.state.momenta == pytest.approx(momenta, abs=1e-6)
+        drop.step()
+    assert energy([drop]) == pytest.approx(start, rel=2e-3)
+    assert drop.solver.state.momenta == pytest.approx(momenta, abs=1e-6)
 
 
-def test_velocities_that_are_linear_in_space_come_over_as_they_are():
+def test_linear_velocity_fields_are_transferred_exactly():
     flow = spinning(sphere_cloud(BALL, 3), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), steps=0)
     slope = np.array([[0.3, -0.2, 0.1], [0.5, 0.1, 0.0], [-0.4, 0.2, -0.4]])
     flow.body.velocity = 0.7 + flow.body.points @ slope.T
@@ -118,17 +118,17 @@ def test_on_a_wall_the_centre_and_the_momenta_along_it_stay():
         for side in (-0.56, 0.56)
     )
     assert touch(first.body, second.body)
-    one = merged([first, second])
-    before, after = totals([first, second]), totals([one])
+    drop = merged([first, second])
+    before, after = totals([first, second]), totals([drop])
     along = [0, 1, 5]
     assert after[0] == pytest.approx(before[0], rel=1e-12)
     assert after[1] == pytest.approx(before[1], abs=1e-12)
     assert after[2][along] == pytest.approx(before[2][along], abs=1e-12)
-    assert len(one.body.cloud.rings) == 1
+    assert len(drop.body.cloud.rings) == 1
 
 
-def test_a_joint_that_parts_keeps_volume_centre_and_ledger(monkeypatch):
-    """Two drops on their pads; the neck of three spacings is cut before it is as thin as it would be."""
+def test_a_detached_joint_keeps_volume_centre_and_energy_budget(monkeypatch):
+    """Two drops on their pads; the neck is cut early, at a width of three spacings."""
     radius = 0.24e-3
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
     fluid = {"surface_tension": 4.985, "viscosity": 0.227, "effects": effects}

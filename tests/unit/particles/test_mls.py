@@ -51,42 +51,42 @@ def test_shape_functions_equal_the_mls_approximation(cloud, row):
     values = np.random.default_rng(6).normal(size=len(cloud))
     neighbours = NeighbourList(SUPPORT["linear"], skin=0.3)
     neighbours.update(cloud)
-    found = shape_functions(cloud, np.array([row], np.int32), neighbours)
-    assert found @ values == pytest.approx(mls_value(cloud, values, cloud[row]))
-    assert found @ cloud == pytest.approx(cloud[[row]], abs=1e-12)
+    fitted = shape_functions(cloud, np.array([row], np.int32), neighbours)
+    assert fitted @ values == pytest.approx(mls_value(cloud, values, cloud[row]))
+    assert fitted @ cloud == pytest.approx(cloud[[row]], abs=1e-12)
 
 
 def test_linear_derivatives_equal_differences_of_the_mls_approximation(cloud):
     values = np.random.default_rng(5).normal(size=len(cloud))
     row, step = 171, 1e-3
-    found = fit(cloud, [row], "linear")
+    fitted = fit(cloud, [row], "linear")
     centre = mls_value(cloud, values, cloud[row])
     laplacian = 0.0
     for c in range(3):
         shift = step * np.eye(3)[c]
         right, left = (mls_value(cloud, values, cloud[row] + s) for s in (shift, -shift))
-        assert (found.gradient[c] @ values)[0] == pytest.approx((right - left) / (2 * step), rel=1e-4)
+        assert (fitted.gradient[c] @ values)[0] == pytest.approx((right - left) / (2 * step), rel=1e-4)
         laplacian += (right - 2 * centre + left) / step**2
-    assert (found.laplacian @ values)[0] == pytest.approx(laplacian, rel=1e-3)
+    assert (fitted.laplacian @ values)[0] == pytest.approx(laplacian, rel=1e-3)
 
 
 def test_quadratic_basis_reproduces_quadratic_fields_everywhere(cloud):
     x, y, z = cloud.T
-    found = fit(cloud, np.arange(len(cloud)), "quadratic")
-    assert found.gradient[0] @ (x * x - y * z + 3 * x) == pytest.approx(2 * x + 3, abs=1e-8)
-    assert found.laplacian @ (x * x + 2 * y * y - z * z + x * y) == pytest.approx(4.0, abs=1e-8)
+    fitted = fit(cloud, np.arange(len(cloud)), "quadratic")
+    assert fitted.gradient[0] @ (x * x - y * z + 3 * x) == pytest.approx(2 * x + 3, abs=1e-8)
+    assert fitted.laplacian @ (x * x + 2 * y * y - z * z + x * y) == pytest.approx(4.0, abs=1e-8)
 
 
 def test_linear_basis_reproduces_linear_fields_everywhere(cloud):
-    found = fit(cloud, np.arange(len(cloud)), "linear")
-    assert found.gradient[1] @ (cloud @ [1.0, 2.0, 3.0]) == pytest.approx(2.0, abs=1e-9)
+    fitted = fit(cloud, np.arange(len(cloud)), "linear")
+    assert fitted.gradient[1] @ (cloud @ [1.0, 2.0, 3.0]) == pytest.approx(2.0, abs=1e-9)
 
 
 def test_too_few_neighbours_fall_back_to_the_linear_terms():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0.0]])
-    found = fit(points, [0], "quadratic")
-    assert found.order[0] == 1
-    assert (found.gradient[2] @ points)[0] == pytest.approx([0.0, 0.0, 1.0])
+    fitted = fit(points, [0], "quadratic")
+    assert fitted.order[0] == 1
+    assert (fitted.gradient[2] @ points)[0] == pytest.approx([0.0, 0.0, 1.0])
 
 
 def test_a_planar_neighbourhood_is_an_error():

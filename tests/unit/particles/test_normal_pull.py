@@ -1,4 +1,4 @@
-"""Forces of a surface across it: what drives vertices along it is taken out, the net force and moment are left."""
+"""Normal forces of a surface: the tangential part is removed, net force and moment are unchanged."""
 
 from dataclasses import replace
 
@@ -16,12 +16,12 @@ from reflowshock.particles.physics.operators import NoSlip
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes.reflow import start_joint
 
-ALONG_WALL = [0, 1, 5]  # two shifts and the turn that walls without friction admit
+ALONG_WALL = [0, 1, 5]  # two translations and the rotation that a frictionless wall admits
 
 
 @pytest.fixture(scope="module")
 def body():
-    """A cube on a wall that is skewed, so that nothing is symmetric."""
+    """Skewed cube on a wall, without symmetry."""
     cube = Body.at_rest(box_cloud(1.0, 5))
     x, y, z = cube.points.T
     return replace(cube, points=cube.points + 0.1 * np.column_stack((x * y + z, x * z - y**2, z * x)))
@@ -35,7 +35,7 @@ def test_net_force_and_moment_stay(body):
     assert np.abs(pull - whole).max() > 0.01 * np.abs(whole).max()
 
 
-def test_nothing_pulls_along_the_surface_but_a_swirl(body):
+def test_the_tangential_force_is_a_swirl(body):
     physics, count = Physics((SurfaceTension(1.0),), (), (), (), ()), body.cloud.surface_count
     masses = np.ones(len(body.points))
     pull = physics.admit(body, normal_surface_force(body, physics, masses))
@@ -51,7 +51,7 @@ def test_nothing_pulls_along_the_surface_but_a_swirl(body):
     assert along - (along * normal).sum(axis=1)[:, None] * normal == pytest.approx(0.0, abs=1e-12)
 
 
-def test_fast_strain_keeps_all_of_the_forces(body):
+def test_under_fast_strain_the_whole_force_acts(body):
     physics = Physics((SurfaceTension(1.0),), (), (), (), ())
     still, fast = np.zeros((3, 3, 3)), np.broadcast_to(np.diag([1.0, -1.0, 0.0]), (3, 3, 3))
     assert (tangential_share(still, 1.0), tangential_share(fast, 1.0)) == (0.0, 1.0)

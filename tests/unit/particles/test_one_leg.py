@@ -1,4 +1,4 @@
-"""The one-leg method of the scheme ispg on an oscillator: order, damping, stiff modes, steps that differ."""
+"""One-leg method on an oscillator: order, damping, stiff modes, variable steps."""
 
 from itertools import cycle, islice
 

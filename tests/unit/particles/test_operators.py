@@ -1,4 +1,4 @@
-"""Operators of the implicit step and small parts of it."""
+"""Operators of the implicit step, and particle shifting."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_shift_equals_numpy_twin(body):
     body.points[body.interior] += 0.1 * spacing * rng.uniform(-1, 1, (len(body.interior), 3))
     neighbours = NeighbourList(2.4 * spacing, 0.0)
     neighbours.update(body.points)
-    found = interior_shift(body, neighbours, vertex_normals(body.points, body.triangles, count))
+    shift = interior_shift(body, neighbours, vertex_normals(body.points, body.triangles, count))
     for k, i in enumerate(body.interior):
         if not (np.abs(body.points[i] - [0, 0, 0.5]) < 0.25).all():
             continue
@@ -79,7 +79,7 @@ def test_shift_equals_numpy_twin(body):
         r = np.linalg.norm(d, axis=1)
         expected = 0.15 * spacing * (np.maximum(1 - r / (1.1 * spacing), 0) / r) @ d
         expected *= min(1.0, 0.1 * spacing / np.linalg.norm(expected))
-        assert found[k] == pytest.approx(expected, abs=1e-12)
+        assert shift[k] == pytest.approx(expected, abs=1e-12)
 
 
 def test_time_step_is_cut_by_the_displacement_and_grows_back():

@@ -44,24 +44,24 @@ def plain_laplacian(body, support):
 
 def test_laplacian_equals_its_plain_twin():
     body, neighbours, flow = shaken_flow(5)
-    found = flow.laplacian.toarray()
-    assert found == pytest.approx(plain_laplacian(body, neighbours.radius), abs=1e-14)
-    assert np.array_equal(found, found.T)
+    result = flow.laplacian.toarray()
+    assert result == pytest.approx(plain_laplacian(body, neighbours.radius), abs=1e-14)
+    assert np.array_equal(result, result.T)
 
 
 def test_laplacian_of_a_quadratic_potential():
     """-V times the Laplacian of x^2 + y^2 + z^2 is -6 V, in the mean over particles far from the boundary."""
     body, _, flow = shaken_flow(13)
     inner = (np.abs(body.points - [0.0, 0.0, 0.5]) < 0.25).all(axis=1)
-    found = (flow.laplacian @ (body.points**2).sum(axis=1))[inner]
-    assert found.mean() == pytest.approx(-6.0 * body.volumes[inner].mean(), rel=0.02)
+    result = (flow.laplacian @ (body.points**2).sum(axis=1))[inner]
+    assert result.mean() == pytest.approx(-6.0 * body.volumes[inner].mean(), rel=0.02)
 
 
 def test_velocity_of_a_potential_that_is_even_at_the_wall_is_exact():
     """phi = 2 x - y has the gradient (2, -1, 0) everywhere, images at the wall included."""
     body, _, flow = shaken_flow(7)
-    found = flow.velocity(body.points @ np.array([2.0, -1.0, 0.0]))
-    assert found == pytest.approx(np.tile([2.0, -1.0, 0.0], (len(found), 1)), abs=1e-7)
+    result = flow.velocity(body.points @ np.array([2.0, -1.0, 0.0]))
+    assert result == pytest.approx(np.tile([2.0, -1.0, 0.0], (len(result), 1)), abs=1e-7)
 
 
 def test_velocity_of_a_stagnation_flow_converges():
@@ -93,9 +93,9 @@ def test_multigrid_is_reused_and_restored_to_the_same_bits():
         _, _, flow = shaken_flow(9, seed)
         flux = rng.normal(size=flow.laplacian.shape[0])
         flux -= flux.mean()
-        found, iterations = multigrid.solve(flow.laplacian, flux)
+        result, iterations = multigrid.solve(flow.laplacian, flux)
         assert iterations <= 15
-        assert flow.laplacian @ found == pytest.approx(flux, abs=1e-4)
+        assert flow.laplacian @ result == pytest.approx(flux, abs=1e-4)
     first = multigrid.origin
     restored = LaggedMultigrid()
     restored.restore(multigrid.saved())

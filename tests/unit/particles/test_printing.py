@@ -94,6 +94,7 @@ def test_the_largest_spray_of_a_print_is_kept():
     assert again.surface.spray == 0.0 and again.spray == deposit.spray
 
 
+@pytest.mark.long
 def test_one_thread_and_two_print_the_same_bits():
     found = []
     for threads in (1, 2):

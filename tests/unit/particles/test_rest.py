@@ -1,4 +1,4 @@
-"""A body is at rest when it is calm for long enough: a swing that hardly decays is calm where it turns."""
+"""Criterion of rest: a weakly damped oscillation is calm at its turning points, so that calm must last."""
 
 from dataclasses import replace
 from math import cos, pi, sin
@@ -31,8 +31,8 @@ def records_of(displacements):
 def swing(amplitude, decay, steps):
     """Displacements of a swing of an amplitude, in spacings, that loses a share in a step; it starts where it turns."""
     turn = 2.0 * pi / PERIOD
-    place = [amplitude * (1.0 - decay) ** step * cos(turn * step) for step in range(steps + 1)]
-    return np.abs(np.diff(place))
+    positions = [amplitude * (1.0 - decay) ** step * cos(turn * step) for step in range(steps + 1)]
+    return np.abs(np.diff(positions))
 
 
 def steps_to_rest(records, rule):
@@ -51,17 +51,17 @@ def test_a_swing_is_not_at_rest_where_it_turns():
     """Its amplitude is found so with three steps when it is eight times as large as that with a quarter of a period."""
     records = records_of(swing(amplitude=0.02, decay=1e-3, steps=5000))
     three, quarter = StopRule(9999, 1e-6, 1.0), StopRule(9999, 1e-6, 1.0, lasting=0.25 * PERIOD)
-    found = [steps_to_rest(records, rule) for rule in (three, quarter)]
-    assert [run.at_rest for run in found] == [True, True]
-    amplitudes = [0.02 * (1.0 - 1e-3) ** len(run.records) for run in found]
+    results = [steps_to_rest(records, rule) for rule in (three, quarter)]
+    assert [run.at_rest for run in results] == [True, True]
+    amplitudes = [0.02 * (1.0 - 1e-3) ** len(run.records) for run in results]
     fastest = [amplitude * 2.0 * pi / PERIOD for amplitude in amplitudes]
     assert fastest[0] > 4.0 * BOUND
     assert fastest[1] < BOUND / sin(0.25 * pi)
 
 
 @pytest.mark.parametrize(("ratio", "most"), [(0.987, 1.43), (0.9, 1.54), (0.74, 1.82)])
-def test_what_is_left_of_a_swing_that_is_slower_than_its_rule_takes_it_for(ratio, most):
-    """The ratios are those of caps of 60, 120 and 148 degrees: their frequency is one above that of the swing."""
+def test_speed_at_rest_of_an_oscillation_slower_than_estimated(ratio, most):
+    """Ratios of exact to estimated frequency for caps of 60, 120 and 148 degrees."""
     records = records_of(swing(amplitude=0.02, decay=1e-4, steps=40000))
     run = steps_to_rest(records, StopRule(99999, 1e-6, 1.0, lasting=0.25 * ratio * PERIOD))
     fastest = 0.02 * (1.0 - 1e-4) ** len(run.records) * 2.0 * pi / PERIOD
@@ -91,8 +91,8 @@ def test_the_slowest_swing_of_a_cap():
     """Real solder, 1 mm^3, swung so with 60 degrees; the paper's, as a meridian, rose and sank so with 120 and 148."""
     assert cap_frequency(pi / 3.0, 1e-9, 8930.0, 0.4985) / (2.0 * pi) == pytest.approx(108.7, rel=0.02)
     periods = {120: 2.69e-3, 148: 3.7e-3}
-    found = [2.0 * pi / cap_frequency(np.radians(angle), 1e-9, 8930.0, 4.985) / periods[angle] for angle in periods]
-    assert found == pytest.approx([0.9, 0.74], abs=0.02)
+    results = [2.0 * pi / cap_frequency(np.radians(angle), 1e-9, 8930.0, 4.985) / periods[angle] for angle in periods]
+    assert results == pytest.approx([0.9, 0.74], abs=0.02)
 
 
 def test_the_slowest_swing_of_a_film():
@@ -125,5 +125,5 @@ def test_a_drop_of_real_solder_that_swings_is_not_found_at_rest_where_it_turns()
         return flow
 
     assert run_to_rest(pushed(), replace(rule, lasting=0.0)).at_rest
-    with pytest.raises(NotAtRest, match=r"at rest it would be 0.0001 for 0.00115 s"):
+    with pytest.raises(NotAtRest, match=r"the limit is 0.0001 for 0.00115 s"):
         run_to_rest(pushed(), rule)

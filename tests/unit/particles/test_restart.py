@@ -197,12 +197,12 @@ RUNS = [
     pull,
     float_on,
     carry,
-    carry_in_galerkin_form,
+    pytest.param(carry_in_galerkin_form, marks=pytest.mark.long),
     stand,
     stand_with_inertia,
     *FLOWS,
-    swing,
-    merge,
+    pytest.param(swing, marks=pytest.mark.long),
+    pytest.param(merge, marks=pytest.mark.long),
     merge_with_inertia,
 ]
 

@@ -76,6 +76,7 @@ def test_shear_dependence_acts_where_it_is_given_and_viscosity_acts():
     assert not droplet(ink(None)).fields.viscosity.any()
 
 
+@pytest.mark.long
 def test_a_drop_that_thins_spreads_as_a_less_viscous_one():
     """At rates far above that of the law a Carreau liquid has its viscosity at infinity."""
     thin = Rheology(law="carreau", exponent=0.2, shear_rate=1.0, viscosity_at_infinity=5e-3)

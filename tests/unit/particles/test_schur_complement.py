@@ -1,4 +1,4 @@
-"""The pressure equation's matrix against the dense one that its formula stands for."""
+"""Schur complement of the pressure equation against the dense matrix."""
 
 import numpy as np
 from scipy import sparse
@@ -6,10 +6,10 @@ from scipy import sparse
 from reflowshock.particles.discretisation.effective_mass import EffectiveMass
 from reflowshock.particles.discretisation.schur_complement import LowRank, SchurComplement, VolumeRateRows
 
-COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, those of the surface
+COUNT, MOVED, TIME_STEP = 6, 4, 0.3  # particles, surface particles
 
 
-def test_it_is_the_dense_matrix():
+def test_schur_complement_is_the_dense_matrix():
     random = np.random.default_rng(4)
     masses = np.repeat(random.uniform(1.0, 2.0, COUNT), 3)
     root = random.normal(size=(3 * MOVED, 3 * MOVED))
@@ -28,7 +28,7 @@ def test_it_is_the_dense_matrix():
     expected = rows @ np.linalg.solve(inertia, rows.T) + columns @ core @ columns.T
 
     surface = sparse.bsr_matrix(stiffness[: 3 * MOVED, : 3 * MOVED], blocksize=(3, 3))
-    found = SchurComplement.of(
+    operator = SchurComplement.of(
         VolumeRateRows(pairs.indptr.astype(np.int64), pairs.indices, entries),
         shares,
         gradient,
@@ -36,4 +36,4 @@ def test_it_is_the_dense_matrix():
         LowRank(columns, core),
     )
     pressures = random.normal(size=COUNT)
-    np.testing.assert_allclose(found(pressures), expected @ pressures, rtol=1e-10)
+    np.testing.assert_allclose(operator(pressures), expected @ pressures, rtol=1e-10)

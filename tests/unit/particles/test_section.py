@@ -1,6 +1,7 @@
-"""Bodies in section: chains against exact sums and differences, conservation, swings and drops at rest."""
+"""Bodies in section: polylines against exact sums, conservation, oscillations and drops at rest."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def test_forces_are_gradients_of_their_energies(body):
         assert -(force.force(body) * way).sum() == pytest.approx(slope, rel=1e-7)
 
 
-def test_a_cylinder_is_exact_and_an_even_tip_has_its_curvature():
+def test_a_cylinder_is_exact_and_a_smooth_tip_has_its_curvature():
     cylinder = Section.filled(block(MERIDIAN, 0.5, 2.0, 9), MERIDIAN)
     assert 2.0 * cylinder.volume()[0] == pytest.approx(np.pi * 0.25 * 2.0)
     assert 2.0 * cylinder.polyline.area(cylinder.line)[0] == pytest.approx(np.pi * (0.5 * 2.0 * 2.0 + 0.25))
@@ -78,7 +79,7 @@ def test_a_cylinder_is_exact_and_an_even_tip_has_its_curvature():
     assert pull[[0, -1], 2] / slope[[0, ball.cloud.surface_count - 1], 2] == pytest.approx(2.0, rel=5e-3)  # cone: 1.5
 
 
-def test_vertices_that_are_spaced_evenly_stay_on_their_circle():
+def test_smoothed_vertices_stay_on_their_circle():
     turn = np.sort(np.random.default_rng(8).uniform(-0.02, 0.02, 40) + np.linspace(0.0, np.pi, 40))
     line = np.column_stack((np.cos(turn), np.zeros(40), np.sin(turn)))
     moved = line + PLANE.smoothing_offsets(line, 0.3)
@@ -96,7 +97,7 @@ def test_linear_velocities_are_exact(body):
     assert space.divergence(field) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_loads_are_the_transposed(body):
+def test_loads_are_transposes(body):
     space, random = SectionSpace.of(body), np.random.default_rng(3)
     field, other = random.normal(size=(2, len(body.points), 3)) * [1.0, 0.0, 1.0]
     factor, factors = random.normal(size=len(body.points)), random.uniform(size=(len(body.points), 3))
@@ -125,7 +126,7 @@ def test_a_uniform_pressure_pushes_the_surface_only(body):
 
 
 def test_the_projection_keeps_volumes_and_momenta(body):
-    """The implicit tension resists pressures, too, and the change of momentum is what pressures and tension push."""
+    """The change of momentum balances pressure and implicit tension and has no resultant."""
     equations = equations_of(body)
     start = equations.basis @ np.random.default_rng(4).normal(size=equations.basis.shape[1])
     start = start.reshape(-1, 3)
@@ -144,8 +145,8 @@ def test_the_projection_keeps_volumes_and_momenta(body):
     assert np.tensordot(equations.rigid, equations.momentum(change), axes=2) == pytest.approx(0.0, abs=1e-10)
 
 
-def swung(polyline, rings, steps_per_period, periods):
-    """A drop that swings in its second mode: error of the period, decay over that by viscosity, and the flow."""
+def oscillated(polyline, rings, steps_per_period, periods):
+    """Return error of the period, decay over viscous decay, and flow of a drop in its second mode."""
     omega = np.sqrt(8.0 if polyline.power else 6.0)
     drop = Section.filled(disc(polyline, 1.0, rings), polyline)
     flow, time_step = InertialFlow(drop, water(viscosity=0.005), SectionStep()), 2.0 * np.pi / omega / steps_per_period
@@ -158,45 +159,46 @@ def swung(polyline, rings, steps_per_period, periods):
         flow.step(time_step)
         mass = flow.mass.diagonal()
         amplitude.append(mass @ (drop.points**2 @ [-0.5 if polyline.power else -1.0, 0.0, 1.0]) / mass.sum())
-    decay, found = fit_oscillation(np.arange(len(amplitude)) * time_step, np.array(amplitude), omega)
-    return omega / found - 1.0, decay / (0.025 if polyline.power else 0.02), flow
+    decay, frequency = fit_oscillation(np.arange(len(amplitude)) * time_step, np.array(amplitude), omega)
+    return omega / frequency - 1.0, decay / (0.025 if polyline.power else 0.02), flow
 
 
-@pytest.mark.parametrize("polyline", [MERIDIAN, RING], ids=["meridian", "plane"])
-def test_a_free_drop_swings_in_time(polyline):
+@pytest.mark.parametrize("polyline", [MERIDIAN, pytest.param(RING, marks=pytest.mark.long)], ids=["meridian", "plane"])
+def test_period_and_decay_of_a_free_drop(polyline):
     """Rayleigh's period, in a plane omega^2 = n (n^2 - 1) gamma / (rho R^3); decay by viscosity and some smoothing."""
-    period, decay, _ = swung(polyline, 8, 100, 1.2)
+    period, decay, _ = oscillated(polyline, 8, 100, 1.2)
     assert abs(period) < 0.02
     assert 0.9 < decay < 1.25
 
 
-@pytest.mark.parametrize("polyline", [MERIDIAN, RING], ids=["meridian", "plane"])
-def test_long_steps_damp_a_swing(polyline):
-    """By little more than viscosity; with tension in a prediction alone it grew."""
-    _, decay, flow = swung(polyline, 8, 16, 2)
+@pytest.mark.parametrize("polyline", [MERIDIAN, pytest.param(RING, marks=pytest.mark.long)], ids=["meridian", "plane"])
+def test_decay_with_long_steps(polyline):
+    """The decay is little more than viscous; with tension in the prediction only, the oscillation grew."""
+    _, decay, flow = oscillated(polyline, 8, 16, 2)
     assert 0.9 < decay < 1.5
     assert flow.solver.state.losses.integration > 0.0
 
 
-def test_a_thrown_drop_keeps_its_momenta_and_energy():
-    """In a plane: both translations and the turning; the drop is shaken, spaced evenly and shifted on its way."""
+def test_a_moving_drop_keeps_its_momenta_and_energy():
+    """Both translations and the rotation in a plane are kept, with mesh smoothing and particle shifting."""
     drop = Section.filled(disc(RING, 1.0, 6), RING)
     drop.points = drop.points * [1.15, 1.0, 1.0 / 1.15]
     drop.velocity = np.array([0.3, 0.0, -0.2]) + np.cross([0.0, 0.4, 0.0], drop.points)
     flow = SectionFlow(drop, water(viscosity=0.01), TimeStep(0.05, drop.cloud.spacing, 0.05), SectionStep())
     first = SectionSpace.of(drop).volumes
-    kept = [0, 2, 4]
-    before = rigid_momenta(rigid_motions(drop.points), first, drop.velocity)[kept]
+    admitted = [0, 2, 4]
+    before = rigid_momenta(rigid_motions(drop.points), first, drop.velocity)[admitted]
     energy = flow.physics.energy(drop) + 0.5 * (first @ (drop.velocity**2).sum(axis=1))
     for _ in range(40):
         flow.step()
     state = flow.solver.state
-    assert state.momenta[kept] == pytest.approx(before, rel=2e-2)
+    assert state.momenta[admitted] == pytest.approx(before, rel=2e-2)
     assert drop.volume()[0] == pytest.approx(flow.volume, rel=1e-12)
     now = flow.physics.energy(drop) + state.kinetic + state.losses.total
     assert now == pytest.approx(energy, rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_plane_drop_becomes_a_circular_segment():
     angle = 2.0 * np.pi / 3.0
     drop = Section.filled(block(PLANE, 1.0, 1.0, 8), PLANE)
@@ -225,34 +227,35 @@ def solder_of(drop, **effects):
     )
 
 
-@pytest.fixture(scope="module")
-def drops():
-    """At rest, of 8 and 15 particles along the edge of the cube."""
-    found = []
-    for count in (8, 15):
-        drop = Drop(volume=1e-9, contact_angle=np.radians(148.0), particles_per_edge=count, section="axisymmetric")
-        found.append(drop_to_rest(drop, solder_of(drop)))
-    return found
+@cache
+def axisymmetric_drop(count):
+    """A drop at rest on a wall of 148 degrees, with `count` particles along the edge of the initial cube."""
+    drop = Drop(volume=1e-9, contact_angle=np.radians(148.0), particles_per_edge=count, section="axisymmetric")
+    return drop_to_rest(drop, solder_of(drop))
 
 
-def test_a_drop_on_a_wall_comes_to_its_exact_shape(drops):
+@pytest.mark.long
+def test_a_drop_on_a_wall_comes_to_its_exact_shape():
+    drops = [axisymmetric_drop(count) for count in (8, 15)]
     errors = [drop.shape.metrics["shape_error"][0] for drop in drops]
     assert np.log(errors[0] / errors[1]) / np.log(2.0) > 1.5
     for name, limit in (("height_error", 2e-3), ("max_width_error", 1e-3)):
         assert abs(drops[1].shape.metrics[name][0]) < limit
 
 
-def test_a_drop_loses_neither_volume_nor_particles_nor_energy(drops):
-    for drop in drops:
-        metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
-        assert metrics["at_rest"] == 1.0
-        assert metrics["particles_lost"] == 0.0
-        assert abs(metrics["volume_drift"]) < 1e-12
-        assert abs(metrics["energy_imbalance"]) < 1e-4
+@pytest.mark.parametrize("count", [8, pytest.param(15, marks=pytest.mark.long)])
+def test_a_drop_loses_neither_volume_nor_particles_nor_energy(count):
+    metrics = {name: value for name, (value, _) in axisymmetric_drop(count).shape.metrics.items()}
+    assert metrics["at_rest"] == 1.0
+    assert metrics["particles_lost"] == 0.0
+    assert abs(metrics["volume_drift"]) < 1e-12
+    assert abs(metrics["energy_imbalance"]) < 1e-4
 
 
-def test_products_show_the_whole_body(drops):
-    shape, exact = drops[1].shape, drops[1].reference
+@pytest.mark.long
+def test_products_show_the_whole_body():
+    drop = axisymmetric_drop(15)
+    shape, exact = drop.shape, drop.reference
     assert len(shape.surface_points) == shape.triangles.max() + 1
     assert np.ptp(shape.points[:, 1]) == pytest.approx(exact.max_width, rel=2e-3)
     assert (shape.points[len(shape.surface_points) :, 1] == 0.0).all()
@@ -263,7 +266,7 @@ def test_products_show_the_whole_body(drops):
 
 @pytest.fixture(scope="module")
 def plane_drop():
-    """At rest with its weight, Bond number 1; of a volume that is no cube of a unit."""
+    """Plane drop at rest under its weight, Bond number 1, with a volume other than one."""
     drop = Drop(volume=2e-9, contact_angle=np.radians(120.0), particles_per_edge=9, section="plane")
     solder = solder_of(drop).model_copy(update={"gravity": 4.985 / (8930.0 * drop.edge**2)})
     effects = solder.effects.model_copy(update={"gravity": "on"})
@@ -271,12 +274,12 @@ def plane_drop():
 
 
 def test_a_drop_in_a_plane_comes_to_its_exact_shape(plane_drop):
-    _, found = plane_drop
-    metrics = {name: value for name, (value, _) in found.shape.metrics.items()}
+    _, result = plane_drop
+    metrics = {name: value for name, (value, _) in result.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0
     assert metrics["particles_lost"] == 0.0
-    assert metrics["height"] == pytest.approx(found.reference.height, rel=2e-3)
-    assert metrics["max_width"] == pytest.approx(found.reference.max_width, rel=1e-3)
+    assert metrics["height"] == pytest.approx(result.reference.height, rel=2e-3)
+    assert metrics["max_width"] == pytest.approx(result.reference.max_width, rel=1e-3)
     assert metrics["shape_error"] < 2e-3
     assert abs(metrics["volume_drift"]) < 1e-12
     assert abs(metrics["energy_imbalance"]) < 1e-4
@@ -284,8 +287,8 @@ def test_a_drop_in_a_plane_comes_to_its_exact_shape(plane_drop):
 
 
 def test_products_show_a_piece_as_deep_as_the_cube(plane_drop):
-    drop, found = plane_drop
-    shape = found.shape
+    drop, result = plane_drop
+    shape = result.shape
     assert np.unique(shape.surface_points[:, 1]) == pytest.approx([-0.5 * drop.edge, 0.5 * drop.edge])
     assert shape.rings[0].size == 4
     x, y = shape.points[shape.rings[0], :2].T

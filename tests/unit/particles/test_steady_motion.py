@@ -1,4 +1,4 @@
-"""A body that slides without resistance is at its goal in a few steps, however small these are."""
+"""Steady motion: a body that slides without resistance reaches its goal in a few steps of any size."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ PULL, SPACING = 0.05, 0.2
 
 @dataclass
 class Slope:
-    """A uniform force along x, as on a wall that is hardly tilted; its energy is that of the drop's place."""
+    """Uniform force along x with its potential energy, as on a slightly tilted wall."""
 
     pull: float
 

@@ -1,4 +1,4 @@
-"""The surface alone at constant volume: the solve with one constraint."""
+"""Solve of the surface alone at constant volume."""
 
 import numpy as np
 import pytest

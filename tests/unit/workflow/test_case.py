@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.fem.materials.library import SAC305
+from reflowshock.materials.library import SAC305
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case

@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from reflowshock.fem.materials.library import LIBRARY
+from reflowshock.materials.library import LIBRARY
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.examples import EXAMPLES

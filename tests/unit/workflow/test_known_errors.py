@@ -1,15 +1,15 @@
-"""Errors beside figures: from the case's own convergence study of the same inputs, else they are not known."""
+"""Discretisation errors of headline figures, from the convergence study of the same inputs."""
 
 from dataclasses import replace
 
 import pytest
 
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.workflow.convergence.errors import Error, errors_of
-from reflowshock.workflow.convergence.known import COARSEST, STALE, discretisation, own_accuracy
-from reflowshock.workflow.convergence.measured import Accuracy, Host, Measurement, StageCost, write_accuracy
+from reflowshock.workflow.convergence.accuracy_file import Accuracy, Host, Measurement, StageCost, write_accuracy
+from reflowshock.workflow.convergence.convergence_study import Quantity, StudyRun
+from reflowshock.workflow.convergence.discretisation import COARSEST, STALE, discretisation, read_case_accuracy
+from reflowshock.workflow.convergence.errors import Error, compute_errors
 from reflowshock.workflow.convergence.page import section_for
-from reflowshock.workflow.convergence.series import Quantity, StudyRun
 from reflowshock.workflow.package_report.headline import headline, later_swings
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.report.errors import NOT_KNOWN, Discretisation, left_out, scheme_error
@@ -27,7 +27,7 @@ def measurement(size: float, against: str = "", **errors: Error) -> Measurement:
 
 @pytest.fixture
 def study(tmp_path):
-    """The case, its run folder and a study beside it whose middle mesh is the case's own."""
+    """Return a case, its run folder and a study next to it that includes the mesh of the case."""
     case = read_case(SMALL_CASE)
     runs = (measurement(2.0, peel_stress=Error(0.4, "")), measurement(1.0, peel_stress=ORDER, deflection=NO_ORDER))
     errors = {"peel_stress": "peel", "deflection": "deflection"}
@@ -37,58 +37,58 @@ def study(tmp_path):
     return case, tmp_path / "small", accuracy
 
 
-def test_the_case_s_own_mesh_has_a_grid_convergence_index(study):
+def test_mesh_of_the_case_has_a_grid_convergence_index(study):
     case, folder, _ = study
-    known = discretisation(folder, case)
-    assert known.errors == {"peel_stress": pytest.approx(1.25 * 0.04), "deflection": pytest.approx(3.0 * 0.05)}
-    assert known.text("peel_stress") == "±5 % (Richardson, order 1.6)"
-    assert known.text("peak_board_strain") == "not known"
+    estimate = discretisation(folder, case)
+    assert estimate.errors == {"peel_stress": pytest.approx(1.25 * 0.04), "deflection": pytest.approx(3.0 * 0.05)}
+    assert estimate.text("peel_stress") == "±5 % (Richardson, order 1.6)"
+    assert estimate.text("peak_board_strain") == "not known"
 
 
-def test_a_report_in_its_store_finds_what_was_measured_of_the_case(study):
+def test_report_in_a_store_finds_the_study_of_the_case(study):
     case, folder, accuracy = study
     work = folder / ".store/work/report-0123"
     work.mkdir(parents=True)
-    assert own_accuracy(work, case) == accuracy
+    assert read_case_accuracy(work, case) == accuracy
     assert not section_for(work, case)["stale"]
 
 
-def test_errors_of_other_inputs_are_not_shown_as_valid(study):
+def test_errors_of_changed_inputs_are_stale(study):
     _, folder, _ = study
     changed = read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"])
     assert discretisation(folder, changed) == Discretisation(unknown=STALE)
     assert section_for(folder, changed)["stale"]
 
 
-def test_other_limits_leave_the_errors_valid(study):
+def test_changed_failure_limits_keep_the_errors_valid(study):
     _, folder, _ = study
     judged = read_case(SMALL_CASE, ['shock.failure.peel_stress={ limit = "80 MPa", source = "a test" }'])
     assert "peel_stress" in discretisation(folder, judged).errors
 
 
-def test_errors_that_were_not_measured_say_what_to_do(study, tmp_path):
+def test_missing_errors_name_the_command_that_measures_them(study, tmp_path):
     case, folder, accuracy = study
     assert "accuracy measures it" in discretisation(tmp_path / "elsewhere/small", case).unknown
-    alone = (measurement(1.0, against="all x 0.5", peel_stress=ORDER), measurement(2.0, peel_stress=ORDER))
-    write_accuracy(tmp_path / "small-accuracy", replace(accuracy, measurements=alone))
+    partial = (measurement(1.0, against="all x 0.5", peel_stress=ORDER), measurement(2.0, peel_stress=ORDER))
+    write_accuracy(tmp_path / "small-accuracy", replace(accuracy, measurements=partial))
     assert discretisation(folder, case).unknown == COARSEST
 
 
-def test_errors_keep_the_order_of_the_limit_that_they_are_from():
+def test_errors_have_the_order_of_their_extrapolation():
     runs = [StudyRun(f"{size}", "size", {}, size) for size in (4.0, 2.0, 1.0)]
-    answers = {run.name: {"peel": Quantity(1.0 + 0.01 * run.value**2)} for run in runs}
-    found = errors_of(answers, runs, runs, None)
-    assert found["1.0"]["peel"].value == pytest.approx(0.01) and found["1.0"]["peel"].order == pytest.approx(2.0)
-    wavy = {run.name: {"peel": Quantity(1.0 + 0.01 * (-1.0) ** place)} for place, run in enumerate(runs)}
-    assert errors_of(wavy, runs, runs, None)["2.0"]["peel"].order is None
+    results = {run.name: {"peel": Quantity(1.0 + 0.01 * run.value**2)} for run in runs}
+    errors = compute_errors(results, runs, runs, None)
+    assert errors["1.0"]["peel"].value == pytest.approx(0.01) and errors["1.0"]["peel"].order == pytest.approx(2.0)
+    oscillating = {run.name: {"peel": Quantity(1.0 + 0.01 * (-1.0) ** index)} for index, run in enumerate(runs)}
+    assert compute_errors(oscillating, runs, runs, None)["2.0"]["peel"].order is None
 
 
 def result(windows: int = 100, **metrics: float | str) -> dict:
-    found = {name: {"value": value, "unit": ""} for name, value in metrics.items()}
-    return {"metrics": found, "model": {"window": 1e-5, "windows": windows}}
+    records = {name: {"value": value, "unit": ""} for name, value in metrics.items()}
+    return {"metrics": records, "model": {"window": 1e-5, "windows": windows}}
 
 
-def test_the_error_of_two_scales_is_the_difference_from_one_model():
+def test_error_of_two_scales_is_the_difference_from_one_model():
     both = {
         "two_scale": result(peel_stress=6.3e7, critical_joint="A1"),
         "dns": result(peel_stress=6e7, critical_joint="A2"),
@@ -101,14 +101,14 @@ def test_the_error_of_two_scales_is_the_difference_from_one_model():
     assert scheme_error("peel_stress", {"dns": result()}) == "none: one model"
 
 
-def test_an_undamped_run_that_ends_by_itself_says_that_more_may_come():
+def test_undamped_run_with_automatic_end_mentions_later_swings():
     shock = Shock(duration="auto", service_condition="B")
     assert "ends at 2.05 ms" in later_swings(shock, 2.05e-3)
     assert not later_swings(shock.model_copy(update={"duration": 1e-3}), 1e-3)
     assert not later_swings(Shock(duration="auto", damping={"mass_ratio": 0.02, "frequency": 300.0}), 2e-3)
 
 
-def test_what_is_left_out_stands_with_its_influence_the_largest_first():
+def test_omitted_effects_are_sorted_by_influence():
     effects = {
         "damping": {"on": False, "influence": 0.02}, "finite_rotation": {"on": False, "influence": 0.47},
         "gravity": {"on": False, "influence": 1e-3}, "plasticity": {"on": True, "influence": 0.5},
@@ -121,7 +121,7 @@ def test_what_is_left_out_stands_with_its_influence_the_largest_first():
 @pytest.mark.parametrize(
     "known", [Discretisation(), Discretisation({"peel_stress": 0.04}, {"peel_stress": "Richardson"})]
 )
-def test_the_first_table_has_the_error_of_every_figure_or_says_that_it_is_not_known(known):
+def test_headline_table_has_the_error_of_every_figure(known):
     metrics = {"critical_joint": {"value": "A1", "unit": ""}, "peel_stress": {"value": 6e7, "unit": "Pa"}}
     table = headline(metrics, known, {"effects": {}}, {"dns": {"metrics": metrics, **result()}})
     assert [row[1] for row in table["rows"]] == ["A1", "60 MPa"]

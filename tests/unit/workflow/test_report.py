@@ -82,7 +82,7 @@ def test_joints_tell_their_verdict_and_by_what(history):
 
 def test_a_drop_may_stand_anywhere():
     corners = np.array([[1.0, 2.0, 3.0], [3.0, 6.0, 5.0]])
-    assert report_body.middle(corners) == pytest.approx([2.0, 4.0, 0.0])
+    assert report_body.vertical_axis(corners) == pytest.approx([2.0, 4.0, 0.0])
 
 
 def test_a_peak_at_the_end_is_said(history):

@@ -9,7 +9,7 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.template import templates, write_new_case
-from reflowshock.workflow.solder.case import DropCase, JointCase, of_joint
+from reflowshock.workflow.solder.case import DropCase, JointCase, check_joint
 from reflowshock.workflow.solder.forecast import forecast_solder
 from reflowshock.workflow.store.keys import stage_inputs
 from tests.support.case_schema import validate
@@ -95,7 +95,7 @@ def test_bad_values_are_named(path, setting, words):
 def test_a_neck_must_be_resolved_and_an_open_joint_is_left_to_the_flow():
     text = problems_of(JOINT, "joint.volume=0.024 mm^3", "joint.spacing=0.1 mm")
     assert "joint.spacing" in text and "neck" in text
-    assert of_joint(read_case(JOINT, ["joint.volume=0.01 mm^3"])) == []
+    assert check_joint(read_case(JOINT, ["joint.volume=0.01 mm^3"])) == []
 
 
 def test_a_spacing_larger_than_the_drop(tmp_path):
@@ -175,7 +175,7 @@ def test_a_slow_package_is_predicted_to_take_longer():
 
 @pytest.mark.parametrize("table", [SPEED, "joint.package.load=1 mN"])
 def test_packages_move_by_the_scheme_ispg(table):
-    assert of_joint(read_case(JOINT, [table, GALERKIN, "solder.effects.inertia=on"])) == []
+    assert check_joint(read_case(JOINT, [table, GALERKIN, "solder.effects.inertia=on"])) == []
 
 
 def test_too_little_solder_pulls_its_package_down():

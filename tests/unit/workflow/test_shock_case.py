@@ -8,7 +8,7 @@ import pytest
 from reflowshock.workflow.board_drop.board_deflection import decided, expected_deflection, expected_duration
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.convergence.packages import package_study
+from reflowshock.workflow.convergence.packages import board_drop_study
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
 
@@ -168,6 +168,6 @@ def test_a_duration_is_a_time_or_auto(text):
 
 def test_meshes_are_compared_over_the_same_time():
     case = read_case(SMALL_CASE, ["shock.duration=auto"])
-    runs = package_study(case).runs
+    runs = board_drop_study(case).runs
     assert {run.settings["shock.duration"] for run in runs} == {f"{1e3 * longest_duration(case):.6g} ms"}
-    assert "shock.duration" not in package_study(read_case(SMALL_CASE)).runs[0].settings
+    assert "shock.duration" not in board_drop_study(read_case(SMALL_CASE)).runs[0].settings

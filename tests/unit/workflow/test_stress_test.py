@@ -80,6 +80,7 @@ def test_no_measure_hides_nan(monkeypatch):
     assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
 
 
+@pytest.mark.long
 def test_a_push_in_the_middle_of_a_run_counts(monkeypatch):
     from reflowshock.cases.hard.trials import windows
 
@@ -204,6 +205,7 @@ def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods, tmp_p
     assert "30 random ones (seed 1)" in (tmp_path / "out/stress_test.html").read_text()
 
 
+@pytest.mark.long
 def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods, tmp_path):
     survived, told = rods(5, **RANDOM | {"draws": "refused rods"})
     assert not survived

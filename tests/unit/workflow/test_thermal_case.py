@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from reflowshock.fem.materials.library import FR4, LIBRARY
+from reflowshock.materials.library import FR4, LIBRARY
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case

@@ -8,7 +8,7 @@ import pytest
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.reflow.joints import ReflowError, mark_bridges, refuse_joints_without_mesh
-from reflowshock.workflow.solder.stages import of_drop, of_joint, of_oscillation
+from reflowshock.workflow.solder.stages import judge_drop, judge_joint, judge_oscillation
 
 PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4)]
 
@@ -68,10 +68,10 @@ def test_joints_that_were_carried_have_no_time_to_rest_and_no_losses(records):
 
 def test_the_decay_of_a_swing_is_judged_to_ten_per_cent_whatever_the_scheme():
     metrics = {"volume_drift": (0.0, ""), "period_error": (5e-3, ""), "decay_rate_error": (0.101, "")}
-    health = of_oscillation(metrics, {}).health
+    health = judge_oscillation(metrics, {}).health
     assert health["decay_rate_error"] == {"value": 0.101, "limit": 0.1, "ok": False}
     assert health["period_error"]["ok"]
-    assert of_oscillation(metrics | {"decay_rate_error": (-0.099, "")}, {}).health["decay_rate_error"]["ok"]
+    assert judge_oscillation(metrics | {"decay_rate_error": (-0.099, "")}, {}).health["decay_rate_error"]["ok"]
 
 
 def test_widths_are_judged_to_one_per_cent_and_counted(records):
@@ -85,18 +85,18 @@ def test_widths_are_judged_to_one_per_cent_and_counted(records):
 
 
 def test_a_joint_that_failed_says_how():
-    assert of_joint({}, "overflow", {}).health["joint_overflow"] == {
+    assert judge_joint({}, "overflow", {}).health["joint_overflow"] == {
         "value": 1,
         "limit": 0,
         "ok": False,
     }
-    assert of_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
+    assert judge_joint({}, "ok", {}).health["joints_not_ok"]["ok"]
 
 
 def test_a_drop_that_still_moves_is_not_judged_by_the_shape_at_rest():
     metrics = {"volume_drift": (0.0, ""), "height_error": (0.5, ""), "at_rest": (0.0, "")}
-    assert set(of_drop(metrics, "ok", {}).health) == {"volume_drift"}
-    assert set(of_drop(metrics | {"at_rest": (1.0, "")}, "ok", {}).health) == {
+    assert set(judge_drop(metrics, "ok", {}).health) == {"volume_drift"}
+    assert set(judge_drop(metrics | {"at_rest": (1.0, "")}, "ok", {}).health) == {
         "volume_drift",
         "height_error",
     }

@@ -1,10 +1,10 @@
-"""Materials by name, each constant with its source.
+"""Library of materials, with the source of each constant.
 
-Where sources differ, the comment says by how much: solder, moulding compound and plated nickel are not one material
-each. "Not reread" marks published constants whose paper was not at hand for a second look: check before relying on it.
+Comments state the scatter between sources, which is large for solder, moulding compound and plated nickel. "Not reread"
+marks published constants that were not checked against the original paper: verify them before relying on them.
 """
 
-from reflowshock.fem.materials.parameters import Isotropic, JohnsonCook, Material, Orthotropic
+from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material, Orthotropic
 
 # H tables 3-5; the shear modulus G_xz and the density are from the same widely used FR4 data set, e.g.
 # Syed et al., ECTC 2005, and its successors; H leaves them out (PHYSICS 1).
@@ -85,6 +85,6 @@ LIBRARY: dict[str, Material] = {
     "NiAu": NIAU,
     "SAC305": SAC305,
     "SAC405": SAC405,
-    "SAC405_elastic": SAC405.elastic,  # the solder of H, which does not yield
+    "SAC405_elastic": SAC405.elastic,  # the elastic solder of H
     "SnPb": SNPB,
 }

@@ -1,4 +1,4 @@
-"""`accuracy.json`: what was measured in a convergence study, on which machine, and what follows from it."""
+"""The file ``accuracy.json``: measurements of a convergence study, their machine, fits and recommendation."""
 
 import json
 import platform
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy, StudyRun
 from reflowshock.workflow.convergence.errors import Error
-from reflowshock.workflow.convergence.orders import CostFit, ErrorFit, fit_cost, fit_error
-from reflowshock.workflow.convergence.series import ConvergenceStudy, StudyRun
+from reflowshock.workflow.convergence.fits import CostFit, ErrorFit, fit_cost, fit_error
 from reflowshock.workflow.process.environment import available_cores
 
 CPU_INFO = Path("/proc/cpuinfo")
@@ -16,7 +16,7 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """Model of the processor, and the cores that a program may use."""
+    """A machine: model of the processor and number of usable cores."""
 
     processor: str
     cores: int
@@ -26,7 +26,7 @@ class Host:
 
 
 def this_host() -> Host:
-    """Return the machine that this process is on."""
+    """Return the machine on which this process runs."""
     return Host(_model() or platform.processor() or platform.machine(), available_cores())
 
 
@@ -42,12 +42,12 @@ FILE = "accuracy.json"
 
 @dataclass(frozen=True, slots=True)
 class StageCost:
-    """What a stage of a run cost, and what was predicted.
+    """Measured and predicted cost of a stage.
 
     Attributes:
-        seconds: wall time [s], the smallest of all times that it was run.
-        core_seconds: processor time of all its processes [s], the smallest likewise.
-        forecast: wall time [s] that was predicted; None where there is no forecast of the stage.
+        seconds: Wall time, the smallest of repeated runs [s].
+        core_seconds: Processor time of all its processes, the smallest of repeated runs [s].
+        forecast: Predicted wall time [s]; None if the stage has no forecast.
     """
 
     seconds: float
@@ -57,18 +57,18 @@ class StageCost:
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What was measured of a run.
+    """Errors and costs of one run of a study.
 
     Attributes:
-        run: its name.
-        parameter: what varies.
-        value: of the parameter; None for a choice.
-        settings: dotted key -> value.
-        key: of its point in the store.
-        stages: cost of the stages that count; empty where it failed.
-        errors: quantity -> error; one that others are compared with has none.
-        failed: message of the stage that failed; empty where none did.
-        against: run that its errors are from, where they are not those of the whole answer.
+        run: Name of the run.
+        parameter: Varied parameter.
+        value: Value of the parameter; None for a choice.
+        settings: Dotted key -> value.
+        key: Key of its point in the store.
+        stages: Cost of the timed stages; empty if the run failed.
+        errors: Quantity -> error; a reference run has none.
+        failed: Message of the failed stage; empty if none failed.
+        against: Reference run if the errors are partial, not total errors.
     """
 
     run: str
@@ -83,18 +83,23 @@ class Measurement:
 
     @property
     def seconds(self) -> float:
-        """Wall time of the stages that count [s]."""
+        """Wall time of the timed stages [s]."""
         return sum(stage.seconds for stage in self.stages.values())
 
     @property
     def core_seconds(self) -> float:
-        """Processor time of the stages that count [s]."""
+        """Processor time of the timed stages [s]."""
         return sum(stage.core_seconds for stage in self.stages.values())
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How errors and cost follow a parameter: quantity -> fit of its error; fit of the cost, None where none fits."""
+    """Fits over one parameter.
+
+    Attributes:
+        errors: Quantity -> fit of its error.
+        cost: Fit of the cost; None if there are too few runs.
+    """
 
     errors: Mapping[str, ErrorFit]
     cost: CostFit | None
@@ -102,14 +107,14 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Recommended:
-    """Settings that were chosen, what was predicted of them and, once they were run, what was found.
+    """Recommended settings with their predicted error and cost.
 
     Attributes:
-        run: name, parameter, settings.
-        why: in words.
-        error: that was predicted.
-        core_seconds: that were predicted [s].
-        found: the run; None where it was not run.
+        run: Recommended run.
+        why: Reason, for readers.
+        error: Predicted error.
+        core_seconds: Predicted cost [s].
+        found: Measurement of the recommended run; None if it was not run.
     """
 
     run: StudyRun
@@ -121,19 +126,19 @@ class Recommended:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """All that was measured of a case.
+    """Content of ``accuracy.json``: the convergence study of a case.
 
     Attributes:
-        case: its name.
-        kind: of case.
-        command: that measured it.
-        machine: where.
-        errors: quantity -> what its error is called; the first one is judged.
-        measurements: of all runs that were run.
-        fits: parameter -> fits.
-        tolerance: of the judged error; None where none was asked for.
-        recommended: None where nothing was.
-        key: of the product with the case's own answer; that of another case, or of one changed since, differs.
+        case: Name of the case.
+        kind: Kind of the case.
+        command: Command that ran the study.
+        machine: Machine of the runs.
+        errors: Quantity -> name of its error; the first one is the judged quantity.
+        measurements: Measurements of all runs.
+        fits: Parameter -> fits.
+        tolerance: Tolerance of the judged error; None if the user gave none.
+        recommended: Recommended settings; None without a recommendation.
+        key: Key of the case's product; it differs for another case or changed inputs.
     """
 
     case: str
@@ -149,16 +154,19 @@ class Accuracy:
 
     @property
     def judged(self) -> str:
-        """Name of the quantity that the tolerance is meant for."""
+        """Name of the quantity to which the tolerance applies."""
         return next(iter(self.errors))
 
 
-def fits_of(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) -> dict[str, Fit]:
-    """Fit errors and costs of every parameter.
+def fit_measurements(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) -> dict[str, Fit]:
+    """Fit errors and costs over every parameter of a study.
 
     Args:
-        study: its parameters.
-        measurements: name of run -> what was measured of it.
+        study: Study with the parameters.
+        measurements: Name of run -> its measurement.
+
+    Returns:
+        Name of parameter -> fits.
     """
     return {
         parameter.name: _fit(parameter.runs, parameter.order, study, measurements) for parameter in study.parameters
@@ -168,16 +176,16 @@ def fits_of(study: ConvergenceStudy, measurements: Mapping[str, Measurement]) ->
 def _fit(
     runs: tuple[StudyRun, ...], order: float | None, study: ConvergenceStudy, measurements: Mapping[str, Measurement]
 ) -> Fit:
-    known = [found for run in runs if (found := measurements.get(run.name)) is not None and not found.failed]
-    values = [one.value or 0.0 for one in known]
+    measured = [m for run in runs if (m := measurements.get(run.name)) is not None and not m.failed]
+    values = [measurement.value or 0.0 for measurement in measured]
     errors = {}
     for quantity in study.errors:
-        place = [k for k, one in enumerate(known) if quantity in one.errors]
+        rows = [k for k, measurement in enumerate(measured) if quantity in measurement.errors]
         theory = order if quantity == study.judged else None
-        fit = fit_error([values[k] for k in place], [known[k].errors[quantity].value for k in place], theory)
+        fit = fit_error([values[k] for k in rows], [measured[k].errors[quantity].value for k in rows], theory)
         if fit is not None:
             errors[quantity] = fit
-    return Fit(errors, fit_cost(values, [one.core_seconds for one in known]))
+    return Fit(errors, fit_cost(values, [measurement.core_seconds for measurement in measured]))
 
 
 def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
@@ -189,7 +197,7 @@ def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
 
 
 def read_accuracy(path: Path) -> Accuracy | None:
-    """Read ``accuracy.json``; None where there is none, or that of a version that wrote other fields."""
+    """Read ``accuracy.json``; return None if it is missing or was written by a version with other fields."""
     if not path.is_file():
         return None
     try:
@@ -201,13 +209,13 @@ def read_accuracy(path: Path) -> Accuracy | None:
 def _accuracy(table: dict) -> Accuracy:
     chosen = table["recommended"]
     if chosen is not None:
-        found = chosen["found"]
-        chosen |= {"run": StudyRun(**chosen["run"]), "found": None if found is None else _measurement(found)}
+        measured = chosen["found"]
+        chosen |= {"run": StudyRun(**chosen["run"]), "found": None if measured is None else _measurement(measured)}
     return Accuracy(
         **table
         | {
             "machine": Host(**table["machine"]),
-            "measurements": tuple(_measurement(one) for one in table["measurements"]),
+            "measurements": tuple(map(_measurement, table["measurements"])),
             "fits": {parameter: _read_fit(fit) for parameter, fit in table["fits"].items()},
             "recommended": None if chosen is None else Recommended(**chosen),
         }

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import FR4, SAC405
-from reflowshock.fem.materials.parameters import GeneralOrthotropic, JohnsonCook
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import FR4, SAC405
+from reflowshock.materials.parameters import GeneralOrthotropic, JohnsonCook
 
 RANDOM = np.random.default_rng(5)
 

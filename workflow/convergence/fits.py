@@ -1,4 +1,4 @@
-"""Fits: errors follow a power of the parameter's value, costs a constant and a power."""
+"""Fits of errors and costs over the value h of a parameter: error = C h^p, cost = t0 + D h^-q."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ STEEPEST_COST = 9.0
 
 @dataclass(frozen=True, slots=True)
 class ErrorFit:
-    """Error = constant * value ** order.
+    """Fit of the error, constant * value ** order.
 
     Attributes:
-        constant: error at value 1.
-        order: observed.
-        scatter: largest factor by which a measured error is above the fit.
-        theory: the order by theory; None without one.
+        constant: Error at value 1.
+        order: Observed order.
+        scatter: Largest factor by which a measured error exceeds the fit.
+        theory: Theoretical order; None without theory.
     """
 
     constant: float
@@ -25,23 +25,23 @@ class ErrorFit:
     theory: float | None = None
 
     def at(self, value: float) -> float:
-        """Return the error that is expected."""
+        """Return the expected error at a value."""
         return self.constant * value**self.order
 
     def value_for(self, error: float) -> float:
-        """Return the largest value whose error, with the scatter, is no more than a given one."""
+        """Return the largest value whose error, including the scatter, does not exceed ``error``."""
         return (error / (self.constant * self.scatter)) ** (1.0 / self.order)
 
 
 @dataclass(frozen=True, slots=True)
 class CostFit:
-    """Cost = start + constant * value ** -exponent, in core-seconds.
+    """Fit of the cost in core-seconds, start + constant * value ** -exponent.
 
     Attributes:
-        start: what any run costs: libraries and compiled kernels are loaded.
-        constant: what is added at value 1.
-        exponent: of one over the value.
-        scatter: largest relative difference of a measured cost.
+        start: Cost of any run: loading of libraries and compiled kernels [s].
+        constant: Additional cost at value 1 [s].
+        exponent: Exponent of 1 / value.
+        scatter: Largest relative difference between a measured cost and the fit.
     """
 
     start: float
@@ -50,17 +50,20 @@ class CostFit:
     scatter: float
 
     def at(self, value: float) -> float:
-        """Return the cost that is expected."""
+        """Return the expected cost at a value [core-seconds]."""
         return self.start + self.constant * value**-self.exponent
 
 
 def fit_error(values: Sequence[float], errors: Sequence[float], theory: float | None = None) -> ErrorFit | None:
-    """Fit a power to errors, by least squares of logarithms; None unless three are known and they grow with the value.
+    """Fit a power to errors by least squares of logarithms.
 
     Args:
-        values: of the parameter, positive.
-        errors: positive.
-        theory: the order by theory.
+        values: Values of the parameter, positive.
+        errors: Errors at these values, positive.
+        theory: Theoretical order; None without theory.
+
+    Returns:
+        The fit; None for fewer than three values, or if errors do not grow with the value.
     """
     if len(values) < 3 or min(errors) <= 0.0:
         return None
@@ -72,9 +75,14 @@ def fit_error(values: Sequence[float], errors: Sequence[float], theory: float | 
 
 
 def fit_cost(values: Sequence[float], costs: Sequence[float]) -> CostFit | None:
-    """Fit a constant and a power to costs, by least squares of relative differences; None unless four are known.
+    """Fit a constant and a power to costs by least squares of relative differences.
 
-    Through three, its three numbers would fit whatever they are, without a scatter.
+    Args:
+        values: Values of the parameter, positive.
+        costs: Costs at these values, positive [core-seconds].
+
+    Returns:
+        The fit; None for fewer than four values, which three coefficients would fit without any scatter.
     """
     if len(values) < 4 or min(costs) <= 0.0:
         return None

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from reflowshock.fem.kernels.plasticity import plastic_constants, yield_stress
-from reflowshock.fem.materials.elasticity import elasticity_matrix
-from reflowshock.fem.materials.library import LIBRARY, SAC305, SNPB
-from reflowshock.fem.materials.parameters import Isotropic
+from reflowshock.fem.kernels.plasticity import yield_stress
+from reflowshock.materials.elasticity import elasticity_matrix
+from reflowshock.materials.library import LIBRARY, SAC305, SNPB
+from reflowshock.materials.parameters import Isotropic
+from reflowshock.materials.plasticity import plastic_constants
 
 RATES = (1e-3, 1e-1, 10.0, 100.0)
 

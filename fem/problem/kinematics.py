@@ -1,8 +1,8 @@
-"""Kinematics of elements, and what they leave out of a run, in words.
+"""Kinematics of elements: small, corotational or finite.
 
-Small ones take rotations and strains as small. Corotational ones take rotations of any size and, where a material is
-elastic and elements are hexahedra, small strains in the frame that turns: a fraction of the cost of finite ones, which
-take rotations and strains of any size. Materials that yield are computed alike in both.
+``small`` assumes small rotations and strains. ``corotational`` allows finite rotations; elastic hexahedra have small
+strains in the rotating frame, at a fraction of the cost of ``finite``, which allows finite rotations and strains.
+Plastic materials are computed in the same way with ``corotational`` and ``finite``.
 """
 
 from typing import Literal
@@ -10,16 +10,16 @@ from typing import Literal
 Kinematics = Literal["small", "corotational", "finite"]
 TURNING: tuple[Kinematics, ...] = ("corotational", "finite")
 
-NEGLIGIBLE_STRAIN = 1e-4  # a tenth or less of the strains for which boards are tested
+NEGLIGIBLE_STRAIN = 1e-4  # at most a tenth of the strains in board-level tests
 
 
 def finite_rotation(table: str, kinematics: Kinematics, neglected_strain: float | None = None) -> tuple[bool, str]:
-    """Return whether rotations are finite, and why.
+    """Return whether rotations are finite, and the reason as text.
 
     Args:
-        table: Table of the case that has the key ``kinematics``.
-        kinematics: Its value.
-        neglected_strain: Largest strain that a run has left out; None before a run.
+        table: Table of the case file that has the key ``kinematics``.
+        kinematics: Value of that key.
+        neglected_strain: Largest strain that the kinematics neglected in a run; None before a run.
     """
     turns, why = kinematics != "small", f"{table}.kinematics = {kinematics}"
     if kinematics != "finite" and neglected_strain is not None:

@@ -1,6 +1,6 @@
-"""Parameters of materials: elasticity of three symmetries, thermal expansion, plasticity of Johnson and Cook.
+"""Parameters of materials: isotropic and orthotropic elasticity, thermal expansion, Johnson-Cook plasticity.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use.
 """
 
 import math
@@ -20,35 +20,35 @@ Expansion = Annotated[float | None, Quantity("ppm/K")]
 
 
 class Expanding(Parameters):
-    """Base of materials: their coefficients of thermal expansion, which need not be known where nothing warms up."""
+    """Base of materials with coefficients of thermal expansion, which are optional at constant temperature."""
 
     EXPANSION: ClassVar[tuple[str, str, str]]
 
     @property
     def unknown_expansion(self) -> tuple[str, ...]:
-        """Return the names of the coefficients that are not given."""
+        """Names of the missing coefficients of thermal expansion."""
         return tuple(name for name in dict.fromkeys(self.EXPANSION) if getattr(self, name) is None)
 
     @property
     def expansion(self) -> tuple[float, float, float]:
-        """Return the coefficients of linear thermal expansion along x, y, z [1/K].
+        """Coefficients of linear thermal expansion along x, y, z [1/K].
 
         Raises:
-            ValueError: One is not given.
+            ValueError: A coefficient is missing.
         """
         if self.unknown_expansion:
-            raise ValueError(f"{' and '.join(self.unknown_expansion)} of {self!r} is not given")
+            raise ValueError(f"{' and '.join(self.unknown_expansion)} of {self!r} must be given")
         x, y, z = (getattr(self, name) for name in self.EXPANSION)
         return x, y, z
 
 
 class EngineeringConstants(NamedTuple):
-    """Elastic constants along the axes x, y, z.
+    """Elastic constants of an orthotropic material along the axes x, y, z.
 
     Attributes:
-        young: E_x, E_y, E_z [Pa].
-        poisson: nu_xy, nu_yz, nu_xz; nu_ij is the contraction along j under tension along i.
-        shear: G_xy, G_yz, G_xz [Pa].
+        young: Young's moduli E_x, E_y, E_z [Pa].
+        poisson: Poisson's ratios nu_xy, nu_yz, nu_xz; nu_ij is the contraction along j under tension along i.
+        shear: Shear moduli G_xy, G_yz, G_xz [Pa].
     """
 
     young: tuple[float, float, float]
@@ -57,16 +57,16 @@ class EngineeringConstants(NamedTuple):
 
 
 def inadmissible(allowed: str) -> PydanticCustomError:
-    """Return the error of a value that is impossible beside the values before it."""
-    message = "does not go with the values above it: the strain energy would not be positive"
+    """Return the error of an elastic constant for which the strain energy is not positive."""
+    message = "contradicts the values above it: the strain energy would not be positive"
     return PydanticCustomError("inadmissible", message, {"allowed": allowed})
 
 
 class JohnsonCook(Parameters):
-    """Yield stress (A + B p^n) (1 + C ln max(1, rate / reference_rate)) (1 - T*^m), p the equivalent plastic strain.
+    """Yield stress (A + B p^n) (1 + C ln max(1, rate / reference_rate)) (1 - T*^m) of Johnson and Cook.
 
-    T* = (temperature - room_temperature) / (melting_temperature - room_temperature), at least 0 (Johnson & Cook, Proc.
-    7th Int. Symp. Ballistics, 1983).
+    p is the equivalent plastic strain and T* = (temperature - room_temperature) / (melting_temperature -
+    room_temperature), at least 0 (Johnson & Cook, Proc. 7th Int. Symp. Ballistics, 1983).
     """
 
     A: Stress = Field(gt=0)
@@ -88,13 +88,16 @@ class JohnsonCook(Parameters):
         raise PydanticCustomError("inadmissible", "is out of range", {"allowed": allowed})
 
     def softening(self, temperature: float) -> float:
-        """Return 1 - T*^m at a temperature [K]."""
+        """Return the factor 1 - T*^m on the yield stress at a temperature [K]."""
         relative = (temperature - self.room_temperature) / (self.melting_temperature - self.room_temperature)
         return 1.0 - max(0.0, relative) ** self.m
 
 
 class Isotropic(Expanding):
-    """Isotropic linear elastic material; ``plasticity`` makes it yield, ``temperature`` softens that."""
+    """Isotropic linear elastic material, plastic if ``plasticity`` is given.
+
+    ``temperature`` is that of the material during the shock; it lowers the yield stress.
+    """
 
     EXPANSION: ClassVar[tuple[str, str, str]] = ("thermal_expansion",) * 3
     kind: Literal["isotropic"] = "isotropic"
@@ -116,28 +119,28 @@ class Isotropic(Expanding):
 
     @property
     def engineering_constants(self) -> EngineeringConstants:
-        """Return the elastic constants along the axes."""
+        """Elastic constants along the axes."""
         young, ratio = self.young_modulus, self.poisson_ratio
         return EngineeringConstants((young,) * 3, (ratio,) * 3, (self.shear_modulus,) * 3)
 
     @property
     def shear_modulus(self) -> float:
-        """Return G = E / (2 (1 + nu)) [Pa]."""
+        """Shear modulus G = E / (2 (1 + nu)) [Pa]."""
         return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
     @property
     def softening(self) -> float:
-        """Return the factor on the yield stress at the material's temperature."""
+        """Factor on the yield stress at the temperature of the material."""
         return 1.0 if self.plasticity is None else self.plasticity.softening(self.temperature)
 
     @property
     def elastic(self) -> Self:
-        """Return the material without its plasticity."""
+        """Same material without plasticity."""
         return self.model_copy(update={"plasticity": None})
 
 
 class Orthotropic(Expanding):
-    """Orthotropic linear elastic laminate, equal in x and y (z is the thickness).
+    """Orthotropic linear elastic laminate with equal constants in x and y (z is the thickness direction).
 
     ``poisson_ratio_out_of_plane`` is nu_xz: contraction in z under tension in x.
     """
@@ -164,7 +167,7 @@ class Orthotropic(Expanding):
     def _stores_energy(cls, value: float, info: ValidationInfo) -> float:
         names = ("young_modulus_in_plane", "young_modulus_out_of_plane", "poisson_ratio_in_plane")
         if not all(name in info.data for name in names):
-            return value  # those are reported
+            return value  # the missing or invalid values are reported themselves
         in_plane, out_of_plane, ratio = (info.data[name] for name in names)
         bound = math.sqrt(0.5 * (1.0 - ratio) * in_plane / out_of_plane)
         if abs(value) < bound:
@@ -173,7 +176,7 @@ class Orthotropic(Expanding):
 
     @property
     def engineering_constants(self) -> EngineeringConstants:
-        """Return the elastic constants along the axes."""
+        """Elastic constants along the axes."""
         in_plane, out_of_plane = self.shear_modulus_in_plane, self.shear_modulus_out_of_plane
         return EngineeringConstants(
             (self.young_modulus_in_plane, self.young_modulus_in_plane, self.young_modulus_out_of_plane),
@@ -218,7 +221,7 @@ class GeneralOrthotropic(Expanding):
     def _stores_energy(cls, value: float, info: ValidationInfo) -> float:
         names = [f"young_modulus_{axis}" for axis in "xyz"] + ["poisson_ratio_xy", "poisson_ratio_yz"]
         if not all(name in info.data for name in names):
-            return value  # those are reported
+            return value  # the missing or invalid values are reported themselves
         x, y, z, xy, yz = (info.data[name] for name in names)
         # With r_ij = nu_ij sqrt(E_j / E_i) the determinant 1 - r_xy^2 - r_yz^2 - r_xz^2 - 2 r_xy r_yz r_xz must be > 0.
         first, second = xy * math.sqrt(y / x), yz * math.sqrt(z / y)
@@ -230,7 +233,7 @@ class GeneralOrthotropic(Expanding):
 
     @property
     def engineering_constants(self) -> EngineeringConstants:
-        """Return the elastic constants along the axes."""
+        """Elastic constants along the axes."""
         return EngineeringConstants(
             (self.young_modulus_x, self.young_modulus_y, self.young_modulus_z),
             (self.poisson_ratio_xy, self.poisson_ratio_yz, self.poisson_ratio_xz),

@@ -1,1 +1,0 @@
-"""Materials: parameters, library with sources, elasticity, material of each role."""

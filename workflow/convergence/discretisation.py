@@ -1,0 +1,70 @@
+"""Discretisation errors of a run, from the convergence study of its case.
+
+The reported error is the grid convergence index of Roache, J. Fluids Eng. 116 (1994) 405.
+"""
+
+from pathlib import Path
+
+from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.convergence.accuracy_file import FILE, Accuracy, Measurement, read_accuracy
+from reflowshock.workflow.convergence.calibration import folder_name
+from reflowshock.workflow.convergence.errors import Error
+from reflowshock.workflow.report.errors import Discretisation
+from reflowshock.workflow.store.keys import product_keys
+from reflowshock.workflow.store.store import HOME
+
+CASE_SIZE = 1.0  # element size relative to the case
+SAFETY, SAFETY_WITHOUT_ORDER = 1.25, 3.0  # Roache 1994: for three or more meshes, and for two
+STALE = "the case has changed since reflowshock accuracy was run; run it again"
+COARSEST = "reflowshock accuracy has not compared the mesh of the case with finer ones"
+
+
+def read_case_accuracy(run_folder: Path, case: Case) -> Accuracy | None:
+    """Read the convergence study of a case from the folder next to its run folder; return None without one.
+
+    Args:
+        run_folder: Run folder, or the work folder in a store while a product is computed.
+        case: Case of the run.
+    """
+    folder = run_folder.resolve()
+    store = next((parent for parent in folder.parents if parent.name == HOME), None)
+    runs = (store.parent if store else folder).parent
+    accuracy = read_accuracy(runs / folder_name(case) / FILE)
+    return accuracy if accuracy is not None and accuracy.kind == case.kind else None
+
+
+def is_current(accuracy: Accuracy, case: Case) -> bool:
+    """Return whether a study was run with the present inputs of a case and this version of the program."""
+    return accuracy.key in product_keys(case).values()
+
+
+def discretisation(run_folder: Path, case: Case) -> Discretisation:
+    """Return the discretisation errors of a run: grid convergence indices of the mesh of its case.
+
+    Args:
+        run_folder: Run folder; the study is searched next to it.
+        case: Case of the run.
+    """
+    accuracy = read_case_accuracy(run_folder, case)
+    if accuracy is None:
+        return Discretisation()
+    if not is_current(accuracy, case):
+        return Discretisation(unknown=STALE)
+    run = _run_of_case(accuracy)
+    errors = {} if run is None else dict(run.errors)
+    return Discretisation(
+        {name: grid_convergence_index(error) for name, error in errors.items()},
+        {name: error.against for name, error in errors.items()},
+        "reflowshock accuracy does not measure it" if errors else COARSEST,
+    )
+
+
+def grid_convergence_index(error: Error) -> float:
+    """Return an error times a safety factor: 1.25 if it is against a Richardson extrapolation, else 3."""
+    return error.value * (SAFETY_WITHOUT_ORDER if error.order is None else SAFETY)
+
+
+def _run_of_case(accuracy: Accuracy) -> Measurement | None:
+    """Return the run on the mesh of the case whose errors are total errors; None without one."""
+    runs = (run for run in accuracy.measurements if run.value == CASE_SIZE and not run.against and run.errors)
+    return next(runs, None)
