@@ -15,13 +15,14 @@ import numpy as np
 from numba import get_num_threads, set_num_threads
 
 from benchmarks.support import results
-from reflowshock.particles.parameters.droplets import Droplet, DropletEffects, DropletNumerics
-from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
-from reflowshock.particles.scenes.dam_break import dam
-from reflowshock.particles.scenes.droplet import droplet, liquid_of
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.droplet import Droplet, DropletEffects, DropletNumerics
+from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.threads import ThreadParticles
+from reflowshock.particles.sph_flows.dam_break import dam
+from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
 
 NAME = "sph"
 RATE, SPEEDUP, GPU_RATE = 5e5, 1.7, 1e8  # bars

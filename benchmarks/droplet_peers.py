@@ -35,11 +35,12 @@ from matplotlib import pyplot as plt
 from benchmarks.support import interfoam, results
 from benchmarks.support.interfoam import Wedge
 from benchmarks.support.tables import write_tables
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.parameters.flows import DamBreak, SphNumerics
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
+from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.reference.impact_spread import laan, of_measured, pasandideh_fard, roisman, wildeman
-from reflowshock.particles.scenes.dam_break import solve_dam_break
-from reflowshock.particles.scenes.droplet import solve_droplet
+from reflowshock.particles.sph_flows.dam_break import solve_dam_break
+from reflowshock.particles.sph_flows.droplet import solve_droplet
 from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.surface_mesh import SurfaceLost
 

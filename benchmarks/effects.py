@@ -93,8 +93,8 @@ def sides() -> dict[str, Callable[[], object]]:
     return reflows | {
         "drop": drop(PULSE),
         "drop_weight": drop(PULSE, WEIGHT),
-        "drop_alpha": drop(PULSE, RayleighDamping.build(body, (1.0, 0.0))),
-        "drop_beta": drop(PULSE, RayleighDamping.build(body, (0.0, 1e-10))),
+        "drop_alpha": drop(PULSE, RayleighDamping.build(body, 1.0, 0.0)),
+        "drop_beta": drop(PULSE, RayleighDamping.build(body, 0.0, 1e-10)),
         "force": force(FR4),
         "force_finite": force(FR4, "finite"),
         "force_yielding": force(SAC305),

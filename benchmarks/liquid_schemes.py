@@ -20,15 +20,15 @@ import numpy as np
 
 from benchmarks.support.tables import write_tables
 from benchmarks.tension.scenes import TRACKED, pair
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import PROPERTIES, Drop, Drops, Fluid
 from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import start_clouds
-from reflowshock.particles.scenes.droplet import solve_droplet
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild
 from reflowshock.particles.scenes.reflow import start_flow
+from reflowshock.particles.sph_flows.droplet import solve_droplet
 from reflowshock.particles.surface.profile import section_areas
 
 NAME = "liquid_schemes"

@@ -221,7 +221,7 @@ def interpreter() -> tuple[Bars, dict]:
     steps = 20
     works: dict[str, Callable[[], object]] = {
         "at_once": lambda: motion.take_steps(steps),
-        "one_by_one": lambda: ExplicitMotion._take_each(motion, steps, None),
+        "one_by_one": lambda: ExplicitMotion._take_single_steps(motion, steps, None),
     }
     seconds = turns.in_turns({name: turns.batch(work) for name, work in works.items()})
     spared = float(np.median(seconds["one_by_one"] - seconds["at_once"])) / steps

@@ -24,7 +24,7 @@ from benchmarks.support import results, turns
 from benchmarks.support.drop_scene import DropScene
 from reflowshock.fem.coupling.stopwatch import Stopwatch
 from reflowshock.fem.parallel.communicators import Communicators
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.run.dynamics import make_participants
@@ -97,7 +97,7 @@ def main(counts: list[int]) -> None:
             path.write_text(json.dumps(placed(found, count)))
             program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
             command = mpi_command(count, program, oversubscribe=True)
-            subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.DEVNULL, check=True)
+            subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.DEVNULL, check=True)
             table |= json.loads(path.read_text())
     results.write_and_print("placement", {"rows": table, "bars": {name: bars(row) for name, row in table.items()}})
 

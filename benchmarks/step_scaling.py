@@ -30,7 +30,7 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import Load, half_sine_drop
 from reflowshock.fem.model.assembly import make_body, make_pieces
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.materials.roles import Materials
 from reflowshock.workflow.process.launch import mpi_command
 
@@ -123,7 +123,7 @@ def report(least: dict[str, float]) -> dict:
 
 def main() -> None:
     command = mpi_command(2, [sys.executable, __file__, "ranks"], oversubscribe=False)
-    done = subprocess.run(command, env=own_environment(os.environ), stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.PIPE, text=True, check=True)
     results.write_and_print("step_scaling", json.loads(done.stdout))
 
 

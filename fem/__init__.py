@@ -1,5 +1,5 @@
 """Drop shock: explicit dynamics on DOLFINx meshes, one model or two coupled ones."""
 
-from reflowshock.kernel_place import ask_first
+from reflowshock.kernel_cache import install_locator
 
-ask_first()
+install_locator()

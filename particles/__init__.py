@@ -5,6 +5,6 @@ particles inside follow a potential flow. The ISPG scheme of the paper (`gripc/g
 comparison. Start with `scenes/reflow.py`.
 """
 
-from reflowshock.kernel_place import ask_first
+from reflowshock.kernel_cache import install_locator
 
-ask_first()
+install_locator()

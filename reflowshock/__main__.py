@@ -1,12 +1,12 @@
 """``python -m reflowshock`` is the command; errors while the program loads are reported, too."""
 
-from reflowshock.workflow.process.last_word import heed_signals, last_word
+from reflowshock.workflow.process.error_exit import handle_signals, one_line_errors
 
 
 def main() -> None:
     """Prepare the process, then load and run the command line."""
-    with last_word():
-        heed_signals()
+    with one_line_errors():
+        handle_signals()
         from reflowshock.workflow.process.environment import begin_again_in_utf8, prepare
 
         begin_again_in_utf8()

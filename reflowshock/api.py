@@ -22,7 +22,7 @@ from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import PlannedStage
-from reflowshock.workflow.process.kernel_cache import compilation
+from reflowshock.workflow.process.kernel_folder import compilation_time
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.folders import read_mark
 from reflowshock.workflow.store.point import Point
@@ -121,7 +121,7 @@ class Case:
         text = StringIO()
         plan.show_plan(store, point, Console(file=text, width=WIDTH, force_jupyter=False))
         stages, effects = plan.planned_stages(store, point), kind_of(self.resolved).forecast(self.resolved).effects
-        once = compilation([name for name, stage in stages.items() if stage.runs])
+        once = compilation_time([name for name, stage in stages.items() if stage.runs])
         return Plan(stages, effects, text.getvalue(), once)
 
     def run(

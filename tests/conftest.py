@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 from tests.support.compiled_once import compile_once
 from tests.support.shared_run import shared_run
 
-keep_kernels_by_source()
+choose_kernel_folder()
 compile_once()
 os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: ranks that wait leave them to others
 

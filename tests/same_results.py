@@ -45,6 +45,9 @@ COARSE_BOARD = (
     "dynamics.numerics.field_samples=4",
     "dynamics.numerics.implicit_step=2.5 us",
 )  # fmt: skip
+SHORT_SHOCK = (
+    "shock.duration=0.05 ms", "shock.numerics.dns_duration=0.05 ms", 'shock.picture_times=["0.04 ms"]',
+)  # fmt: skip
 CASES = {
     "drop": ("tests/pipeline/small.toml", ONE_RANK),
     "heated": ("tests/pipeline/small.toml", HEATED + ONE_RANK),
@@ -66,10 +69,7 @@ EVERY_CASE = CASES | {
     "two_scale_bar": ("cases/two_scale_bar/case.toml", ()),
     "bga_drop": ("cases/bga_drop/case.toml", QUICK),
     "hu_bga_reflow": ("cases/hu_bga_reflow/case.toml", QUICK),
-    "hu_bga_drop": (
-        "cases/hu_bga_drop/case.toml",
-        QUICK + ("shock.duration=0.05 ms", "shock.numerics.dns_duration=0.05 ms"),
-    ),
+    "hu_bga_drop": ("cases/hu_bga_drop/case.toml", QUICK + SHORT_SHOCK),
     "jedec_bga": ("cases/jedec_bga/case.toml", QUICK),
     "measured_strip": ("cases/measured_strip/case.toml", ()),
     "sessile_drop_ispg": ("cases/sessile_drop/case.toml", COARSE_DROP + ISPG),

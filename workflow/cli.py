@@ -17,7 +17,7 @@ from reflowshock.workflow.new_case import import_board, init, new
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores, prepare
-from reflowshock.workflow.process.last_word import answer, heed_signals, last_word, remember_run_folder
+from reflowshock.workflow.process.error_exit import handle_signals, one_line_errors, run_app, set_run_folder
 from reflowshock.workflow.process.terminal import console, interruptible, print_error
 from reflowshock.workflow.store.folders import check_folder, read_mark
 from reflowshock.workflow.store.point import Point
@@ -305,12 +305,12 @@ def study(
     """Run a parametric study; only what is missing is computed. Writes tables, plots and a page."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
-    from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_outlook
+    from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_forecast
 
     points = read_points_of(study, oversubscribe or executor != ExecutorName.LOCAL, force)
     store = Store(out or Path("runs") / points.study.about.name)
     if dry_run:
-        show_outlook(points, store)
+        show_forecast(points, store)
         return
     cases = [point.case for point in points.possible.values()]
     machine = machine_of(executor_for(executor, profile, cores, oversubscribe, cases))
@@ -361,10 +361,10 @@ for command in app.registered_commands:
 
 def main() -> None:
     """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input, 3 a verdict FAIL, if asked for."""
-    with last_word():
-        heed_signals()
+    with one_line_errors():
+        handle_signals()
         prepare()
-        answer(app)
+        run_app(app)
 
 
 def _version(wanted: bool) -> None:
@@ -389,5 +389,5 @@ def _load(
     case = read_case(path, settings or [], lenient, force)
     store = Store(out or Path("runs") / case.run_name, one_run=True)
     if read_mark(store.folder) is not None:
-        remember_run_folder(store.folder)
+        set_run_folder(store.folder)
     return store, Point({}, case)

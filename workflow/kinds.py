@@ -16,8 +16,13 @@ from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
-from reflowshock.workflow.board_drop.forecast import forecast, package_size
-from reflowshock.workflow.board_drop.plan import package_tables
+from reflowshock.workflow.board_drop.forecast import (
+    board_drop_size,
+    forecast_board_drop,
+    forecast_package,
+    package_size,
+)
+from reflowshock.workflow.board_drop.plan import board_drop_tables, package_tables
 from reflowshock.workflow.board_drop.shock_effects import SHOCK_EFFECTS
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STAGE, Size
@@ -209,7 +214,7 @@ PACKAGE = Kind(
         "surface": package_stages.surface,
         "solder_mesh": package_stages.solder_mesh,
     },
-    forecast=forecast,
+    forecast=forecast_package,
     size=package_size,
     plan=package_tables,
     acts="reflow",
@@ -221,7 +226,10 @@ BOARD_DROP = replace(
     PACKAGE,
     case=BoardDropCase,
     problems=package_checks.board_drop_problems,
-    stages={**PACKAGE.stages, "shock": package_stages.shock},
+    stages={**PACKAGE.stages, "solder_mesh": package_stages.solder_mesh_for_drop, "shock": package_stages.shock},
+    forecast=forecast_board_drop,
+    size=board_drop_size,
+    plan=board_drop_tables,
     acts="reflow and shock",
     report=_board_drop_report,
     study=_board_drop_study,

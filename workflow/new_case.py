@@ -1,13 +1,11 @@
-"""The commands that write a case file: from a template, from five answers, from a board of ECAD."""
+"""Commands that write a case file: ``new`` from a template, ``init`` from five answers, ``import`` from ECAD."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from reflowshock.workflow.process.terminal import console, print_error
+from reflowshock.workflow.process.terminal import console
 
 
 def new(
@@ -31,9 +29,8 @@ def init(
     """Ask five questions about a package on a board, and write a case that runs."""
     from reflowshock.workflow.ecad.command import ask_for_case
 
-    given = {"name": name, "array": array, "ball": ball, "board": board, "drop": drop}
-    with _in_words():
-        path = ask_for_case(given, lambda words, usual: typer.prompt(words, default=usual))
+    options = {"name": name, "array": array, "ball": ball, "board": board, "drop": drop}
+    path = ask_for_case(options, lambda prompt, default: typer.prompt(prompt, default=default))
     console.print(f"wrote {path}; next: reflowshock run {path}")
 
 
@@ -42,33 +39,21 @@ def import_board(
         Path, typer.Argument(metavar="BOARD", help="KiCad (.kicad_pcb), IPC-2581 (.xml), CSV, or a folder of Gerber X2")
     ],
     component: Annotated[
-        str | None, typer.Option(metavar="U8", help="component whose joints are computed; without: show what is there")
+        str | None,
+        typer.Option(metavar="U8", help="component whose joints are computed; without it, the components are listed"),
     ] = None,
     name: Annotated[str | None, typer.Option(help="name of the case (default: board and component)")] = None,
     thickness: Annotated[
-        str | None, typer.Option(help='of the board, where the file does not say it: "1.6 mm"')
+        str | None, typer.Option(help='thickness of the board if the file does not give it, e.g. "1.6 mm"')
     ] = None,
     ball: Annotated[str | None, typer.Option(help="diameter of a solder ball (default: 0.6 of the pitch)")] = None,
     holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes (default: 2 mm)")] = None,
 ) -> None:
-    """Write a case file for a component of a board from ECAD."""
+    """Write a case file for a component of an ECAD board."""
     from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case
 
-    with _in_words():
-        if component is None:
-            show_layout(read_layout(board), console)
-            return
-        path = write_case(board, component, name, {"--thickness": thickness, "--ball": ball, "--holes": holes})
-    console.print(f"wrote {path}; put in what is ASSUMED, then: reflowshock plan {path}")
-
-
-@contextmanager
-def _in_words() -> Iterator[None]:
-    """End with exit code 2 where a board is not what it should be."""
-    from reflowshock.workflow.ecad.layout import EcadError
-
-    try:
-        yield
-    except EcadError as error:
-        print_error(str(error))
-        raise typer.Exit(2) from error
+    if component is None:
+        show_layout(read_layout(board), console)
+        return
+    path = write_case(board, component, name, {"--thickness": thickness, "--ball": ball, "--holes": holes})
+    console.print(f"wrote {path}; replace values marked ASSUMED, then: reflowshock plan {path}")

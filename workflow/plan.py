@@ -13,7 +13,7 @@ from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
 from reflowshock.workflow.pipeline.gate import LONG
-from reflowshock.workflow.process.kernel_cache import compilation
+from reflowshock.workflow.process.kernel_folder import compilation_time
 from reflowshock.workflow.process.terminal import new_table, styled
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
@@ -45,7 +45,7 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
     """Return a plan for scripts: stages, effects as in ``summary.json``, wall times [s] of compilation and of all."""
     stages = planned_stages(store, point)
-    once = compilation([name for name, stage in stages.items() if stage.runs])
+    once = compilation_time([name for name, stage in stages.items() if stage.runs])
     return {
         "case": point.case.case.name,
         "folder": str(store.folder),
@@ -103,7 +103,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """Predict the wall time [s] of all that has to be made up to a stage."""
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
     stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
-    return sum(costs[name].seconds for name in stale) + compilation(stale)
+    return sum(costs[name].seconds for name in stale) + compilation_time(stale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     for name, state in states.items():
         mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
-    if once := compilation([name for name, state in states.items() if state.stale]):
+    if once := compilation_time([name for name, state in states.items() if state.stale]):
         table.add_row("kernels", "", f"about {duration(once)}", "compiled once, in these stages")
     stale = [costs[name] for name, state in states.items() if state.stale]
     left = sum(cost.seconds for cost in stale) + once

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from benchmarks.support.program_run import ProgramRun
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
-from reflowshock.fem.dynamics.participant import Alone
+from reflowshock.fem.dynamics.participant import SingleModel
 from reflowshock.fem.estimates.estimate import implicit_plan
 from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
@@ -39,7 +39,7 @@ def take_implicit_steps(run: ProgramRun, step: float) -> "NewtonMotion":
     [(role, participant)] = run.participants.items()
     run.plan = implicit_plan(run.plan, step)
     motion = NewtonMotion(participant.motion.body, participant.motion._loads, run.plan.step)
-    run.participants = {role: Alone(motion, run.plan)}
+    run.participants = {role: SingleModel(motion, run.plan)}
     return motion
 
 

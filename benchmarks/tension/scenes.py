@@ -19,13 +19,14 @@ from benchmarks.tension.free_pressure import FreeSurfacePressure
 from benchmarks.tension.half_level import RAYS, filled, level_points
 from benchmarks.tension.pairwise import Pairwise, cohesion
 from reflowshock.arrays import Floats
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
+from reflowshock.particles.flows.droplet_metrics import base_width
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
-from reflowshock.particles.scenes.droplet import base_width, droplet
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT
+from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface.remeshing import EDGE
 from reflowshock.particles.surface.surface_mesh import SurfaceLost
 

@@ -1,6 +1,6 @@
 """Files of this folder are tests: `pytest cases/hard` tries the first case of each."""
 
 from reflowshock.cases.hard.collector import pytest_addoption, pytest_collect_file  # noqa: F401
-from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 
-keep_kernels_by_source()
+choose_kernel_folder()

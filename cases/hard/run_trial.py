@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from reflowshock.cases.hard.trial import Measured, Trial
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.parameters import Parameters
 from reflowshock.problem import as_toml
 from reflowshock.workflow.case.problems import CaseError
@@ -50,7 +50,7 @@ def run_case(parameters: RunParameters) -> dict[str, Measured]:
     settings = [part for override in parameters.overrides for part in ("--set", override)]
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "reflowshock", "run", parameters.case, "--out", folder, "-j", "1", *settings]
-        environment = own_environment(os.environ)
+        environment = without_mpi_job(os.environ)
         process = subprocess.run(
             command, capture_output=True, encoding="utf-8", errors="replace", check=False, env=environment
         )

@@ -1,1 +1,1 @@
-"""Coupling of two models of one run: schemes, placement on ranks, self-check; start with `scheme.py`."""
+"""Coupling of two models in one run: schemes, placement on ranks, self-check; start with `scheme.py`."""

@@ -1,10 +1,10 @@
-"""Impulses: the meso model carries the interface in its own steps; the macro model's force pushes it once a window.
+"""Impulse coupling: the meso model carries the interface; the macro force acts on it by one impulse per window.
 
-A window is one of r-RESPA (M. Tuckerman, B. J. Berne, G. J. Martyna, J. Chem. Phys. 97, 1992, 1990-2001), mirror image
-of held velocity: the interface, which weighs what both models have there, gets DT times the macro model's force at t_n,
-then m substeps of the meso model's; the macro model moves with where the interface has come to. Every element pushes
-its nodes by opposite impulses, so linear and angular momentum are kept to round-off, along any path of the meso model's
-material. The models wait for each other. Stable under the conditions of held velocity.
+This is r-RESPA (M. Tuckerman, B. J. Berne, G. J. Martyna, J. Chem. Phys. 97, 1992, 1990-2001) and the mirror image of
+held velocity. The interface, with the mass of both models, receives DT times the macro force at t_n, then m substeps of
+the meso model; the macro model adopts the new interface position. All impulses are pairwise opposite, so linear and
+angular momentum are conserved to round-off for any path-dependent material. The models alternate. The scheme is stable
+under the conditions of held velocity.
 """
 
 from collections.abc import Mapping
@@ -15,31 +15,31 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.coupling.held_velocity import WindowMotion, counted_interface, local_interface
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.dynamics.participant import Continued
+from reflowshock.fem.dynamics.participant import Restartable
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
+from reflowshock.fem.parallel.checkpoint_state import Rows, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import Rows, State
 
 
 class Impulse:
-    """The scheme: the meso model waits for the macro model's mass at the interface, so that one is made first."""
+    """Impulse scheme; the macro model is created first and sends its interface mass."""
 
     order: tuple[Role, Role] = ("macro", "meso")
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> "ImpulseMacro":
-        """Return the macro model's participant."""
+        """Return the participant of the macro model."""
         return ImpulseMacro(body, loads, plan, channels)
 
     def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> "ImpulseMeso":
-        """Return the meso model's participant."""
+        """Return the participant of the meso model."""
         return ImpulseMeso(body, loads, plan, channels)
 
 
-class ImpulseMacro(Continued):
-    """The board: one step a window, its interface where the meso model has taken it."""
+class ImpulseMacro(Restartable):
+    """Macro model: one step per window, with its interface moved by the meso model."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Send the mass of the interface and start at rest."""
@@ -51,10 +51,10 @@ class ImpulseMacro(Continued):
         self.interface_work = 0.0
 
     def begin_window(self) -> None:
-        """Do nothing: the meso model has the force."""
+        """Do nothing: the meso model already has the force."""
 
     def finish_window(self) -> None:
-        """Receive the interface's mean velocity, move, and send the force at the interface."""
+        """Receive the mean interface velocity, move, and send the interface force."""
         motion = self.motion
         before = motion.force[self._counted]
         self._channels.forces.receive(motion.velocity)
@@ -65,17 +65,17 @@ class ImpulseMacro(Continued):
         self._channels.velocities.send(motion.force)
 
     def interface_force(self) -> NDArray[np.float64]:
-        """Return the force that was sent."""
+        """Return the force sent to the meso model."""
         self._interface_force[self._counted] = self.motion.force[self._counted]
         return self._interface_force
 
     def foreign_force(self) -> NDArray[np.float64]:
-        """Return zero: all forces are this model's."""
+        """Return zero: all forces belong to this model."""
         return self._zero
 
 
-class ImpulseMeso(Continued):
-    """Joints, package, buffer and the interface itself: m substeps a window."""
+class ImpulseMeso(Restartable):
+    """Meso model of joints, package, buffer and interface: m substeps per window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Receive the macro model's mass at the interface and start at rest; a ``ImpulseMacro`` must have sent it."""
@@ -88,7 +88,7 @@ class ImpulseMeso(Continued):
         self.interface_work = 0.0
 
     def begin_window(self) -> None:
-        """Take m substeps, the first of which feels the macro model's force; send the interface's mean velocity."""
+        """Take m substeps, the first with the macro force, then send the mean interface velocity."""
         motion = self.motion
         start = motion.displacement[self._interface]
         for substep in range(self.plan.substeps):
@@ -100,13 +100,13 @@ class ImpulseMeso(Continued):
         self._channels.forces.send(self._mean)
 
     def finish_window(self) -> None:
-        """Receive the macro model's force, an impulse of a window for one substep."""
+        """Receive the macro force, and add the impulse of a window to one substep."""
         self._channels.velocities.receive(self._received)
         self.motion.force += self.foreign_force()
         self._count_work()
 
     def _count_work(self) -> None:
-        """Add half a window's work of the macro model's force at the velocity of a substep beside it."""
+        """Add half a window's work of the macro force at the velocity of an adjacent substep."""
         work = np.sum(self._received[self._counted] * self.motion.velocity[self._counted])
         self.interface_work += 0.5 * self.plan.window * float(work)
 
@@ -115,14 +115,14 @@ class ImpulseMeso(Continued):
         return self._received
 
     def foreign_force(self) -> NDArray[np.float64]:
-        """Return the received force as often as there are substeps: it is in ``motion.force`` after a window."""
+        """Return the received force times the number of substeps, which is part of ``motion.force`` after a window."""
         return self.plan.substeps * self._received
 
     def state(self) -> State:
-        """Return also the received force."""
+        """Return the motion, the interface work and the received force."""
         return {**super().state(), "received": Rows(self.motion.body.local.nodes, self._received)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""
         super().restore(state)
         self._received[:] = state["received"]

@@ -1,7 +1,7 @@
-"""One way: the macro model drives the meso model's interface and takes nothing back, as a submodel is driven.
+"""One-way coupling (submodelling): the macro model drives the interface of the meso model and receives no force.
 
-The macro model is a whole structure of its own, the fine region coarsely included; its windows are those of one model
-alone. The meso model's energy balance balances with the work across its interface, which to it is external.
+The macro model is a complete structure with a coarse mesh of the fine region. In the energy balance of the meso model,
+the work across the interface is external work.
 """
 
 from collections.abc import Mapping
@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.coupling.held_velocity import Driven
-from reflowshock.fem.dynamics.participant import Alone, explicit_motion
+from reflowshock.fem.coupling.held_velocity import VelocityFollower
+from reflowshock.fem.dynamics.participant import SingleModel, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Kept, Load
 from reflowshock.fem.model.body import Body
@@ -21,21 +21,21 @@ from reflowshock.fem.parallel.exchange import InterfaceChannels
 
 
 class OneWay:
-    """The scheme: nobody waits for anything at the start."""
+    """One-way scheme; the participants are created in any order."""
 
     order: tuple[Role, Role] = ("macro", "meso")
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> "Driver":
-        """Return the macro model's participant."""
+        """Return the participant of the macro model."""
         return Driver(body, loads, plan, channels)
 
     def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> "Submodel":
-        """Return the meso model's participant."""
+        """Return the participant of the meso model."""
         return Submodel(body, loads, plan, channels)
 
 
-class Driver(Alone):
-    """The whole structure: one step a window, whose velocity at the interface is sent."""
+class Driver(SingleModel):
+    """Macro model of the whole structure: one step per window, sending its interface velocity."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest."""
@@ -43,7 +43,7 @@ class Driver(Alone):
         self._channels = channels
 
     def begin_window(self) -> None:
-        """Move, and send the interface's velocity."""
+        """Move, and send the interface velocity."""
         self.motion.advance()
         self._channels.velocities.send(self.motion.velocity)
 
@@ -54,14 +54,14 @@ class Driver(Alone):
 
 @dataclass
 class InterfaceWork(Load):
-    """The work that moves the interface of a submodel [J]."""
+    """Work that moves the interface of a submodel [J]."""
 
     kept: ClassVar[Mapping[str, Kept]] = {"work": "sum"}
     work: float = 0.0
 
 
-class Submodel(Driven):
-    """The fine region: m substeps a window."""
+class Submodel(VelocityFollower):
+    """Meso model of the fine region: m substeps per window."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest."""
@@ -73,5 +73,5 @@ class Submodel(Driven):
         self._work.work += self.follow()
 
     def interface_force(self) -> NDArray[np.float64]:
-        """Return zero: nobody takes the force of the interface."""
+        """Return zero: the macro model receives no interface force."""
         return self._zero

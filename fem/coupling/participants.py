@@ -1,4 +1,4 @@
-"""The participants of a coupled run on one rank, and the channels between them."""
+"""Participants of a coupled run on one rank, and the channels between them."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from reflowshock.fem.parallel.exchange import InterfaceChannels, MessageClock
 
 
 class CoupledRun(NamedTuple):
-    """Participants of this rank in the order of their turns, clocks of their channels, what was checked before."""
+    """Participants of this rank in the order of their turns, clocks of their channels, and the self-check."""
 
     participants: dict[Role, Participant]
     clocks: list[MessageClock]
@@ -30,17 +30,17 @@ def couple(
     plan: WindowPlan,
     scheme: Scheme,
 ) -> "CoupledRun":
-    """Open the channels of a coupled run, check what must be exact, and make the participants; collective.
+    """Open the channels of a coupled run, run the self-check, and create the participants; collective.
 
     Args:
-        comms: The communicators of both models.
-        bodies: The models of this rank.
-        loads: What acts on each of them.
+        comms: Communicators of both models.
+        bodies: Models of this rank.
+        loads: Loads and damping of each model.
         plan: Windows and substeps.
-        scheme: How they are coupled.
+        scheme: Coupling scheme.
 
     Raises:
-        AgreedError: Fields, forces or masses that are not exact; on every rank.
+        AgreedError: The self-check failed; on every rank.
     """
     absent = np.full_like(next(iter(bodies.values())).interface, -1)
     macro, meso = (bodies[role].interface if role in bodies else absent for role in ("macro", "meso"))
@@ -50,5 +50,7 @@ def couple(
     if comms.world.rank == 0:
         print(checked.words, flush=True)
     make = {"macro": scheme.macro, "meso": scheme.meso}
-    made = {role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies}
-    return CoupledRun({role: made[role] for role in comms.models}, channels.clocks, checked)
+    participants = {
+        role: make[role](bodies[role], loads[role], plan, channels) for role in scheme.order if role in bodies
+    }
+    return CoupledRun({role: participants[role] for role in comms.models}, channels.clocks, checked)

@@ -38,24 +38,24 @@ from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.shock import Ranks
-from reflowshock.fem.setup.models import Divided
+from reflowshock.fem.setup.models import DividedModels
 from reflowshock.materials.roles import materials_of_parts
 
 CALLS = 2.5e-5  # [s] of the interpreter in a step of a motion
-KEPT = "speeds.json"
+COST_FILE = "speeds.json"
 ALTERNATING: tuple[SchemeName, ...] = ("gravouil_combescure", "impulse")  # schemes whose models wait for each other
 
 
 @dataclass(frozen=True, slots=True)
 class ModelWork:
-    """A model that is to be distributed.
+    """Model to be distributed.
 
     Attributes:
-        mesh: Its mesh on rank 0, None on the others.
-        level: ``(ne,)`` level of the step of each cell.
-        rates: ``(levels,)`` steps of each level in a window.
-        steps: Steps of its motion in a window.
-        kind: What its elements are like.
+        mesh: Mesh on rank 0, None on other ranks.
+        level: Step level of each cell, shape (ne,).
+        rates: Steps of each level in a window, shape (levels,).
+        steps: Steps of the model's motion in a window.
+        kind: Materials, formulation, kinematics and step of the elements.
     """
 
     mesh: MeshData | None
@@ -67,12 +67,12 @@ class ModelWork:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Who does what.
+    """Assignment of models and cells to ranks.
 
     Attributes:
         placement: Ranks of each model.
-        cells: Of each model on several ranks, the rank ``(ne,)`` of each cell in its communicator; on rank 0 only.
-        summary: Prediction and measurements, for the result.
+        cells: Rank of each cell in the communicator of its model, shape (ne,), for models on several ranks; on rank 0.
+        summary: Prediction and measurements for the result file.
     """
 
     placement: Placement
@@ -82,14 +82,14 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Costs of this machine: of steps ``(ranks, 3)``, and of a message [s]."""
+    """Measured costs of this machine: steps of each element family on each rank, and a message [s]."""
 
     cost: StepCost
     latency: float
 
 
-def works_of(divided: Divided[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
-    """Return the models of a divided mesh as what is to be distributed."""
+def works_of(divided: DividedModels[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
+    """Return the work of each model of a divided mesh."""
     works: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():
         _, assigned = materials_of_parts(tables.part_names, request.part_materials)
@@ -111,22 +111,23 @@ def plan_ranks(
     folder: Path | None,
     scheme: SchemeName = "held_velocity",
 ) -> Plan:
-    """Measure, predict, choose, and say so; collective.
+    """Choose the placement from measured costs, and print it; collective.
 
     Args:
-        world: All ranks.
-        loads: The models.
-        ranks: What the input asks for.
-        folder: Where a run keeps its checkpoints. Its measurement is kept there, too: a run that continues does so with
-            the same cells on the same ranks, to the same bits.
-        scheme: How two models are coupled.
+        world: Communicator of all ranks.
+        loads: Work of each model.
+        ranks: Placement settings of the input.
+        folder: Checkpoint folder, which also stores the measurement, so that a restart has the same cells on the same
+            ranks and identical results.
+        scheme: Coupling scheme.
     """
     family = {role: families(load.mesh, load.kind) for role, load in loads.items() if load.mesh}
     present = np.unique(np.concatenate([np.zeros(0, np.int8), *family.values()]))
-    measured = kept(world, folder, present) or measure(world, loads, family)
+    measured = stored_costs(world, folder, present) or measure(world, loads, family)
     if folder is not None and world.rank == 0:
-        keep(folder, measured)
-    plan = plan_from(loads, family, ranks, (measured, scheme not in ALTERNATING)) if world.rank == 0 else None
+        store_costs(folder, measured)
+    overlap = scheme not in ALTERNATING
+    plan = plan_from(loads, family, ranks, measured, overlap) if world.rank == 0 else None
     if plan:
         print(words(plan), flush=True)
     shared = world.bcast((plan.placement, plan.summary) if plan else None)
@@ -134,48 +135,59 @@ def plan_ranks(
 
 
 def measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
-    """Time each family of elements on a sample from the model that has most of it; collective."""
-    found: dict[int, tuple[MeshData, MeshData, Kind]] = {}
+    """Measure the cost of each element family on a sample from the model with most of its elements; collective."""
+    chosen: dict[int, tuple[MeshData, MeshData, Kind]] = {}
     for role in sorted(family, key=lambda role: len(family[role])):
         load = loads[role]
         assert load.mesh is not None
         for number, pair in samples(load.mesh, family[role], world.size).items():
-            if number not in found or len(pair[1].cells) > len(found[number][1].cells):
-                found[number] = (*pair, load.kind)
-    return Measured(measured_costs(world, world.bcast(found)), measured_latency(world))
+            if number not in chosen or len(pair[1].cells) > len(chosen[number][1].cells):
+                chosen[number] = (*pair, load.kind)
+    return Measured(measured_costs(world, world.bcast(chosen)), measured_latency(world))
 
 
-def kept(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Measured | None:
-    """Return what ``keep`` wrote with as many ranks of all families that rank 0 finds ``present``; collective."""
-    found = None
-    if world.rank == 0 and folder is not None and (folder / KEPT).exists():
+def stored_costs(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Measured | None:
+    """Return the stored costs if they cover this number of ranks and the element families present; collective."""
+    costs = None
+    if world.rank == 0 and folder is not None and (folder / COST_FILE).exists():
         try:
-            found = read(folder / KEPT, world.size, present)
+            costs = read(folder / COST_FILE, world.size, present)
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-            warn(f"{folder / KEPT} is broken, this machine is measured again: {type(error).__name__}: {error}")
-    return world.bcast(found)
+            warn(f"{folder / COST_FILE} is damaged, costs are measured again: {type(error).__name__}: {error}")
+    return world.bcast(costs)
 
 
 def read(path: Path, ranks: int, present: NDArray[np.int8]) -> Measured | None:
-    """Return a measurement; None where it is of another number of ranks, or a family is missing."""
+    """Read measured costs; return None for another number of ranks or a missing element family."""
     record = json.loads(path.read_text())
     cost = StepCost(np.array(record["fixed"], float), np.array(record["element"], float))
     fits = len(cost.fixed) == ranks and bool((cost.element[:, present] > 0.0).all())
     return Measured(cost, float(record["latency"])) if fits else None
 
 
-def keep(folder: Path, measured: Measured) -> None:
-    """Write a measurement for a run that continues."""
+def store_costs(folder: Path, measured: Measured) -> None:
+    """Write measured costs for a restart."""
     folder.mkdir(parents=True, exist_ok=True)
     cost = {"fixed": measured.cost.fixed.tolist(), "element": measured.cost.element.tolist()}
-    write_at_once(folder / KEPT, json.dumps(cost | {"latency": measured.latency}).encode())
+    write_at_once(folder / COST_FILE, json.dumps(cost | {"latency": measured.latency}).encode())
 
 
 def plan_from(
-    loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]], ranks: Ranks, known: tuple[Measured, bool]
+    loads: Mapping[Role, ModelWork],
+    family: Mapping[Role, NDArray[np.int8]],
+    ranks: Ranks,
+    measured: Measured,
+    overlap: bool,
 ) -> Plan:
-    """Choose a placement, and the rank of each cell, from a measurement and from whether two models work at once."""
-    measured, overlap = known
+    """Choose the placement and the rank of each cell from measured costs.
+
+    Args:
+        loads: Work of each model.
+        family: Element family of each cell of each model, shape (ne,).
+        ranks: Placement settings of the input.
+        measured: Measured costs of this machine.
+        overlap: Whether both models work concurrently.
+    """
     cost, size = measured.cost, len(measured.cost.fixed)
     seconds = {role: rank_seconds(load, family[role], cost) for role, load in loads.items()}
     speeds = speeds_of(np.sum([work for work, _ in seconds.values()], axis=0))
@@ -186,24 +198,24 @@ def plan_from(
     }
     if "macro" in models:
         window = WindowCost(models["macro"], models["meso"], measured.latency, overlap)
-        found = alternatives(ranks, speeds.tolist(), window)
+        placements = alternatives(ranks, speeds.tolist(), window)
     else:
         [(role, model)] = models.items()
         alone = shared((role,), size)
-        found = [Alternative(alone, model_seconds(model, (speeds.sum(), size > 1), measured.latency))]
-    chosen = found[0]
+        placements = [Alternative(alone, model_seconds(model, speeds.sum(), size > 1, measured.latency))]
+    chosen = placements[0]
     cells = {
         role: partition(load.mesh, level_work(load, family[role], cost), speeds[list(chosen.placement.ranks[role])])
         for role, load in loads.items()
         if load.mesh is not None and len(chosen.placement.ranks[role]) > 1
     }
-    return Plan(chosen.placement, cells, summary(ranks, found, speeds, measured))
+    return Plan(chosen.placement, cells, summary(ranks, placements, speeds, measured))
 
 
 def rank_seconds(
     load: ModelWork, family: NDArray[np.int8], cost: StepCost
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the seconds ``(ranks,)`` of a window that all elements of a model take, and those of calls."""
+    """Return the time per window of all elements of a model, and of its calls, each of shape (ranks,) [s]."""
     rates, count = load.rates, len(FAMILIES)
     updates = np.bincount(family, weights=rates[load.level].astype(float), minlength=count)
     present = np.unique(np.column_stack([load.level, family]), axis=0)
@@ -212,20 +224,22 @@ def rank_seconds(
 
 
 def level_work(load: ModelWork, family: NDArray[np.int8], cost: StepCost) -> NDArray[np.float64]:
-    """Return the seconds ``(ne, levels)`` of a window that each element takes, in the column of its level."""
+    """Return the time per window of each element in the column of its level, shape (ne, levels) [s]."""
     work = np.zeros((len(family), len(load.rates)))
     work[np.arange(len(family)), load.level] = cost.element.mean(axis=0)[family] * load.rates[load.level]
     return work
 
 
-def summary(ranks: Ranks, found: list[Alternative], speeds: NDArray[np.float64], measured: Measured) -> dict[str, Any]:
-    """Return the choice and what it rests on."""
+def summary(
+    ranks: Ranks, placements: list[Alternative], speeds: NDArray[np.float64], measured: Measured
+) -> dict[str, Any]:
+    """Return the chosen placement with predictions and measurements."""
     mean = measured.cost.element.mean(axis=0)
     return {
         "asked": ranks.placement,
-        "chosen": found[0].placement.words,
-        "predicted_window_seconds": found[0].seconds,
-        "alternatives": {item.placement.words: item.seconds for item in found},
+        "chosen": placements[0].placement.words,
+        "predicted_window_seconds": placements[0].seconds,
+        "alternatives": {item.placement.words: item.seconds for item in placements},
         "speeds": speeds.tolist(),
         "update_seconds": {name: float(mean[k]) for k, name in enumerate(FAMILIES) if mean[k] > 0.0},
         "message_seconds": measured.latency,
@@ -233,11 +247,11 @@ def summary(ranks: Ranks, found: list[Alternative], speeds: NDArray[np.float64],
 
 
 def words(plan: Plan) -> str:
-    """Return one line on the choice, for people."""
+    """Return the placement and its predicted window time as one line of text."""
     others = [
         f"{name} {1e3 * seconds:.3g} ms"
         for name, seconds in plan.summary["alternatives"].items()
         if name != plan.summary["chosen"]
     ]
-    line = f"placement: {plan.summary['chosen']}, {1e3 * plan.summary['predicted_window_seconds']:.3g} ms a window"
+    line = f"placement: {plan.summary['chosen']}, {1e3 * plan.summary['predicted_window_seconds']:.3g} ms per window"
     return f"{line} predicted" + (f"; {', '.join(others)}" if others else "")

@@ -1,4 +1,4 @@
-"""Coupling schemes: the contract, and the scheme of a name."""
+"""Coupling schemes: their common interface, and the choice by name."""
 
 from dataclasses import replace
 from typing import Literal, Protocol
@@ -19,34 +19,34 @@ Direction = Literal["two_way", "one_way"]
 
 
 class Scheme(Protocol):
-    """How two models go through a window together.
+    """Interface of a coupling scheme.
 
     Attributes:
-        order: In which order a rank makes its participants: the second waits for what the first sends.
+        order: Order in which a rank creates its participants; the second waits for a message of the first.
     """
 
     order: tuple[Role, Role]
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
-        """Return the macro model's participant; collective over its ranks."""
+        """Return the participant of the macro model; collective over its ranks."""
 
     def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
-        """Return the meso model's participant; collective over its ranks."""
+        """Return the participant of the meso model; collective over its ranks."""
 
 
 class LocalSteps:
-    """Another scheme both of whose models take whole windows: the smaller steps are inside the meso model's force."""
+    """Scheme with whole windows for both models; the small steps are inside the force term of the meso model."""
 
     def __init__(self, scheme: Scheme) -> None:
-        """Take the scheme that couples at whole windows."""
+        """Wrap the scheme that couples the models at whole windows."""
         self._scheme, self.order = scheme, scheme.order
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
-        """Return the macro model's participant."""
+        """Return the participant of the macro model."""
         return self._scheme.macro(body, loads, replace(plan, substeps=1), channels)
 
     def meso(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> Participant:
-        """Return the meso model's participant."""
+        """Return the participant of the meso model."""
         return self._scheme.meso(body, loads, replace(plan, substeps=1), channels)
 
 
@@ -54,11 +54,11 @@ def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
     """Return the scheme of a name and direction.
 
     Raises:
-        ValueError: The scheme needs an answer, which one way does not give.
+        ValueError: The scheme does not support one-way coupling.
     """
     if name == "gravouil_combescure":
         if direction == "one_way":
-            raise ValueError("gravouil_combescure links two models; one_way needs held_velocity")
+            raise ValueError("gravouil_combescure does not support direction = one_way; use held_velocity")
         return GravouilCombescure()
     if name == "impulse" and direction == "two_way":
         return Impulse()

@@ -1,4 +1,4 @@
-"""What must be exact between two models before they move: fields through tie and interface, forces back, masses."""
+"""Self-check before a coupled run: exactness of fields, forces and masses through tie and interface."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -17,22 +17,22 @@ from reflowshock.fem.parallel.exchange import InterfaceChannels
 
 RIGID = np.array([[0.0, -0.7, 0.4], [0.7, 0.0, -0.9], [-0.4, 0.9, 0.0]])
 LINEAR = np.array([[0.3, -1.0, 0.5], [1.0, 0.2, -0.7], [-0.4, 0.6, 1.0]])
-SHIFT = np.array([0.2, -0.5, 0.3])  # of the size of the models
+SHIFT = np.array([0.2, -0.5, 0.3])  # relative to the size of the models
 
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """What was found, the same on all ranks.
+    """Result of the self-check, equal on all ranks.
 
     Attributes:
-        rigid: Largest error of a rigid motion at slaves and interface, of its size.
-        linear: The same of a linear field.
-        tie: Net force and moment that ties lose, of the sum of magnitudes.
-        interface: The same of the coupling interface.
+        rigid: Largest relative error of a rigid motion at slaves and interface.
+        linear: Largest relative error of a linear field at slaves and interface.
+        tie: Net force and moment lost by ties, relative to the sum of magnitudes.
+        interface: Net force and moment lost at the coupling interface, relative to the sum of magnitudes.
         macro_mass: Mass of the macro model [kg].
-        interface_mass: Mass that the meso model gives to the nodes of the interface [kg].
-        meso_mass: Its other mass [kg].
-        volume_mass: Density times volume of both, and lumped masses [kg].
+        interface_mass: Mass of the meso model at interface nodes [kg].
+        meso_mass: Remaining mass of the meso model [kg].
+        volume_mass: Density times volume of both models plus attached masses [kg].
     """
 
     rigid: float
@@ -54,24 +54,24 @@ class SelfCheck:
         )
 
     def judge(self) -> None:
-        """Check that all is exact.
+        """Check that all residuals are at round-off.
 
         Raises:
-            AgreedError: A residual above 1e-12, or masses that do not add up.
+            AgreedError: A residual exceeds ``EXACT``, or the masses do not add up.
         """
         sums = self.macro_mass + self.interface_mass + self.meso_mass
-        exact = max(self.rigid, self.linear, self.tie, self.interface) <= EXACT  # false for what is no number
+        exact = max(self.rigid, self.linear, self.tie, self.interface) <= EXACT  # False for NaN
         if not exact or not abs(sums - self.volume_mass) <= MASS_TOLERANCE * self.volume_mass:
             raise AgreedError(f"{self.words}; residuals must be at most {EXACT:g}, masses equal to {MASS_TOLERANCE:g}")
 
 
 def recorded(checked: SelfCheck | None) -> dict[str, Any]:
-    """Return what was found for the result, empty for a run of one model."""
+    """Return the self-check as a section of the result, empty for a run with one model."""
     return {"self_check": asdict(checked)} if checked else {}
 
 
 def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels) -> SelfCheck:
-    """Try the ties and the interface of two models; collective over ``world``."""
+    """Check fields, forces and masses through ties and interface of two models; collective over ``world``."""
     size = max(float(np.ptp(body.local.points, axis=0).max()) for body in bodies.values())
     size = world.allreduce(size, MPI.MAX)
     rigid, linear = (field_error(bodies, channels, gradient, size) for gradient in (RIGID, LINEAR))
@@ -88,29 +88,29 @@ def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: Interface
 def field_error(
     bodies: Mapping[Role, Body], channels: InterfaceChannels, gradient: NDArray[np.float64], size: float
 ) -> float:
-    """Return the largest error of a linear field on this rank, at slaves and where the meso model received it."""
+    """Return the largest relative error of a linear field on this rank, at slaves and received interface values."""
     error = 0.0
     for role in sorted(bodies):  # the macro model sends before a rank that has both receives
         body = bodies[role]
         exact = body.local.points @ gradient + size * SHIFT
         values = exact.copy()
-        wanted = body.tie.slave
+        checked_nodes = body.tie.slave
         if role == "meso":
-            here = body.interface[body.interface >= 0]
-            values[here] = np.nan
+            interface = body.interface[body.interface >= 0]
+            values[interface] = np.nan
             channels.velocities.receive(values)
-            wanted = np.concatenate([wanted, here])
+            checked_nodes = np.concatenate([checked_nodes, interface])
         body.tie.spread(values)
         if role == "macro":
             channels.velocities.send(values)
-        error = max(error, float(np.abs(values[wanted] - exact[wanted]).max(initial=0.0)) / size)
+        error = max(error, float(np.abs(values[checked_nodes] - exact[checked_nodes]).max(initial=0.0)) / size)
     return error
 
 
 def load_errors(
     world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels, size: float
 ) -> tuple[float, float]:
-    """Return the net load that ties, and that the interface, lose of the sum of magnitudes; collective."""
+    """Return the relative net load lost by the ties and at the interface; collective."""
     lost, amount = np.zeros((2, 6)), np.zeros(2)
     for role in sorted(bodies, reverse=True):  # now the meso model sends
         body = bodies[role]
@@ -122,17 +122,17 @@ def load_errors(
         body.tie.gather(force)
         body.shared.add(force)
         lost[0] -= net_load(points[owned], force[owned])
-        here = body.interface[body.interface >= 0]
-        here = here[owned[here]]
+        nodes = body.interface[body.interface >= 0]
+        nodes = nodes[owned[nodes]]
         if role == "meso":
-            force = np.sin(size * 7.0 + 1e3 * points / size)  # the same on all copies of a node
+            force = np.sin(size * 7.0 + 1e3 * points / size)  # equal on all copies of a node
             channels.forces.send(force)
-            lost[1] += net_load(points[here], force[here])
-            amount[1] += float(np.abs(force[here]).sum())
+            lost[1] += net_load(points[nodes], force[nodes])
+            amount[1] += float(np.abs(force[nodes]).sum())
         else:
             force[:] = 0.0
             channels.forces.receive(force)
-            lost[1] -= net_load(points[here], force[here])
+            lost[1] -= net_load(points[nodes], force[nodes])
     lost, amount = world.allreduce(lost), world.allreduce(amount)
     scale = np.where(amount > 0.0, amount, 1.0)[:, None] * np.array([1.0] * 3 + [size] * 3)
     tie, interface = np.abs(lost / scale).max(axis=1)
@@ -140,11 +140,11 @@ def load_errors(
 
 
 def masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
-    """Return this rank's masses ``(4,)`` [kg]: macro model, interface, rest of the meso model, volumes and lumped."""
-    found = np.zeros(4)
+    """Return this rank's masses of macro model, interface, rest of the meso model, and volumes, shape (4,) [kg]."""
+    result = np.zeros(4)
     for role, body in bodies.items():
-        own = np.where(body.shared.owned, body.mass, 0.0)
-        at_interface = float(own[body.interface[body.interface >= 0]].sum())
-        found[:3] += [own.sum(), 0.0, 0.0] if role == "macro" else [0.0, at_interface, own.sum() - at_interface]
-        found[3] += float(body.elements.density @ body.geometry.volume) + body.lumped
-    return found
+        mass = np.where(body.shared.owned, body.mass, 0.0)
+        at_interface = float(mass[body.interface[body.interface >= 0]].sum())
+        result[:3] += [mass.sum(), 0.0, 0.0] if role == "macro" else [0.0, at_interface, mass.sum() - at_interface]
+        result[3] += float(body.elements.density @ body.geometry.volume) + body.lumped
+    return result

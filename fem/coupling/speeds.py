@@ -1,9 +1,8 @@
-"""What an update of an element costs each rank: the program's own force terms, timed on samples of the mesh.
+"""Measured cost of an element update on each rank, with the program's own force terms on samples of the mesh.
 
-Elements are of five families, which ``force.force_terms`` computes in five ways: boxes that share stiffnesses, other
-linear ones whose matrices are assembled, those with a path, boxes that turn, and other hexahedra that turn. A step
-costs a fixed part (calls) and one per element (force, and update of its nodes); two samples of different size tell them
-apart.
+There are five element families, one for each kind of force term of ``force.force_terms``: boxes with shared stiffness,
+other linear elements (assembled), path-dependent elements, corotational boxes, and other corotational hexahedra. A step
+has a fixed cost (calls) and a cost per element (force, update of nodes), from two samples of different size.
 """
 
 import time
@@ -24,20 +23,20 @@ from reflowshock.materials.parameters import Material
 
 FAMILIES = ("box", "assembled", "path", "turning_box", "turning")
 LARGE, SMALL = 8192, 128  # elements of a sample; the large one is no larger than a rank's share
-BATCHES, BATCH_SECONDS = 24, 0.001  # short: some fall between two turns of another program on the core
-ALIKE = 1.2  # ratio of two speeds below which they may be one, measured twice
+BATCHES, BATCH_SECONDS = 24, 0.001  # short batches, so that some run undisturbed by other programs
+ALIKE = 1.2  # ratio of speeds below which they count as equal
 MESSAGE_ROWS, MESSAGES = 500, 40
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What decides on the family of elements besides their shape.
+    """Properties that determine the element family, apart from the shape.
 
     Attributes:
         materials: Material of each part.
-        formulation: Of hexahedra.
-        kinematics: Whether rotations and strains are small.
-        step: dt [s].
+        formulation: Formulation of hexahedra.
+        kinematics: Small, corotational or finite kinematics.
+        step: Time step dt [s].
     """
 
     materials: Sequence[Material]
@@ -48,11 +47,11 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class StepCost:
-    """Seconds of a step, by family, of one rank ``(5,)`` or of all of them ``(ranks, 5)``.
+    """Cost of a step by element family, shape (5,) for one rank or (ranks, 5) for all ranks.
 
     Attributes:
-        fixed: Of one step, however many elements.
-        element: Of each element.
+        fixed: Fixed time of a step [s].
+        element: Time per element [s].
     """
 
     fixed: NDArray[np.float64]
@@ -60,7 +59,7 @@ class StepCost:
 
 
 def families(mesh: MeshData, kind: Kind) -> NDArray[np.int8]:
-    """Return the family ``(ne,)`` of each element."""
+    """Return the family of each element as an index into ``FAMILIES``, shape (ne,)."""
     elastic = np.array([material.plasticity is None for material in kind.materials])[mesh.part]
     linear = elastic & (kind.kinematics == "small")
     box = is_box(mesh.points[mesh.cells])
@@ -85,31 +84,33 @@ def some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshDat
     return without_unused_nodes(MeshData(mesh.points, mesh.cells[taken], mesh.part[taken], mesh.part_names, {}))[0]
 
 
-def measured_costs(world: MPI.Comm, found: Mapping[int, tuple[MeshData, MeshData, Kind]]) -> StepCost:
-    """Time a small and a large sample of each family on all ranks at the same time, as a run would be; collective.
+def measured_costs(world: MPI.Comm, chosen: Mapping[int, tuple[MeshData, MeshData, Kind]]) -> StepCost:
+    """Time a small and a large sample of each family on all ranks simultaneously, as in a run; collective.
 
     Returns:
-        ``(ranks, 5)``; zero for families without a sample.
+        Costs of shape (ranks, 5), zero for families without a sample.
     """
     fixed, element = np.zeros(len(FAMILIES)), np.zeros(len(FAMILIES))
-    for number, (small, large, kind) in found.items():
+    for number, (small, large, kind) in chosen.items():
         terms = [sample_terms(sample, kind) for sample in (small, large)]
         world.Barrier()
         first, second = (
             seconds_of_step(term, len(mesh.points)) for term, mesh in zip(terms, (small, large), strict=True)
         )
-        fixed[number], element[number] = line_through((len(small.cells), first), (len(large.cells), second))
+        fixed[number], element[number] = fit_step_cost(len(small.cells), first, len(large.cells), second)
     return StepCost(np.array(world.allgather(fixed)), np.array(world.allgather(element)))
 
 
-def line_through(small: tuple[int, float], large: tuple[int, float]) -> tuple[float, float]:
-    """Return the fixed seconds of a step and those of each element, from two samples: elements, seconds.
+def fit_step_cost(
+    small_count: int, small_seconds: float, large_count: int, large_seconds: float
+) -> tuple[float, float]:
+    """Return the fixed time of a step and the time per element [s], from two samples.
 
-    At least half of the large sample's time is its elements'; all else would be a disturbed measurement.
+    The elements take at least half of the time of the large sample; a smaller share would be a disturbed measurement.
     """
-    count = large[0] - small[0]
-    element = max((large[1] - small[1]) / count if count else 0.0, 0.5 * large[1] / large[0])
-    return max(large[1] - element * large[0], 0.0), element
+    count = large_count - small_count
+    element = max((large_seconds - small_seconds) / count if count else 0.0, 0.5 * large_seconds / large_count)
+    return max(large_seconds - element * large_count, 0.0), element
 
 
 def sample_terms(sample: MeshData, kind: Kind) -> list[ForceTerm]:
@@ -119,9 +120,9 @@ def sample_terms(sample: MeshData, kind: Kind) -> list[ForceTerm]:
 
 
 def seconds_of_step(terms: Sequence[ForceTerm], nodes: int) -> float:
-    """Return the seconds of a step of some terms with ``nodes`` nodes at rest: the least of a few batches."""
+    """Return the time of a step of force terms with ``nodes`` nodes at rest, the minimum of several batches [s]."""
     state, gravity = np.zeros((3, nodes, 3)), np.zeros(3)
-    mobility = np.zeros((nodes, 3))  # nothing moves: a step that no element bears would turn them inside out
+    mobility = np.zeros((nodes, 3))  # nodes stay at rest, since the step may be unstable for these elements
 
     def steps(count: int) -> float:
         begin = time.perf_counter()
@@ -138,22 +139,22 @@ def seconds_of_step(terms: Sequence[ForceTerm], nodes: int) -> float:
 
 
 def measured_latency(world: MPI.Comm) -> float:
-    """Return the seconds of a message of some nodes between neighbours, the largest of all ranks; collective."""
+    """Return the median time of a message between neighbouring ranks, the largest of all ranks [s]; collective."""
     sent, received = np.zeros((MESSAGE_ROWS, 3)), np.empty((MESSAGE_ROWS, 3))
-    before, after = (world.rank - 1) % world.size, (world.rank + 1) % world.size
+    previous, following = (world.rank - 1) % world.size, (world.rank + 1) % world.size
     world.Barrier()
     seconds = []
     for _ in range(MESSAGES if world.size > 1 else 0):
         begin = time.perf_counter()
-        world.Sendrecv(sent, after, recvbuf=received, source=before)
+        world.Sendrecv(sent, following, recvbuf=received, source=previous)
         seconds.append(time.perf_counter() - begin)
     return float(world.allreduce(float(np.median(seconds)) if seconds else 0.0, MPI.MAX))
 
 
 def speeds_of(seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the speed ``(ranks,)`` of each rank from the seconds ``(ranks,)`` that it needs for the same work.
+    """Return the relative speed of each rank, shape (ranks,), from its time for the same work, shape (ranks,) [s].
 
-    Their mean is one; ranks as fast as each other but for the error of a measurement are alike.
+    The mean speed is one; speeds that differ only by measurement error are set equal.
     """
     speeds = 1.0 / seconds
     return np.ones(len(speeds)) if speeds.max() < ALIKE * speeds.min() else speeds / speeds.mean()

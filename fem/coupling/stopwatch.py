@@ -1,4 +1,4 @@
-"""Where the time of windows goes: each model's turns on each rank, and what of them is packing and waiting."""
+"""Timing of windows: turns of each model on each rank, with the shares of packing and waiting."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -12,18 +12,18 @@ from reflowshock.fem.parallel.exchange import MessageClock
 
 
 class Stopwatch:
-    """Takes the time of turns, read a few times a window.
+    """Stopwatch for the turns of the models in a window.
 
     Attributes:
-        turns: Seconds that each model of this rank has had.
-        core_seconds: Of the processor in all turns, waiting included where it keeps the core busy.
+        turns: Time of each model on this rank [s].
+        core_seconds: Processor time of all turns, busy waiting included [s].
     """
 
     def __init__(self, sums: Mapping[Role, MessageClock], coupling: Sequence[MessageClock] = ()) -> None:
         """Start at zero.
 
         Args:
-            sums: Of each model of this rank, the clock of sums over nodes that ranks share.
+            sums: Clock of the sums over shared nodes for each model of this rank.
             coupling: Clocks of the channels between the models.
         """
         self.turns: dict[Role, float] = dict.fromkeys(sums, 0.0)
@@ -32,13 +32,13 @@ class Stopwatch:
         self._counted = [(clock, MessageClock()) for clock in [*sums.values(), *coupling]]
 
     def start(self) -> None:
-        """Begin a window; messages since the one before are of samples, and do not count."""
+        """Begin a window; messages since the previous one belong to samples and are not counted."""
         for clock, counted in self._counted:
             clock.packing, clock.waiting = counted.packing, counted.waiting
         self._begin, self._core_begin = time.perf_counter(), time.process_time()
 
     def lap(self, role: Role) -> None:
-        """Count the time since the start or the last lap for a model."""
+        """Add the time since the start or the last lap to a model."""
         end, core_end = time.perf_counter(), time.process_time()
         self.turns[role] += end - self._begin
         self.core_seconds += core_end - self._core_begin
@@ -47,7 +47,7 @@ class Stopwatch:
             counted.packing, counted.waiting = clock.packing, clock.waiting
 
     def summary(self, world: MPI.Comm, windows: int) -> dict[str, Any]:
-        """Return shares of the time of all windows, on each rank and in all; collective.
+        """Return window times and their shares on each rank and in total; collective.
 
         ``coupling_overhead`` is what the rank that others wait for spends on the coupling, packing and messages: its
         share is that of the rank with the least. Waiting for the other model is in ``busy_share``, as is waiting
@@ -68,7 +68,7 @@ class Stopwatch:
         }
 
     def _record(self) -> dict[str, Any]:
-        """Return the seconds of this rank."""
+        """Return the times of this rank [s]."""
         self.start()
         return {
             "turns": self.turns,

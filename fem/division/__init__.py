@@ -1,1 +1,1 @@
-"""Which cells are whose: macro or meso model, and which step level; start with `divide.py`."""
+"""Division of a mesh into macro and meso model and into step levels; start with `divide.py`."""

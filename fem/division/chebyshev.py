@@ -1,4 +1,4 @@
-"""Coefficients of stabilised leapfrog steps inside one step: Chebyshev polynomials shifted a little.
+"""Coefficients of stabilised leapfrog substeps, from shifted Chebyshev polynomials.
 
 With z = DT^2 M^-1 K, p small steps from rest make q_p = T_p(delta - z / omega) / T_p(delta) q_0 of q_0,
 delta = 1 + nu / p^2, omega = 2 T_p'(delta) / T_p(delta) (Carle, Hochbruck & Sturm, SIAM J. Numer. Anal. 58, 2020;
@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 from reflowshock.fem.errors import LevelError
 
 LARGEST_DAMPING, ROUNDING = 0.03, 1e-9
-FIRST, GROWTH = 0.15, 2.5  # nu of the outermost level; each inner one must stay below what the level around it bears
+FIRST, GROWTH = 0.15, 2.5  # nu of the outermost level, and its growth from level to level inwards
 
 
 @dataclass(frozen=True, slots=True)
 class Substeps:
-    """The p small steps of one level inside a step DT of the level around it.
+    """Coefficients of the p substeps of one level inside a step DT of the surrounding level.
 
     Substep k changes the displacement by d_k = memory_k d_{k-1} + rate_k DT^2 f(q_k) / m. The mean force of the step,
     by which q_p = q_0 + DT^2 f / (2 m), is the sum of weight_k f(q_k): weights are positive and add up to one.
 
     Attributes:
-        memory: ``(p,)``, the first is zero.
-        rate: ``(p,)``.
-        weight: ``(p,)``.
-        reach: Largest z over that of p leapfrog steps, 4 p^2, as a ratio of steps: its square root.
+        memory: Factor on the previous displacement change, shape (p,); the first is zero.
+        rate: Factor on DT^2 times the acceleration, shape (p,).
+        weight: Weight of each substep in the mean force, shape (p,).
+        reach: Largest stable step relative to p plain leapfrog steps.
     """
 
     memory: NDArray[np.float64]
@@ -46,14 +46,14 @@ class Substeps:
         memory = np.concatenate([[0.0], value[: count - 1] / value[2:]])
         weight = np.empty(count)
         following = 0.0
-        for k in range(count - 1, -1, -1):  # what a unit of d_k adds to q_p: itself, and its memory in all later ones
+        for k in range(count - 1, -1, -1):  # contribution of d_k to q_p, with its memory in all later substeps
             following = 1.0 + (memory[k + 1] * following if k + 1 < count else 0.0)
             weight[k] = 2.0 * rate[k] * following
         return cls(memory, rate, weight, float(np.sqrt(omega * (1.0 + delta))) / (2.0 * count))
 
 
 def stabilisation(level: int, damping: float = 0.0) -> float:
-    """Return nu of a level.
+    """Return the stabilisation parameter nu of a level.
 
     A step of an inner level is itself a leapfrog whose highest frequencies reach z = 4 / (1 + nu) or so, whatever the
     elements: nu must grow inwards for that to stay below the reach of the level around it. ``FIRST`` and ``GROWTH``
@@ -62,23 +62,23 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
     many substeps is lowered by as much.
 
     Args:
-        level: 1 is the outermost.
-        damping: beta / DT of the model's step, at most ``LARGEST_DAMPING``.
+        level: Number of the level, 1 for the outermost.
+        damping: Coefficient beta over the step DT of the model, at most ``LARGEST_DAMPING``.
 
     Raises:
         LevelError: The damping is too strong.
     """
     if damping > LARGEST_DAMPING * (1.0 + ROUNDING):
         raise LevelError(
-            f"damping.stiffness_coefficient is {damping:.3g} times the window, too strong for levels, which bear"
-            f" {LARGEST_DAMPING:g} times it: at most {LARGEST_DAMPING / damping:.3g} of it, or scheme = held_velocity"
+            f"damping.stiffness_coefficient = {damping:.3g} windows is too large for local time steps; the limit is"
+            f" {LARGEST_DAMPING:g} windows, {LARGEST_DAMPING / damping:.3g} of it; or use scheme = held_velocity"
         )
     largest = (2.0 + 2.0 / np.cosh(np.sqrt(2.0 * FIRST))) / (1.0 + 2.0 * damping)
     return float(0.5 * np.arccosh(2.0 / (largest - 2.0)) ** 2) * GROWTH ** (level - 1)
 
 
 def chebyshev(degree: int, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return T_k(x) and T_k'(x) for k = 0 ... degree: ``(degree + 1,)`` each."""
+    """Return the Chebyshev polynomials T_k(x) and T_k'(x) for k = 0 ... degree, each of shape (degree + 1,)."""
     value, slope = np.ones(degree + 1), np.zeros(degree + 1)
     value[1], slope[1] = x, 1.0
     for k in range(1, degree):

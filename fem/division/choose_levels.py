@@ -1,4 +1,4 @@
-"""Which level each element takes its steps at, and how many steps: least predicted cost of a window."""
+"""Choice of step levels and step ratios by the least predicted cost of a window."""
 
 import math
 from collections.abc import Iterator
@@ -15,21 +15,21 @@ from reflowshock.fem.errors import LevelError
 if TYPE_CHECKING:  # a plan loads no compiled kernels
     from reflowshock.fem.mesh.tie import Tie
 
-SUBSTEP_COST = 500.0  # updates of boxes in the time of one substep without elements: kernel calls, messages
+SUBSTEP_COST = 500.0  # fixed cost of a substep (kernel calls, messages), in updates of a box
 LARGEST_RATIO = 64
 ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """What the steps of a window follow.
+    """Critical steps and costs from which the step levels follow.
 
     Attributes:
-        steps: ``(ne,)`` critical step of each element [s].
-        cost: ``(ne,)`` cost of an update of each element, in those of a box.
+        steps: Critical step of each element, shape (ne,) [s].
+        cost: Cost of an update of each element, in updates of a box, shape (ne,).
         window: Step of level 0 [s].
-        fraction: Largest step over critical step, the latter without damping.
-        stiffness: beta of damping [s].
+        fraction: Largest allowed step over undamped critical step.
+        stiffness: Coefficient beta of stiffness-proportional damping [s].
     """
 
     steps: NDArray[np.float64]
@@ -40,15 +40,15 @@ class Pace:
 
     @property
     def damping(self) -> float:
-        """Return beta over the window."""
+        """Coefficient beta over the window."""
         return self.stiffness / self.window
 
     @property
     def outermost(self) -> float:
-        """Return the smallest step [s], times the fraction, of an element that takes the window.
+        """Smallest critical step times fraction of an element that can take the window [s].
 
-        Damping needs DT^2 (1 + 2 beta / DT) below the square of the critical step; inside levels it is their nu that
-        makes room for it.
+        Damping requires DT^2 (1 + 2 beta / DT) below the square of the critical step; inside levels their nu accounts
+        for it.
         """
         return self.window * math.sqrt(1.0 + 2.0 * self.fraction * self.damping)
 
@@ -62,17 +62,17 @@ def choose_levels(
     nodes: so it grows by one layer of elements that could take larger steps.
 
     Args:
-        cells: ``(ne, k)``.
-        tie: Its slaves and masters.
-        pace: Steps and cost of the elements.
+        cells: Nodes of each element, shape (ne, k).
+        tie: Slaves and masters of the mesh.
+        pace: Critical steps and costs of the elements.
         most: Largest number of levels below the window, at least 1.
 
     Returns:
-        Level of each element ``(ne,)`` int32, 0 for the window; steps of level k + 1 in one of level k, empty where
-        all elements take the window.
+        Level of each element, 0 for the window, shape (ne,) int32, and the ratios: steps of level k + 1 in one step of
+        level k, empty if all elements take the window.
 
     Raises:
-        LevelError: The elements need more than ``LARGEST_RATIO`` steps of a level.
+        LevelError: The elements need more than ``LARGEST_RATIO`` steps in a level.
     """
     needed = governing_steps(cells, tie, pace.fraction * pace.steps)
     if needed.min() >= pace.outermost * (1.0 - ROUNDING):
@@ -83,17 +83,16 @@ def choose_levels(
     if not candidates:
         raise LevelError(
             f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
-            f" {needed.min():.3e} s: allowed are {LARGEST_RATIO} steps a level, and {most} levels"
+            f" {needed.min():.3e} s; allowed: {LARGEST_RATIO} steps per level and {most} levels"
         )
     ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, pace)))]
     return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
 
 
 def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return for each element the smallest of the steps ``(ne,)`` of all elements that share a node with it.
+    """Return the smallest critical step, shape (ne,), among all elements that share a node with each element.
 
-    Slaves stand for their masters. The level of an element is that of the largest at one of its nodes, which is that
-    of the smallest step at this node.
+    Slaves count as their masters. This step determines the level of the element.
     """
     node = np.full(int(max(cells.max(), tie.master.max(initial=0), tie.slave.max(initial=0))) + 1, np.inf)
     np.minimum.at(node, cells.ravel(), np.repeat(steps, cells.shape[1]))
@@ -103,7 +102,7 @@ def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.floa
 
 
 def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
-    """Return the smallest critical step times the fraction that levels 0, 1, ... bear: ``(levels + 1,)`` [s]."""
+    """Return the smallest usable critical step (times fraction) at levels 0, 1, ..., shape (levels + 1,) [s]."""
     counts = np.cumprod(ratios)
     reaches = [reach_of(ratio, level, pace.damping) for level, ratio in enumerate(ratios, 1)]
     return np.array([pace.outermost, *(pace.window / (counts * reaches))]) * (1.0 - ROUNDING)
@@ -111,18 +110,18 @@ def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
 
 @cache
 def reach_of(ratio: int, level: int, damping: float) -> float:
-    """Return how far the substeps of a level reach, of those of leapfrog."""
+    """Return the largest stable step of a level's substeps relative to plain leapfrog, see ``Substeps``."""
     return Substeps.of(ratio, level, damping).reach
 
 
 def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
-    """Yield ratios of one to ``most`` levels that make ``needed`` steps of a window.
+    """Yield the ratios of one to ``most`` levels that divide a window into at least ``needed`` steps.
 
     Args:
-        pace: What the steps follow.
-        needed: Step of level 0 over the smallest one.
-        inner: Ratios of the levels around.
-        most: Levels that may follow.
+        pace: Critical steps and costs of the elements.
+        needed: Step of level 0 over the smallest step.
+        inner: Ratios of the surrounding levels.
+        most: Largest number of further levels.
     """
     level = len(inner) + 1
     for ratio in range(2, LARGEST_RATIO + 1):
@@ -137,15 +136,15 @@ def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> 
 def window_costs(
     candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], pace: Pace
 ) -> NDArray[np.float64]:
-    """Return the cost of a window for each candidate: elements of each level times their steps, and of each substep.
+    """Return the predicted cost of a window for each candidate, for element updates and substeps.
 
-    There may be a quarter of a million: those of as many levels are taken at once.
+    There may be 250 000 candidates, so all candidates with the same number of levels are evaluated together.
 
     Args:
         candidates: Ratios of the levels.
-        needed: ``(ne,)`` step that each element needs, ascending [s].
-        cost: ``(ne + 1,)`` sum of the costs of an update of the first elements.
-        pace: What the steps follow.
+        needed: Required step of each element in ascending order, shape (ne,) [s].
+        cost: Cumulative cost of an update of the elements in this order, shape (ne + 1,).
+        pace: Critical steps and costs of the elements.
     """
     totals = np.empty(len(candidates))
     lengths = np.array([len(ratios) for ratios in candidates])

@@ -1,4 +1,4 @@
-"""The choice of models, levels and window from the cells of a whole mesh and their critical steps."""
+"""Division of a mesh into models, levels and windows, from its cells and their critical steps."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,17 +18,17 @@ from reflowshock.fem.estimates.estimate import (
     damped_critical_step,
 )
 
-# Of the coarse cells, those that may need less than the window: none, a few at the walls of holes, the finer half.
+# Fraction of coarse cells that may need less than the window: none, a few at the walls of holes, the finer half.
 EXCEPTIONS = (0.0, 0.02, 0.5)
 SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
 WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updates of a box
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Choose scheme, models, levels and window; ``checks.check_division`` says whether they can be coupled.
+    """Choose scheme, models, levels and window; ``checks.check_division`` then checks the result.
 
     Raises:
-        LevelError: Steps that differ by more than levels bridge.
+        LevelError: The critical steps differ by more than the levels allow.
     """
     choice = scheme_for(whole, survey, rules)
     if rules.copied is not None and rules.copy is not None:
@@ -43,14 +43,14 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme for a mesh, with the reason; errors as ``decide_scheme``."""
+    """Return the scheme for a mesh, with the reason; raises as ``decide_scheme``."""
     return decide_scheme(
         rules, survey.step, bool(survey.linear.all()), lambda: bool(by_buffer(whole, survey, rules).macro.any())
     )
 
 
 def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the meso model all that is no board, and some layers of board around it: held velocity.
+    """Return the division of held velocity: the meso model is all but the board, plus layers of board around it.
 
     The window follows the macro model and all cells that touch the interface (PHYSICS 4).
     """
@@ -60,7 +60,7 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the models the cells that ``by_buffer`` gives them, and the meso model levels where nothing else acts."""
+    """Return the division of ``by_buffer``, with levels in the meso model if no load or damping forbids them."""
     division = by_buffer(whole, survey, rules)
     meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
     pushed = rules.pushed or meso[list(rules.shaken)].any()
@@ -77,12 +77,12 @@ def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the models the cells that they have with held velocity; the interface is the meso model's: impulses."""
+    """Return the division of the impulse scheme: the cells of held velocity, the interface in the meso model."""
     return replace(by_buffer(whole, survey, rules), scheme="impulse")
 
 
 def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
-    """Return the division of held velocity whose meso model has given cells ``(ne,)``."""
+    """Return the division of held velocity for the cells of the meso model, shape (ne,)."""
     slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
     return in_two_steps("held_velocity", ~meso, meso, plan_windows(rules, slow, survey.step))
 
@@ -90,9 +90,10 @@ def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) ->
 def submodel(
     whole: Whole, survey: Survey, rules: Rules, copied: NDArray[np.bool_], copy: NDArray[np.bool_]
 ) -> Division:
-    """Give the meso model fine cells ``(ne,)`` and layers of all around them; the macro model has all, them as copies.
+    """Return the division of one-way coupling: the meso model has the fine cells and layers of cells around them.
 
-    Layers grow through ties, too: another joint on the same element is in the meso model as coarse as it is.
+    The macro model has the whole structure with coarse copies of the fine cells. Layers grow through ties, too, so
+    another joint on the same element is part of the meso model with its coarse mesh.
     """
     cells, meso = whole.mesh.cells, copied.copy()
     for _ in range(rules.coupling.buffer_layers):
@@ -104,50 +105,50 @@ def submodel(
 
 
 def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` nodes cells of both sides have."""
+    """Return which of ``count`` nodes belong to cells of both models, shape (count,)."""
     return nodes_of(cells, meso, count) & nodes_of(cells, ~meso, count)
 
 
 def at_ties(_whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the meso model all that is no board: Gravouil-Combescure, whose interface is the nodes tied to."""
+    """Return the division of Gravouil-Combescure: the meso model is all but the board, coupled at the tied nodes."""
     plan = plan_windows(rules, rules.coarse, survey.step)
     return in_two_steps("gravouil_combescure", rules.coarse, ~rules.coarse, plan)
 
 
 def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Choose window and levels of least predicted cost: local steps.
+    """Return the division of local steps with the window and levels of least predicted cost.
 
     Raises:
         LevelError: No window allows levels.
     """
     critical = damped_critical_step(survey.step, rules.stiffness)
-    found, failure = [], LevelError("no window was tried")
+    divisions, failure = [], LevelError("no window was tried")
     for step in window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
         try:
-            found.append(levels_below(whole, survey, step, rules))
+            divisions.append(levels_below(whole, survey, step, rules))
         except LevelError as error:
             failure = error
-    if not found:
+    if not divisions:
         raise failure
-    useful = [division for division in found if division.meso.any() and division.macro.any()]
-    return min(useful or found, key=lambda division: predicted_cost(division, survey.cost))
+    useful = [division for division in divisions if division.meso.any() and division.macro.any()]
+    return min(useful or divisions, key=lambda division: predicted_cost(division, survey.cost))
 
 
 def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
-    """Yield critical steps [s] of which the window may be the allowed fraction, from those of coarse cells."""
+    """Yield candidate critical steps for the window [s], from the critical steps of the coarse cells [s]."""
     natural = np.quantile(coarse, EXCEPTIONS, method="lower")
     yield from np.unique(np.outer(natural, SHARES)).tolist()
 
 
 def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
-    """Return the division of the window that follows a critical step [s]; errors as ``choose_levels``."""
+    """Return the division in levels for a window from a critical step [s]; raises as ``choose_levels``."""
     plan = rules.plan(step, step)
     pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
     return in_local_steps(whole.mesh.cells, whole.tie, pace, plan, rules.coupling.most_levels)
 
 
 def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
-    """Return the cost of a second of simulated time in updates of a box, ``cost (ne,)`` that of an update."""
+    """Return the cost per second of simulated time, from the cost of an update of each cell, shape (ne,)."""
     counts = np.cumprod([1, *division.ratios])
     updates = float(cost @ counts[division.level]) + SUBSTEP_COST * float(counts[1:].sum())
     return (updates + WINDOW_COST) / division.plan.window
@@ -156,12 +157,12 @@ def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
 def grown(
     cells: NDArray[np.int32], seeds: NDArray[np.bool_], through: NDArray[np.bool_], layers: int
 ) -> NDArray[np.bool_]:
-    """Return the cells ``(ne,)`` of some layers around seeds, each of which touches a node of the layer before.
+    """Return the cells of several layers around seed nodes, shape (ne,); each layer touches the previous one.
 
     Args:
-        cells: ``(ne, k)`` nodes.
-        seeds: ``(n,)`` nodes that the first layer touches.
-        through: ``(ne,)`` cells that a layer may have.
+        cells: Nodes of each cell, shape (ne, k).
+        seeds: Nodes that the first layer touches, shape (n,).
+        through: Cells that a layer may contain, shape (ne,).
         layers: Number of layers.
     """
     taken = np.zeros(len(cells), dtype=bool)

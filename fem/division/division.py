@@ -1,4 +1,4 @@
-"""How the cells of a whole mesh are divided: by which rules and scheme, into which models and levels of steps."""
+"""Records of a division of cells into models and step levels, with its rules and coupling scheme."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,26 +11,25 @@ from reflowshock.fem.estimates.estimate import WindowPlan, window_plan
 from reflowshock.fem.problem.shock import Coupling, Shock
 
 SchemeName = Literal["held_velocity", "local_steps", "impulse", "gravouil_combescure"]
-BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes whose interface lies below layers of board
+BUFFERED: tuple[SchemeName, ...] = ("held_velocity", "impulse")  # schemes with layers of board around the joints
 
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """What a division follows.
+    """Input of a division.
 
     Attributes:
-        coupling: What the user wants.
-        coarse: ``(ne,)`` cells that are the macro model's where velocities or forces are coupled: a board's.
-        fraction: Of the critical step that is used.
-        stiffness: beta of damping [s].
+        coupling: Coupling settings of the user.
+        coarse: Cells of the macro model in two-way coupling, those of the board, shape (ne,).
+        fraction: Step over critical step.
+        stiffness: Coefficient beta of stiffness-proportional damping [s].
         duration: Simulated time [s].
-        samples: History samples wanted.
-        copied: One way, ``(ne,)`` fine cells of which the driving model has a coarse copy.
-        copy: These copies.
+        samples: Number of history samples.
+        copied: Fine cells of which the driving model has a coarse copy, shape (ne,); only for one-way coupling.
+        copy: Coarse copies of these cells, shape (ne,); only for one-way coupling.
         sprung: Whether supports have springs.
-        pushed: Whether more than body accelerations and elements act in the meso model: damping, springs, stress at
-            rest.
-        shaken: ``(k,)`` nodes on which a large mass acts.
+        pushed: Whether damping, springs or initial stress act in the meso model.
+        shaken: Nodes on which a large mass acts, shape (k,).
     """
 
     coupling: Coupling
@@ -62,23 +61,23 @@ class Rules:
         )
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:
-        """Return the windows that follow from two critical steps [s]."""
+        """Return windows and substeps for the critical steps of macro and meso model [s]."""
         return window_plan(macro_step, meso_step, self.fraction, self.duration, self.samples)
 
 
 @dataclass(frozen=True, slots=True)
 class Division:
-    """The cells of each model, and the steps that they take.
+    """Cells of each model and their step levels.
 
     Attributes:
-        scheme: How the models are coupled.
-        macro: ``(ne,)`` cells of the macro model; all of them where there is one model only.
-        meso: ``(ne,)`` cells of the meso model: the others, unless the macro model takes nothing back from it.
-        level: ``(ne,)`` int32 level of the step of each cell, 0 for the window.
-        ratios: Steps of level k + 1 in one of level k.
-        plan: Window and substeps.
-        copy: One way, ``(ne,)`` cells of the macro model that stand for finer ones of the meso model.
-        why: Why this scheme, in words.
+        scheme: Coupling scheme.
+        macro: Cells of the macro model, shape (ne,).
+        meso: Cells of the meso model, shape (ne,); both models overlap only in one-way coupling.
+        level: Step level of each cell, 0 for the window, shape (ne,) int32.
+        ratios: Steps of level k + 1 in one step of level k.
+        plan: Windows and substeps.
+        copy: Cells of the macro model that represent finer cells of the meso model, shape (ne,), or None.
+        why: Reason for the scheme.
     """
 
     scheme: SchemeName
@@ -92,28 +91,28 @@ class Division:
 
     @property
     def around(self) -> NDArray[np.bool_]:
-        """Return the cells ``(ne,)`` outside the meso model, up to which it reaches."""
+        """Cells outside the meso model, without coarse copies, shape (ne,)."""
         outside = self.macro & ~self.meso
         return outside if self.copy is None else outside & ~self.copy
 
     @property
     def overlaps(self) -> bool:
-        """Whether both models have some cells."""
+        """Whether both models have cells in common."""
         return bool((self.macro & self.meso).any())
 
     @property
     def local(self) -> bool:
-        """Whether levels are inside the meso model's force; else its motion has the step of the innermost one."""
+        """Whether the levels are inside the force term of the meso model (local time steps)."""
         return self.scheme == "local_steps"
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """Return the steps ``(levels + 1,)`` of each level in a window."""
+        """Steps of each level in a window, shape (levels + 1,)."""
         return np.cumprod([1, *self.ratios])
 
     @property
     def every(self) -> NDArray[np.int32]:
-        """Return in how many steps of its model's motion each cell ``(ne,)`` acts once."""
+        """Pace of each cell: number of steps of its model in which it acts once, shape (ne,)."""
         if self.local:
             return np.ones(len(self.level), np.int32)
         rest = self.plan.substeps // self.counts
@@ -121,34 +120,35 @@ class Division:
 
     @property
     def meso_step(self) -> float:
-        """Return the step of the meso model's motion [s]: with local steps these are inside its force."""
+        """Step of the meso model's motion [s], which is the window if local steps are inside its force term."""
         return self.plan.window if self.local else self.plan.step
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A scheme, and the reason in words."""
+    """Coupling scheme and the reason for it."""
 
     scheme: SchemeName
     why: str
 
 
 def choose_scheme(elastic: bool, buffer_possible: bool) -> Choice:
-    """Choose the scheme of a two-way run whose user leaves it open.
+    """Choose the scheme of a two-way run with ``scheme = "auto"``.
 
-    All are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps keep energy and
-    momentum but know no path: plastic strains would be those of a mean motion, half as large or twice (PHYSICS 4). Held
-    velocity lets both models work at the same time; impulses, which keep momentum exactly along a path, do not, and are
-    taken where the user asks for them. Gravouil-Combescure's link takes energy from what moves, and waits, too.
+    All schemes are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps conserve
+    energy and momentum, but support no path-dependent materials: plastic strains would follow a mean motion and be
+    wrong by a factor of two (PHYSICS 4). Held velocity advances both models concurrently. Impulses conserve momentum
+    exactly with path-dependent materials, but the models alternate, so they are used only on request.
+    Gravouil-Combescure dissipates energy at the interface, and the models alternate, too.
 
     Args:
-        elastic: Whether all of the meso model is linear elastic at small strains.
-        buffer_possible: Whether two layers of board fit between what is fine and the macro model.
+        elastic: Whether the whole meso model is linear elastic at small strains.
+        buffer_possible: Whether two layers of board fit between fine cells and the macro model.
     """
     if elastic:
-        return Choice("local_steps", "all that takes small steps is linear elastic at small strains")
+        return Choice("local_steps", "all elements with small steps are linear elastic at small strains")
     if buffer_possible:
-        return Choice("held_velocity", "what takes small steps depends on its path; layers of board fit around it")
+        return Choice("held_velocity", "elements with small steps are path-dependent; layers of board fit around them")
     return Choice(
-        "gravouil_combescure", "what takes small steps depends on its path; no two layers of board fit around it"
+        "gravouil_combescure", "elements with small steps are path-dependent; no two layers of board fit around them"
     )

@@ -1,4 +1,4 @@
-"""Which joints of a package are fine: all others have the coarse mesh."""
+"""Selection of fine joints; all other joints of a package get the coarse mesh."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -19,10 +19,10 @@ KEY = "shock.coupling.fine_joints"
 
 
 def read_package(request: PackageInput) -> MeshData:
-    """Read the meshes of a run, each joint fine or coarse as it asks for.
+    """Read the meshes of a run, with fine or coarse joints as requested.
 
     Raises:
-        MeshError: As ``with_coarse_joints``, or joints are to be coarse and no file has them.
+        MeshError: A joint is unknown, or no file has the coarse joints.
     """
     fine = request.shock.coupling.fine_joints
     mesh = read_meshes(request.meshes)
@@ -32,7 +32,7 @@ def read_package(request: PackageInput) -> MeshData:
     if fine == "all":
         return mesh
     if isinstance(fine, str):
-        raise MeshError(f'{KEY} = "{fine}" names no joint: a run takes a list of names, or "all"')
+        raise MeshError(f'{KEY} = "{fine}" is not a joint; allowed: a list of names, or "all"')
     return with_coarse_joints(mesh, read_coarse(request.coarse_joints), fine)
 
 
@@ -40,7 +40,7 @@ def read_coarse(path: Path | None) -> MeshData:
     """Read the mesh of coarse joints.
 
     Raises:
-        MeshError: There is none.
+        MeshError: There is no such file.
     """
     if path is None:
         raise MeshError(f"{KEY} leaves out some joints, and there is no file of coarse joints (coarse_joints)")
@@ -48,29 +48,30 @@ def read_coarse(path: Path | None) -> MeshData:
 
 
 def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) -> MeshData:
-    """Replace all joints of a mesh but the fine ones by those of another; all keep their order.
+    """Replace all joints of a mesh except the fine ones by coarse joints; the order is unchanged.
 
     Raises:
-        MeshError: An unknown joint, no fine joint at all, or one that neither is fine nor has a coarse mesh.
+        MeshError: A joint is unknown, no joint is fine, or a joint is neither fine nor has a coarse mesh.
     """
-    joints, known = joint_names(mesh), joint_names(coarse)
+    joints, coarse_joints = joint_names(mesh), joint_names(coarse)
     unknown = sorted(set(fine) - set(joints))
     if unknown:
         hint = nearest(unknown[0], joints)
-        asked = f"; did you mean {hint}?" if hint else ""
-        raise MeshError(f"{KEY}: the mesh has no joint {unknown[0]}, allowed: {', '.join(joints)}{asked}")
+        question = f"; did you mean {hint}?" if hint else ""
+        raise MeshError(f"{KEY}: the mesh has no joint {unknown[0]}, allowed: {', '.join(joints)}{question}")
     if not fine:
         raise MeshError(f"{KEY} is empty: no joint would be fine, allowed: {', '.join(joints)}")
     others = [name for name in joints if name not in fine]
-    missing = [name for name in others if name not in known]
+    missing = [name for name in others if name not in coarse_joints]
     if missing:
-        raise MeshError(f"{missing[0]} is not fine and has no coarse mesh; coarse joints: {', '.join(known) or 'none'}")
-    kept, _ = select(mesh, lambda part: joint_of(part) not in others)
-    return append([kept, select(coarse, lambda part: joint_of(part) in others)[0]]) if others else mesh
+        available = ", ".join(coarse_joints) or "none"
+        raise MeshError(f"{missing[0]} is not fine and has no coarse mesh; coarse joints: {available}")
+    remaining, _ = select(mesh, lambda part: joint_of(part) not in others)
+    return append([remaining, select(coarse, lambda part: joint_of(part) in others)[0]]) if others else mesh
 
 
 def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
-    """Return coarse joints that stand beside fine ones, as a driving model has them: named apart, and not watched.
+    """Return coarse copies of fine joints for the driving model of one-way coupling, renamed and not watched.
 
     Raises:
         MeshError: A fine joint has no coarse mesh.
@@ -86,12 +87,12 @@ def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
 
 
 def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return the cells ``(ne,)`` of fine joints that have a coarse copy beside them, and of these copies."""
+    """Return masks of the cells of fine joints with a coarse copy, and of these copies, each of shape (ne,)."""
     copy = mesh.in_parts(lambda name: COPY in name)
     copied = {joint_of(mesh.part_names[part]) for part in np.unique(mesh.part[copy])}
     return mesh.in_parts(lambda name: joint_of(name) in copied) & ~copy, copy
 
 
 def joint_of(part: str) -> str:
-    """Return the joint that a part belongs to, empty where it is no joint's."""
+    """Return the joint of a part, empty if the part does not belong to a joint."""
     return part.partition("@")[2]

@@ -1,4 +1,4 @@
-"""From what is fitted to a board or a structure to tables: watch points, strain gauges, supports, lumped masses."""
+"""Tables of the fittings of a board or structure: watch points, strain gauges, supports, lumped masses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,19 +13,19 @@ from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.mesh.point_table import PointTable, Support, point_table
 from reflowshock.fem.problem.fittings import AXES, Fittings, PointMass, StrainGauge
 
-ROUNDING = 1e-9  # of the mesh: closer than that is the same place
+ROUNDING = 1e-9  # distance relative to the mesh below which points coincide
 Shares = tuple[NDArray[np.integer], NDArray[np.float64]]
 Gauge = tuple[NDArray[np.float64], float, NDArray[np.int64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
 class FittedTable:
-    """What is fitted to a mesh, in input numbers.
+    """Fittings of a mesh, in input numbers.
 
     Attributes:
         points: Watch points, gauges and supports.
-        bedded: Name of an elastic support -> its facets.
-        masses: Nodes and what they bear of lumped masses [kg].
+        bedded: Facets of each elastic support by name.
+        masses: Nodes with lumped masses, and the mass at each [kg].
     """
 
     points: PointTable
@@ -35,9 +35,12 @@ class FittedTable:
     def within(
         self, node: NDArray[np.integer], cell: NDArray[np.integer], every_node: NDArray[np.int32]
     ) -> "FittedTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 where another has it.
+        """Return the fittings of one model in its own numbers.
 
-        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        Args:
+            node: Number of each node in the model, -1 if it counts in another model, shape (n,).
+            cell: Number of each cell in the model, -1 if it counts in another model, shape (ne,).
+            every_node: Number of each node in the model, interface nodes included, shape (n,).
         """
         nodes, masses = node[self.masses[0]], self.masses[1]
         bedded = {
@@ -48,18 +51,18 @@ class FittedTable:
 
 
 def fitted(mesh: MeshData, given: Fittings, symmetry: Sequence[str], slaves: NDArray, yields: bool) -> FittedTable:
-    """Find what is fitted to a mesh.
+    """Return the tables of the fittings of a mesh.
 
     Args:
-        mesh: The whole body.
-        given: What is fitted to it.
-        symmetry: Axes whose planes through the origin are planes of symmetry.
-        slaves: Nodes that follow others.
-        yields: Whether plastic strain is watched, too.
+        mesh: Mesh of the whole body.
+        given: Fittings of the input.
+        symmetry: Axes that are normal to a symmetry plane through the origin.
+        slaves: Slave nodes, which follow their masters.
+        yields: Whether plastic strain is watched.
 
     Raises:
-        MeshError: A watch point lies outside.
-        LoadError: A facet set without facets; a mass or the end of a gauge outside.
+        MeshError: A watch point is outside the mesh.
+        LoadError: A facet set is empty, or a mass or the end of a gauge is outside the mesh.
     """
     supports: dict[str, Support] = {
         name: (np.setdiff1d(facet_set(mesh, support.on), slaves), np.isin(list(AXES), support.hold))
@@ -68,13 +71,13 @@ def fitted(mesh: MeshData, given: Fittings, symmetry: Sequence[str], slaves: NDA
     points = point_table(mesh, {name: point.at for name, point in given.watch.items()}, supports, yields)
     return FittedTable(
         points=replace(points, gauges=gauge_table(mesh, given.gauges, symmetry)),
-        bedded={name: outward_facets(mesh, one.on) for name, one in given.supports.items() if one.bedding},
+        bedded={name: outward_facets(mesh, item.on) for name, item in given.supports.items() if item.bedding},
         masses=lumped_masses(mesh, given.masses, symmetry),
     )
 
 
 def fitted_to(mesh: MeshData, chosen: NDArray[np.bool_], given: Fittings, yields: bool) -> FittedTable:
-    """Find what is fitted to some cells ``(ne,)`` of a mesh, the board of a drop; errors as ``fitted``."""
+    """Return the fittings of selected cells of a mesh, shape (ne,), such as the board; raises as ``fitted``."""
     body, number = selected_cells(mesh, chosen)
     symmetry = [axis for axis in AXES if len(body.facets_of(f"symmetry_{axis}"))]
     nodes, cells = np.flatnonzero(number >= 0).astype(np.int32), np.flatnonzero(chosen)
@@ -82,13 +85,13 @@ def fitted_to(mesh: MeshData, chosen: NDArray[np.bool_], given: Fittings, yields
 
 
 def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Sequence[str]) -> Shares:
-    """Return the nodes that bear lumped masses and what each bears [kg]; arguments and errors as ``fitted``."""
+    """Return the nodes with lumped masses and the mass at each [kg]; arguments and errors as in ``fitted``."""
     nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
     margin = ROUNDING * float(np.ptp(mesh.points, axis=0).max())
     for name, item in masses.items():
         for place, part in item.meshed_places(symmetry, margin):
-            found, share = point_shares(mesh, f"masses.{name}.at", place)
-            nodes.append(found)
+            around, share = point_shares(mesh, f"masses.{name}.at", place)
+            nodes.append(around)
             shares.append(item.mass * part * share)
     numbers, where = np.unique(np.concatenate(nodes), return_inverse=True)
     total = np.zeros(len(numbers))
@@ -97,31 +100,31 @@ def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Seq
 
 
 def gauge_table(mesh: MeshData, gauges: Mapping[str, StrainGauge], symmetry: Sequence[str]) -> GaugeTable:
-    """Find the nodes around the ends of gauges; arguments and errors as ``fitted``."""
-    found = [find_gauge(mesh, name, one, symmetry) for name, one in gauges.items()]
-    if not found:
+    """Return the table of strain gauges; arguments and errors as in ``fitted``."""
+    located = [find_gauge(mesh, name, gauge, symmetry) for name, gauge in gauges.items()]
+    if not located:
         return GaugeTable.none()
-    directions, lengths, nodes, weights = zip(*found, strict=True)
+    directions, lengths, nodes, weights = zip(*located, strict=True)
     return GaugeTable(
         names=tuple(gauges),
         direction=np.array(directions),
         length=np.array(lengths),
         nodes=np.concatenate(nodes),
-        gauge=np.repeat(np.arange(len(found)), [len(some) for some in nodes]),
+        gauge=np.repeat(np.arange(len(located)), [len(around) for around in nodes]),
         weight=np.concatenate(weights),
     )
 
 
-def find_gauge(mesh: MeshData, name: str, wanted: StrainGauge, symmetry: Sequence[str]) -> Gauge:
-    """Return direction ``(3,)``, length [m], nodes ``(k,)`` and weights ``(k, 3)`` of a gauge, see ``GaugeTable``.
+def find_gauge(mesh: MeshData, name: str, gauge: StrainGauge, symmetry: Sequence[str]) -> Gauge:
+    """Return direction (3,), length [m], nodes (k,) and weights (k, 3) of a gauge, see ``GaugeTable``.
 
-    An end beyond a plane of symmetry is the mirror image of a place on the mesh.
+    The mirror image replaces an end beyond a symmetry plane.
     """
     heights = mesh.points[mesh.cells][:, :, 2]
-    middle = np.array([*wanted.at, heights.max() if wanted.face == "upper" else heights.min()])
-    direction = np.array([*wanted.direction, 0.0]) / np.linalg.norm(wanted.direction)
+    middle = np.array([*gauge.at, heights.max() if gauge.face == "upper" else heights.min()])
+    direction = np.array([*gauge.direction, 0.0]) / np.linalg.norm(gauge.direction)
     around, _ = point_shares(mesh, f"gauges.{name}.at", tuple(middle.tolist()))
-    length = max(wanted.length, float(np.ptp(mesh.points[around] @ direction)))
+    length = max(gauge.length, float(np.ptp(mesh.points[around] @ direction)))
     nodes, weights = [], []
     for side in (1.0, -1.0):
         end = middle + 0.5 * side * length * direction

@@ -1,8 +1,8 @@
-"""Packages beside the one whose joints are meshed: coarse boxes on posts of solder, tied to the board's upper face.
+"""Coarse models of neighbouring packages: boxes on solder posts, tied to the upper face of the board.
 
-A post has the cross-section of its joint. It shares nodes with the substrate, whose grid has the edges of all posts. A
-layer is one element high: with incompatible modes it bends as it should. Edges of a die move to lines of this grid that
-are closer than ``CLOSE``.
+A post has the cross-section of its joint and shares nodes with the substrate, whose grid contains the edges of all
+posts. Each layer is one element high, which represents bending correctly with incompatible modes. Die edges move to
+grid lines that are closer than ``CLOSE``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,21 +19,21 @@ from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets, without
 from reflowshock.fem.problem.fittings import Neighbour
 from reflowshock.materials.roles import role_of_part
 
-CLOSE = 0.2  # of the pitch: lines that are as close would make elements too small
-ROUNDING = 1e-9  # of a neighbour: closer than that is the same place
+CLOSE = 0.2  # smallest distance of grid lines relative to the pitch
+ROUNDING = 1e-9  # distance relative to the package below which lines coincide
 LAYERS = ("solder", "substrate", "die")
 
 
 def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> MeshData:
-    """Put further packages on the board of a mesh, to be tied to it as ``tie_joints`` asks.
+    """Add neighbouring packages to the board of a mesh, with the facet sets that ``tie_joints`` needs.
 
     Raises:
         MeshError: There is no board below one of them.
     """
     for name, item in neighbours.items():
-        own = neighbour_mesh(name, item)
-        mesh = append([mesh, own])
-        below = facets_below(mesh, own.points[own.facet_nodes(f"slave@neighbour_{name}")])
+        package = neighbour_mesh(name, item)
+        mesh = append([mesh, package])
+        below = facets_below(mesh, package.points[package.facet_nodes(f"slave@neighbour_{name}")])
         if not len(below):
             raise MeshError(f"packages.{name}: there is no board below it")
         mesh = replace(mesh, facets=mesh.facets | {f"master@neighbour_{name}": below})
@@ -41,7 +41,7 @@ def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> Mesh
 
 
 def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
-    """Return a package as a mesh of its own, its posts' lower faces as the facet set ``slave@neighbour_NAME``."""
+    """Return the mesh of a package, with the lower faces of its posts as facet set ``slave@neighbour_NAME``."""
     posts = [post_edges(item, *axis) for axis in zip(item.at, (item.columns, item.rows), strict=True)]
     lines = [grid_lines(posts[k], (item.at[k], item.substrate[k], item.die[k]), item.pitch) for k in range(2)]
     heights = np.cumsum([0.0, item.standoff, item.substrate[2], item.die[2]])
@@ -54,32 +54,32 @@ def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
     x, y = points[cells].mean(axis=1)[:, :2].T
     in_post = within(x, posts[0]) & within(y, posts[1])
     in_die = (np.abs(x - item.at[0]) < 0.5 * item.die[0]) & (np.abs(y - item.at[1]) < 0.5 * item.die[1])
-    kept = np.choose(part, [in_post, True, in_die])
+    is_solid = np.choose(part, [in_post, True, in_die])
     names = tuple(f"{layer}_{name}" for layer in LAYERS)
-    feet = cells[kept & (part == 0)][:, [0, 1, 3, 2]]
-    mesh = MeshData(points, cells[kept], part[kept], names, {f"slave@neighbour_{name}": feet})
+    feet = cells[is_solid & (part == 0)][:, [0, 1, 3, 2]]
+    mesh = MeshData(points, cells[is_solid], part[is_solid], names, {f"slave@neighbour_{name}": feet})
     return without_unused_nodes(mesh)[0]
 
 
 def within(places: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which of some places ``(n,)`` lie in one of the intervals ``(k, 2)``."""
+    """Return which coordinates, shape (n,), lie in one of the intervals, shape (k, 2)."""
     first = np.searchsorted(edges[:, 0], places) - 1
     return np.asarray((first >= 0) & (places < edges[first, 1]))
 
 
 def post_edges(item: Neighbour, centre: float, count: int) -> NDArray[np.float64]:
-    """Return where posts begin and end along an axis: ``(count, 2)`` [m]."""
+    """Return start and end of each post along an axis, shape (count, 2) [m]."""
     middle = centre + item.pitch * (np.arange(count) - 0.5 * (count - 1))
     return middle[:, None] + 0.5 * item.post * np.array([-1.0, 1.0])
 
 
 def grid_lines(edges: NDArray[np.float64], box: Sequence[float], pitch: float) -> NDArray[np.float64]:
-    """Return the lines [m] of a grid along an axis: posts' edges, substrate, die, and so many that none is far apart.
+    """Return the grid lines along an axis [m]: edges of posts, substrate and die, at most one pitch apart.
 
     Args:
-        edges: Of the posts ``(k, 2)`` [m].
+        edges: Start and end of the posts, shape (k, 2) [m].
         box: Centre of the package, lengths of substrate and die [m].
-        pitch: Largest distance of two lines [m].
+        pitch: Largest distance between lines [m].
     """
     centre, outer, inner = box
     lines = np.unique(np.concatenate([edges.ravel(), centre + 0.5 * outer * np.array([-1.0, 1.0])]))
@@ -93,7 +93,7 @@ def grid_lines(edges: NDArray[np.float64], box: Sequence[float], pitch: float) -
 
 
 def facets_below(mesh: MeshData, feet: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the facets ``(nf, 4)``, cyclic, of the board's upper face under some points ``(n, 3)`` [m]."""
+    """Return the facets of the board's upper face below points, shape (n, 3) [m], in cyclic order, shape (nf, 4)."""
     board = mesh.cells[mesh.in_parts(lambda name: role_of_part(name) == "board" and "@" not in name)]
     corners = mesh.points[board]
     low, high = feet.min(axis=0), feet.max(axis=0)

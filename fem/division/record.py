@@ -1,4 +1,4 @@
-"""What a run tells of its coupling: ``coupling`` in ``result.json``."""
+"""Coupling record of a run: ``coupling`` in ``result.json``."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from reflowshock.fem.division.whole import Survey
 
 
 def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
-    """Return the scheme and why, the share of the meso model, its interface, levels of steps with their elements."""
+    """Return scheme with reason, meso share, interface size, and step levels with their elements and cost."""
     plan = division.plan
     level, steps = division.level, (plan.window / division.counts).tolist()
     cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])

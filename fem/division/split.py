@@ -1,4 +1,4 @@
-"""The part of a whole mesh that one model has: its cells, nodes, ties, in its own numbers."""
+"""Part of a joined mesh that belongs to one model: cells, nodes and ties in its own numbers."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from reflowshock.fem.mesh.tie import Tie
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A model's part of a whole mesh.
+    """Part of a joined mesh that belongs to one model.
 
     Attributes:
-        mesh: Its cells, facets and their nodes.
-        tie: Its slaves and all their masters: those that it has no cell of are numbered after the nodes of the mesh.
-        number: ``(n,)`` own number of each node of the whole mesh, -1 where it has none.
-        cell_number: ``(ne,)`` the same of each cell.
-        nodes: Number of its nodes, masters without a cell included.
+        mesh: Cells, facets and nodes of the part.
+        tie: Slaves and all their masters; masters without a cell in the part are numbered after the nodes of the mesh.
+        number: Number in the part of each node of the joined mesh, -1 if it is not in the part, shape (n,).
+        cell_number: Number in the part of each cell of the joined mesh, -1 if it is not in the part, shape (ne,).
+        nodes: Number of nodes, masters without a cell included.
     """
 
     mesh: MeshData
@@ -30,10 +30,10 @@ class Part:
 
 
 def part_of(whole: Whole, cells: NDArray[np.bool_]) -> Part:
-    """Return the part of a mesh that has some of its cells ``(ne,)``.
+    """Return the part of a mesh with the selected cells, shape (ne,).
 
     Raises:
-        MeshError: No cell is left.
+        MeshError: No cell is selected.
     """
     mesh, number = selected_cells(whole.mesh, cells)
     mine = number[whole.tie.slave] >= 0
@@ -45,9 +45,9 @@ def part_of(whole: Whole, cells: NDArray[np.bool_]) -> Part:
 
 
 def interface_between(whole: Whole, macro: Part, meso: Part) -> NDArray[np.intp]:
-    """Return the nodes ``(nc,)`` of the whole mesh that both models have and that move on their own.
+    """Return the nodes of the joined mesh that both models share, without slaves, shape (nc,).
 
-    A slave that both have follows its masters in both: they are the nodes that couple.
+    A shared slave follows its masters in both models, so only the masters are coupled.
     """
     common = (macro.number >= 0) & (meso.number >= 0)
     common[whole.tie.slave] = False

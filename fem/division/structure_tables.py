@@ -1,4 +1,4 @@
-"""From the mesh of a structure to its tables: the work of one rank before anything is distributed."""
+"""Tables of a structure from its mesh, computed on one rank before distribution."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,14 +17,8 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.mesh.tie import tie_joints
 from reflowshock.fem.problem.fittings import AXES
-from reflowshock.fem.problem.structure import (
-    AtPoint,
-    InputG,
-    OnAreas,
-    OnNodes,
-    PrescribedMotion,
-    StructureProblem,
-)
+from reflowshock.fem.problem.load_kinds import AtPoint, OnAreas, OnNodes, PrescribedMotion
+from reflowshock.fem.problem.structure import StructureProblem
 
 NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
@@ -34,11 +28,11 @@ class StructureTables(Tables):
     """Tables of a structure.
 
     Attributes:
-        nodes_of: Name -> nodes of a facet set that supports or motions act on.
-        areas: Name -> nodes and outward areas of a facet set under pressure, see ``facet_areas.outward_areas``.
-        pressed: Name -> the same facet set, for a pressure that follows it.
-        pushed: Name of a force at a point -> nodes and their shares in it; on planes of symmetry they add up to the
-            part that the meshed body bears.
+        nodes_of: Nodes of each facet set with a support or a motion, by name.
+        areas: Nodes and outward areas of each facet set under pressure, see ``facet_areas.outward_areas``.
+        pressed: Facets of each facet set under pressure, for follower pressure.
+        pushed: Nodes and their shares of each point force, by name; on symmetry planes the shares add up to the
+            fraction that acts on the meshed body.
         fitted: Watch points, gauges, supports and lumped masses.
     """
 
@@ -49,7 +43,7 @@ class StructureTables(Tables):
     fitted: FittedTable
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
-        """Return facet sets and what is fitted."""
+        """Return facet sets and fittings in the numbers of a model."""
         return {
             "nodes_of": {name: present(node[nodes]) for name, nodes in self.nodes_of.items()},
             "areas": {
@@ -67,11 +61,11 @@ class StructureTables(Tables):
 
 
 def tied(mesh: MeshData, problem: StructureProblem) -> Whole:
-    """Tie the layers of a structure whose elements differ.
+    """Tie layers of a structure with different meshes.
 
     Raises:
-        MeshError: Cells of another shape, layers without elements or elements without layers.
-        TieError: Layers whose elements differ do not touch.
+        MeshError: The cell shape, or the set of layers, differs between mesh and input.
+        TieError: Layers with different meshes do not touch.
     """
     check_layers(mesh, problem)
     return Whole(*tie_joints(mesh))
@@ -81,7 +75,7 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
     """Build the tables of a structure.
 
     Raises:
-        MeshError, LoadError: As ``fitted``; a force outside, or a prescribed motion of what is held.
+        MeshError, LoadError: As ``fitted``; a force is outside the mesh, or a motion acts on a fixed component.
     """
     mesh, tie = whole.mesh, whole.tie
     moved = [load.on for load in problem.loads.values() if isinstance(load, OnNodes)]
@@ -106,17 +100,17 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
 
 
 def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]:
-    """Return the nodes at forces and their shares, see ``StructureTables.pushed``; errors as ``structure_tables``."""
-    found: dict[str, Shares] = {}
+    """Return nodes and shares of the point forces, see ``StructureTables.pushed``; raises as ``structure_tables``."""
+    pushed: dict[str, Shares] = {}
     for name, load in problem.loads.items():
         if isinstance(load, AtPoint):
             nodes, shares = point_shares(mesh, f"loads.{name}.at", load.at)
-            found[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
-    return found
+            pushed[name] = nodes, shares * 0.5 ** len(problem.structure.planes_at(load.at))
+    return pushed
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
-    """Compare the cells and the parts of the mesh with elements and layers; errors as ``tied``."""
+    """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tied``."""
     element = problem.structure.element
     if mesh.shape.nodes != NODES[element]:
         raise MeshError(
@@ -133,7 +127,7 @@ def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
 
 
 def check_motions(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
-    """Refuse prescribed motions of held components ``(n, 3)``; errors as ``structure_tables``."""
+    """Check that no motion acts on fixed components, shape (n, 3); raises as ``structure_tables``."""
     for name, load in problem.loads.items():
         if not isinstance(load, PrescribedMotion):
             continue
@@ -147,7 +141,7 @@ def check_motions(problem: StructureProblem, nodes_of: dict[str, NDArray[np.inte
 
 
 def check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
-    """Refuse a large mass on components ``(n, 3)`` that are held in space; errors as ``structure_tables``."""
+    """Check that no large mass acts on fixed components, shape (n, 3); raises as ``structure_tables``."""
     for name in shaken_supports(problem):
         nodes = nodes_of[problem.supports[name].on]
         count = int(held[nodes].any(axis=1).sum())
@@ -159,13 +153,13 @@ def check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integ
 
 
 def shaken_supports(problem: StructureProblem) -> list[str]:
-    """Return the supports that a large mass moves: those that hold all components, where an input-G asks for it."""
-    by_mass = any(isinstance(load, InputG) and load.method == "large_mass" for load in problem.loads.values())
+    """Return the supports that a large mass moves: fully fixed ones, if an input-G uses a large mass."""
+    by_mass = any(load.is_large_mass for load in problem.loads.values())
     return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]
 
 
 def held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bool_]:
-    """Return ``(n, 3)``: components that supports and planes of symmetry hold at zero."""
+    """Return the components that supports and symmetry planes fix, shape (n, 3)."""
     shaken = shaken_supports(problem)
     rules = [(support.on, support.hold) for name, support in problem.supports.items() if name not in shaken]
     rules += [(f"{axis}_min", (axis,)) for axis in problem.structure.symmetry]

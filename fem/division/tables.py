@@ -1,4 +1,4 @@
-"""From a mesh to the tables of each model: the work of one rank before anything is distributed."""
+"""Tables of each model from a mesh, computed on one rank before distribution."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,21 +25,21 @@ from reflowshock.fem.problem.shock import JOINT_LAYER
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """What every rank of a model knows about it, in input node and cell numbers.
+    """Tables of a model that every rank has, in input node and cell numbers.
 
     Attributes:
-        part: ``(ne,)`` int32, index into ``part_names``.
+        part: Part of each cell as an index into ``part_names``, shape (ne,) int32.
         part_names: Names of the parts.
         tie: Slaves and masters.
-        master_points: ``(ns, 4, 3)`` [m].
-        moved: Largest move of a slave onto its facet [m].
-        held_nodes: ``(k,)`` nodes with a held component.
-        held: ``(k, 3)`` which components.
-        interface: ``(nc,)`` nodes of the interface, in the same order on both sides.
+        master_points: Positions of the masters of each slave, shape (ns, 4, 3) [m].
+        moved: Largest displacement of a slave onto its master facet [m].
+        held_nodes: Nodes with a fixed component, shape (k,).
+        held: Whether each component of these nodes is fixed, shape (k, 3).
+        interface: Interface nodes in the same order in both models, shape (nc,).
         nodes: Number of nodes of the model.
-        level: ``(ne,)`` int32 level of the step of each cell, 0 for the model's own step.
-        ratios: Steps of level k + 1 in one of level k.
-        every: ``(ne,)`` int32 in how many steps of the model each cell acts once, see ``path_levels``.
+        level: Step level of each cell, 0 for the step of the model, shape (ne,) int32.
+        ratios: Steps of level k + 1 in one step of level k.
+        every: Pace of each cell, the number of steps in which it acts once (``path_levels``), shape (ne,) int32.
     """
 
     part: NDArray[np.int32]
@@ -57,11 +57,11 @@ class Tables:
 
     @classmethod
     def undivided(cls, whole: Whole, held: NDArray[np.bool_], **own: Any) -> Self:
-        """Return the tables of a whole mesh as one model with one step.
+        """Return the tables of a joined mesh as one model with one step.
 
         Args:
             whole: Mesh and ties.
-            held: ``(n, 3)`` held components.
+            held: Fixed components, shape (n, 3).
             own: Fields that a subclass adds.
         """
         held_nodes = np.flatnonzero(held.any(axis=1))
@@ -82,12 +82,12 @@ class Tables:
         )
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
-        """Return the fields of a subclass with what counts in a model.
+        """Return the fields of a subclass restricted to one model.
 
         Args:
-            part: Of the mesh.
-            node: ``(n,)`` its number of each node, -1 where the node counts in another model.
-            cell: ``(ne,)`` the same of each cell.
+            part: Part of the mesh that belongs to the model.
+            node: Number of each node in the model, -1 if it counts in another model, shape (n,).
+            cell: Number of each cell in the model, -1 if it counts in another model, shape (ne,).
         """
         return {}
 
@@ -97,9 +97,9 @@ class JointTables(Tables):
     """Tables of a package on a board.
 
     Attributes:
-        watch: Its watch points.
-        shaken: ``(k,)`` nodes of the mounting holes.
-        interface: Where its joints meet the package.
+        watch: Watch points of joints, centres and board strain.
+        shaken: Nodes of the mounting holes, shape (k,).
+        joint_interface: Upper interfaces of the joints.
         fitted: Watch points, gauges, supports and lumped masses of the board.
     """
 
@@ -112,13 +112,13 @@ class JointTables(Tables):
     def of(
         cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float, given: FittedTable | None = None
     ) -> Self:
-        """Find out what is held and watched.
+        """Return the tables of a package on a board.
 
         Args:
-            whole: The mesh.
-            rules: What is held, as ``HELD``.
-            layer: Thickness of the solder at the pads over which stress is averaged [m].
-            given: What is fitted to the board, if anything is.
+            whole: Joined mesh.
+            rules: Fixed components by facet set, as in ``HELD``.
+            layer: Thickness of the solder layer at the pads over which stress is averaged [m].
+            given: Fittings of the board, None without fittings.
         """
         mesh = whole.mesh
         return cls.undivided(
@@ -131,7 +131,7 @@ class JointTables(Tables):
         )
 
     def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
-        """Return watch points, shaken nodes, interfaces of joints, and what is fitted to the board."""
+        """Return watch points, shaken nodes, joint interfaces and fittings in the numbers of a model."""
         return {
             "watch": self.watch.within(node, cell, part.number),
             "shaken": present(node[self.shaken]),
@@ -146,7 +146,7 @@ TablesT_co = TypeVar("TablesT_co", bound=Tables, covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class ModelInput(Generic[TablesT_co]):
-    """One model before it is distributed: its mesh, its tables, its cells ``(k,)`` in numbers of the whole mesh."""
+    """One model before distribution: mesh, tables, and its cells in numbers of the joined mesh, shape (k,)."""
 
     mesh: MeshData
     tables: TablesT_co
@@ -154,10 +154,10 @@ class ModelInput(Generic[TablesT_co]):
 
 
 def joined(data: MeshData) -> Whole:
-    """Let board and patch share their nodes, give columns their place, and tie the joints.
+    """Merge the nodes of board and board patch, insert columns, and tie the joints.
 
     Raises:
-        CouplingError, MeshError, TieError: They do not fit.
+        CouplingError, MeshError, TieError: The parts of the mesh do not fit together.
     """
     macro_nodes, meso_nodes = find_interface(data)
     return Whole(*tie_joints(with_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
@@ -166,7 +166,7 @@ def joined(data: MeshData) -> Whole:
 def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Join a mesh and return its models, as ``model_inputs``."""
+    """Join a mesh and split it into its models; see ``model_inputs``."""
     return model_inputs(joined(data), division, rules)
 
 
@@ -177,10 +177,10 @@ def model_inputs(
     layer: float = JOINT_LAYER,
     given: FittedTable | None = None,
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Split a package on a board into its models; arguments as ``JointTables.of``.
+    """Split a package on a board into its models; arguments as in ``JointTables.of``.
 
     Returns:
-        ``macro`` and ``meso``, or ``dns``: all of it.
+        Models ``macro`` and ``meso``, or the single model ``dns``.
 
     Raises:
         MeshError: A pad has no solder, or the layer is thicker than a joint.
@@ -189,16 +189,16 @@ def model_inputs(
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
-    return {"dns": part_input(whole, tables, part, (part.number, part.cell_number))}
+    return {"dns": part_input(whole, tables, part, part.number, part.cell_number)}
 
 
 def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, ModelInput[TablesT]]:
-    """Split a mesh with its tables into the models ``macro`` and ``meso``; what both have counts in the macro model."""
+    """Split a mesh with its tables into ``macro`` and ``meso``; shared nodes and cells count in the macro model."""
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     interface = interface_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
-    coarse = part_input(whole, tables, macro, (macro.number, macro.cell_number))
-    fine = part_input(whole, tables, meso, rest)
+    coarse = part_input(whole, tables, macro, macro.number, macro.cell_number)
+    fine = part_input(whole, tables, meso, *rest)
     coarse_tables = replace(coarse.tables, interface=macro.number[interface])
     fine_tables = replace(fine.tables, interface=meso.number[interface], every=division.every[division.meso])
     if division.local:
@@ -207,19 +207,19 @@ def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, Model
 
 
 def part_input(
-    whole: Whole, tables: TablesT, part: Part, counted: tuple[NDArray[np.int32], NDArray[np.int32]]
+    whole: Whole, tables: TablesT, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]
 ) -> ModelInput[TablesT]:
     """Return a part of a mesh as a model without an interface.
 
     Args:
-        whole: The mesh.
-        tables: Its tables.
-        part: The part.
-        counted: Own numbers of the nodes ``(n,)`` and cells ``(ne,)`` that are loaded and watched in this model, -1 for
-            those of another one.
+        whole: Joined mesh.
+        tables: Tables of the joined mesh.
+        part: Part of the mesh.
+        node: Number in the part of each node that is loaded and watched in this model, otherwise -1, shape (n,).
+        cell: Number in the part of each cell that is loaded and watched in this model, otherwise -1, shape (ne,).
     """
-    mine = np.flatnonzero(part.number >= 0)
-    order = mine[np.argsort(part.number[mine])]
+    in_part = np.flatnonzero(part.number >= 0)
+    order = in_part[np.argsort(part.number[in_part])]
     held = part.number[tables.held_nodes].astype(np.int64)
     restricted = replace(
         tables,
@@ -232,11 +232,11 @@ def part_input(
         nodes=part.nodes,
         level=np.zeros(len(part.mesh.cells), np.int32),
         every=np.ones(len(part.mesh.cells), np.int32),
-        **tables.counted(part, *counted),
+        **tables.counted(part, node, cell),
     )
     return ModelInput(part.mesh, restricted, np.flatnonzero(part.cell_number >= 0))
 
 
 def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the numbers that are none of another model's."""
+    """Return the non-negative numbers, which belong to this model."""
     return numbers[numbers >= 0]

@@ -1,4 +1,4 @@
-"""The whole mesh of a run before it is divided: its ties, and what each of its elements is like."""
+"""Joined mesh of a run before division: ties, and properties of its elements."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.materials.parameters import Material
 from reflowshock.materials.roles import Materials, materials_of_parts, role_of_part
 
-IN_COLUMN = "column"  # what of board and substrate stands in the columns of fine joints
+IN_COLUMN = "column"  # elements of board and substrate in the columns of fine joints
 
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A mesh whose parts share nodes or are tied, slaves moved onto their facets by at most ``moved`` [m]."""
+    """Mesh whose parts share nodes or are tied; slaves were moved onto their facets by at most ``moved`` [m]."""
 
     mesh: MeshData
     tie: Tie
@@ -37,13 +37,13 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Treatment:
-    """How elements are computed.
+    """Formulation, kinematics and mass scaling of elements.
 
     Attributes:
-        formulation: Of hexahedra.
-        kinematics: Small, corotational or finite.
-        mass_scaled: Roles whose masses are scaled, or ``IN_COLUMN``.
-        scaled_step: Largest critical step [s] to which they are.
+        formulation: Formulation of hexahedra.
+        kinematics: Small, corotational or finite kinematics.
+        mass_scaled: Material roles with mass scaling, or ``IN_COLUMN``.
+        scaled_step: Largest critical step after mass scaling [s].
     """
 
     formulation: str = HEXAHEDRON.name
@@ -54,15 +54,15 @@ class Treatment:
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What the elements of a mesh are like.
+    """Properties of the elements of a mesh.
 
     Attributes:
-        role: ``(ne,)`` material role.
-        plain_step: ``(ne,)`` critical step of each element on its own, without mass scaling [s].
-        factor: ``(ne,)`` factor of mass scaling on the density.
-        mass: ``(ne,)`` [kg] without it.
-        linear: ``(ne,)`` whether its force is linear in the displacement.
-        cost: ``(ne,)`` cost of an update over that of a box.
+        role: Material role, shape (ne,).
+        plain_step: Critical step of the single element without mass scaling, shape (ne,) [s].
+        factor: Factor of mass scaling on the density, shape (ne,).
+        mass: Mass without mass scaling, shape (ne,) [kg].
+        linear: Whether the force is linear in the displacement, shape (ne,).
+        cost: Cost of an update relative to a box, shape (ne,).
     """
 
     role: NDArray[np.str_]
@@ -74,21 +74,21 @@ class Survey:
 
     @property
     def step(self) -> NDArray[np.float64]:
-        """Return the critical step ``(ne,)`` [s] of each element on its own, with mass scaling."""
+        """Critical step of the single element with mass scaling, shape (ne,) [s]."""
         return self.plain_step * np.sqrt(self.factor)
 
     @property
     def added_mass(self) -> NDArray[np.float64]:
-        """Return the mass ``(ne,)`` [kg] that scaling adds."""
+        """Mass added by mass scaling, shape (ne,) [kg]."""
         return self.mass * (self.factor - 1.0)
 
 
 def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatment: Treatment) -> Survey:
-    """Find out what the elements of a mesh are like.
+    """Determine the properties of the elements of a mesh.
 
     Raises:
-        MeshError: An element is turned inside out.
-        StepError: Every role is mass scaled.
+        MeshError: An element is inverted.
+        StepError: Every role has mass scaling.
     """
     names, assigned = materials_of_parts(mesh.part_names, materials)
     elements = elements_of(mesh.points, mesh.cells, mesh.part, assigned, treatment.formulation)
@@ -114,27 +114,27 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
 
 
 def on_springs(survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]) -> Survey:
-    """Return a survey with the critical steps that elements have on their elastic supports."""
-    faster = np.zeros(len(survey.plain_step))
-    for name, found in table.bedded.items() if table else ():
-        cells, corners = mesh.cells[found.cells], mesh.points[found.facets]
+    """Return a survey with critical steps reduced by elastic supports."""
+    added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
+    for name, facets in table.bedded.items() if table else ():
+        cells, corners = mesh.cells[facets.cells], mesh.points[facets.facets]
         geometry = element_geometry(mesh.points, cells)
-        mass = (survey.mass[found.cells] / geometry.volume)[:, None] * geometry.nodal_volume
-        rates = spring_rates(cells, found.facets, mass, corners, np.array(supports[name].stiffness))
-        np.add.at(faster, found.cells, rates)
-    return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + faster))
+        mass = (survey.mass[facets.cells] / geometry.volume)[:, None] * geometry.nodal_volume
+        rates = spring_rates(cells, facets.facets, mass, corners, np.array(supports[name].stiffness))
+        np.add.at(added_frequency, facets.cells, rates)
+    return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + added_frequency))
 
 
 def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
-    """Return the factor ``(ne,)`` on the density that raises critical steps to the others', or as far as wanted.
+    """Return the density factor that raises critical steps to those of unscaled elements or to a limit, shape (ne,).
 
     Args:
-        step: ``(ne,)`` critical steps [s].
-        scaled: ``(ne,)`` whose mass is scaled.
-        treatment: As what, and how far.
+        step: Critical steps, shape (ne,) [s].
+        scaled: Elements with mass scaling, shape (ne,).
+        treatment: Mass scaling settings.
 
     Raises:
-        StepError: Every element is mass scaled, to no step in particular.
+        StepError: Every element has mass scaling, and there is no limit.
     """
     target = min(float(step[~scaled].min(initial=np.inf)), treatment.scaled_step)
     if not np.isfinite(target):
@@ -143,19 +143,19 @@ def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment
 
 
 def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which cells ``(ne,)`` have one of the nodes ``(n,)``."""
+    """Return which cells, shape (ne,), have one of the marked nodes, shape (n,)."""
     return nodes[cells].any(axis=1)
 
 
 def nodes_of(cells: NDArray[np.int32], chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` nodes belong to one of the chosen cells ``(ne,)``."""
-    found = np.zeros(count, dtype=bool)
-    found[cells[chosen]] = True
-    return found
+    """Return which of ``count`` nodes belong to one of the chosen cells, shape (ne,)."""
+    is_used = np.zeros(count, dtype=bool)
+    is_used[cells[chosen]] = True
+    return is_used
 
 
 def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the nodes ``(n,)`` of fine cells ``(ne,)``, and those that they are tied to."""
+    """Return the nodes of fine cells, shape (ne,), and the masters they are tied to, shape (n,)."""
     nodes = nodes_of(whole.mesh.cells, fine, len(whole.mesh.points))
     nodes[whole.tie.master[nodes[whole.tie.slave]]] = True
     return nodes

@@ -1,1 +1,1 @@
-"""Time integration, participants, energy balance, histories, modes; start with `central_difference.py`."""
+"""Time integration, participants, energy balance, histories and natural modes; start with `central_difference.py`."""

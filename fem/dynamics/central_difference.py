@@ -1,4 +1,10 @@
-"""Central differences on one rank: velocities live half a step behind displacements."""
+"""Central-difference (leapfrog) time integration of one model, with velocities half a step behind displacements.
+
+v(t + dt/2) = v(t - dt/2) + dt (f(t) / m + g(t)),   u(t + dt) = u(t) + dt v(t + dt/2)
+
+(Hughes, The Finite Element Method, Dover 2000, section 9.1). Force terms of pace r act once in r steps by an impulse of
+r dt f (r-RESPA, see ``division.path_levels``).
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,27 +12,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reflowshock.fem.dynamics.compiled_steps import CompiledSteps, no_interface
 from reflowshock.fem.dynamics.motion import Motion
-from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce, no_interface
 from reflowshock.fem.forces.force import TermWithPath
 from reflowshock.fem.kernels.levels import Interface, count_impulses
 from reflowshock.fem.kernels.motion import add_pushed, advance
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
-from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, Shares, State, Sum
 
 
 class ExplicitMotion(Motion):
-    """The state of one model on one rank, and its step.
+    """State of one model on one rank, advanced by central differences.
 
-    Half-kick, drift, force, half-kick, written with the velocity half a step back: v += dt (f / m + g), u += dt v.
-    Nodes that several ranks hold are updated by each of them, from equal sums of forces. A force term of pace r acts
-    once in r steps by an impulse of r dt f (r-RESPA, see ``division.path_levels``).
+    Every rank that shares a node updates it from the same sum of forces.
 
-    Attributes as ``Motion``; ``velocity`` is that at ``time - dt / 2``.
-        ahead: ``(n, 3)`` [N] sum of (r - 1) f of terms that have just acted, which the next step adds; ``(0, 3)``
-            where all terms act in each step.
+    Attributes:
+        velocity: Velocity at ``time - dt / 2``, shape (n, 3) [m/s]; the other attributes are as in ``Motion``.
+        ahead: Sum of (r - 1) f over the terms of pace r that have just acted, added in the next step, shape (n, 3) [N];
+            shape (0, 3) if all terms act in every step.
     """
 
     def __init__(
@@ -35,15 +40,15 @@ class ExplicitMotion(Motion):
         """Start at rest.
 
         Args:
-            body: The model.
-            loads: What acts on it; damping comes last, since it needs all other forces.
-            step: dt [s].
-            held: Local nodes whose velocity another model prescribes; their mass is in that model's energy balance.
-            extra_mass: ``(n,)`` [kg] that another model adds at the interface.
+            body: Elements, masses and supports of the model.
+            loads: Loads and damping of the model in any order; damping acts last because it needs the other forces.
+            step: Time step dt [s].
+            held: Local nodes whose velocity another model prescribes; that model's energy balance counts their mass.
+            extra_mass: Mass that another model adds at the interface, shape (n,) [kg].
         """
         self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
-        carried = [FineSupports()] if levels_of(body.terms) else []
-        self._loads = sorted([*loads, *carried], key=lambda load: load.account == "damping")
+        fine_supports = [FineSupports()] if levels_of(body.terms) else []
+        self._loads = sorted([*loads, *fine_supports], key=lambda load: load.account == "damping")
         mass = body.mass + extra_mass
         free = body.free.copy()
         free[held] = False
@@ -68,28 +73,28 @@ class ExplicitMotion(Motion):
         for load in self._loads:
             load.drive(self.velocity, -step)
         self.velocity -= 0.5 * step * self.acceleration()
-        self._at_once = StepsAtOnce.of(body, self._loads)
+        self._compiled = CompiledSteps.of(body, self._loads)
 
     @property
     def external_work(self) -> float:
-        """Return the work of all loads on this rank's share of the mass [J]."""
+        """Work of all loads on this rank's share of the mass [J]."""
         return self._body_work + sum(load.work for load in self._loads if load.account == "external")
 
     @property
     def damping_energy(self) -> float:
-        """Return the energy that damping has taken from this rank's share [J]."""
+        """Energy that damping has dissipated in this rank's share [J]."""
         return -sum(load.work for load in self._loads if load.account == "damping")
 
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
-        """Let a velocity component of local nodes no longer follow from forces."""
+        """Fix a velocity component of local nodes, so that forces no longer change it."""
         self.mobility[nodes, component] = 0.0
 
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
-        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes, all of them free."""
+        """Add masses of shape (k,) [kg] to free local nodes, outside the energy balance."""
         self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
-        """Give all free components an initial velocity ``(3,)`` [m/s], which damping feels; before the first step."""
+        """Give all free components an initial velocity of shape (3,) [m/s], damped, before the first step."""
         before = self.acceleration()
         self.velocity += np.where(self.mobility > 0.0, velocity, 0.0)
         for load in self._loads:
@@ -99,7 +104,7 @@ class ExplicitMotion(Motion):
         self.velocity -= 0.5 * self.step * (self.acceleration() - before)
 
     def advance(self) -> None:
-        """Move from ``time`` to ``time + dt``, slaves with their masters; the force is then out of date."""
+        """Advance displacement and velocity, slaves with their masters, by one step; then call ``update_force``."""
         for load in self._loads:
             load.drive(self.velocity, self.time)
         if len(self.ahead):
@@ -117,16 +122,16 @@ class ExplicitMotion(Motion):
             self._body_work += self.step * float(mean @ (self.counted_mass @ self.velocity))
 
     def update_force(self) -> None:
-        """Evaluate the force at the present displacement, summed over ranks; once a step, for terms with a path."""
+        """Evaluate the force at the current displacement, summed over ranks, exactly once per step."""
         self.force.fill(0.0)
         self.ahead.fill(0.0)
         for term, pace in self.body.paced:
             if pace == 1:
                 term.add(self.displacement, self.force)
             elif self._substep % pace == 0:
-                pushed = np.zeros_like(self.force)
-                term.add(self.displacement, pushed)
-                add_pushed(pushed, pace, self.force, self.ahead)
+                paced_force = np.zeros_like(self.force)
+                term.add(self.displacement, paced_force)
+                add_pushed(paced_force, pace, self.force, self.ahead)
         if self._tied:
             np.take(self.force, self.body.tie.slave, axis=0, out=self.slave_force)
             self.body.tie.gather(self.force)
@@ -140,25 +145,25 @@ class ExplicitMotion(Motion):
             load.collect(self)
 
     def take_steps(self, count: int, interface: Interface | None = None) -> None:
-        """Take steps, each with its force; what moves an interface and what it bears is counted there."""
-        whole = self._substep == 0 and count % self._longest == 0
-        if self.body.shared.exchanged or self._at_once is None or not whole:
-            self._take_each(count, interface)
+        """Take ``count`` steps; prescribed changes and impulses of the coupling interface are in ``interface``."""
+        full_cycles = self._substep == 0 and count % self._longest == 0
+        if self.body.shared.exchanged or self._compiled is None or not full_cycles:
+            self._take_single_steps(count, interface)
             return
-        ends = [self.time]
+        times = [self.time]
         for _ in range(count):
-            ends.append(ends[-1] + self.step)
-        accelerations = np.concatenate([self.gravity[None], self.accelerations(ends[1:])])
-        state = self._state, self.ahead
-        self._body_work += self._at_once.take(self, state, interface or no_interface(count), (ends, accelerations))
+            times.append(times[-1] + self.step)
+        accelerations = np.concatenate([self.gravity[None], self.accelerations(times[1:])])
+        coupling = interface or no_interface(count)
+        self._body_work += self._compiled.take(self, self._state, self.ahead, coupling, accelerations)
         self.gravity = accelerations[-1]
 
     def accelerations(self, times: Sequence[float]) -> NDArray[np.float64]:
-        """Return ``body_acceleration`` at the ends [s] of the m steps of a window: ``(m, 3)`` [m/s^2]."""
+        """Return the body acceleration at the ends [s] of the m steps of a window, shape (m, 3) [m/s^2]."""
         return np.array([self.body_acceleration(time) for time in times])
 
-    def _take_each(self, count: int, interface: Interface | None) -> None:
-        """Take steps one by one."""
+    def _take_single_steps(self, count: int, interface: Interface | None) -> None:
+        """Take steps one by one in Python, with messages between ranks."""
         if interface is not None:
             count_impulses(interface, 0, self.push())
         for k in range(count):
@@ -172,17 +177,17 @@ class ExplicitMotion(Motion):
             self.velocity[interface.rows] = interface.given
 
     def push(self) -> NDArray[np.float64]:
-        """Return the impulse over dt ``(n, 3)`` [N] of the step that begins: the force, and what acts for others."""
+        """Return the impulse of the coming step over dt, with the delayed share of paced terms, shape (n, 3) [N]."""
         return self.force + self.ahead if len(self.ahead) else self.force
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
-        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes, zero where it does not follow from forces."""
+        """Return the acceleration of local nodes, zero in prescribed components, shape (k, 3) [m/s^2]."""
         inverse = self.mobility[nodes]
-        moved = self.force[nodes] * inverse
-        return moved + np.where(inverse > 0.0, self.gravity, 0.0) if self.gravity.any() else moved
+        acceleration = self.force[nodes] * inverse
+        return acceleration + np.where(inverse > 0.0, self.gravity, 0.0) if self.gravity.any() else acceleration
 
     def kinetic_energy(self) -> float:
-        """Return the kinetic energy [J] of this rank's share at ``time``: v(t - dt/2) . M v(t + dt/2) / 2.
+        """Return the kinetic energy of this rank's share at ``time``, v(t - dt/2) . M v(t + dt/2) / 2 [J].
 
         With this product its change over a step is exactly the work of the forces (central differences conserve it
         together with the strain energy), while m v^2 / 2 of the mean velocity is larger by m (a dt)^2 / 8.
@@ -190,11 +195,11 @@ class ExplicitMotion(Motion):
         return 0.5 * float(np.einsum("n,ni,ni->", self.counted_mass, self.velocity, self._following_velocity()))
 
     def present_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(n, 3)`` [m/s] at ``time``, half a step after ``velocity``; not that of slaves."""
+        """Return the velocity at ``time``, half a step after ``velocity``, shape (n, 3) [m/s]; invalid at slaves."""
         return 0.5 * (self.velocity + self._following_velocity())
 
     def _following_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(n, 3)`` [m/s] at ``time + dt / 2``."""
+        """Return the velocity at ``time + dt / 2``, shape (n, 3) [m/s]."""
         following = self.velocity + self.step * self.acceleration()
         if len(self.ahead):
             following += self.step * self.mobility * self.ahead
@@ -203,7 +208,7 @@ class ExplicitMotion(Motion):
         return following
 
     def reaction(self) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        """Return the forces of supports and prescribed motion on the nodes that this rank owns, shape (n, 3) [N]."""
         force = self.force.copy()
         for load in self._loads:
             load.release(force)
@@ -211,13 +216,13 @@ class ExplicitMotion(Motion):
         return self.counted_mass[:, None] * acceleration - force
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return dt^2 f . M^-1 f / 8 [J] of this rank's share, f the internal force.
+        """Return dt^2 f . M^-1 f / 8 of this rank's share, f the internal force [J].
 
-        For f = -K u this is (dt omega / 2)^2 times the strain energy in each mode of frequency omega: where the sum is
-        larger than the strain energy, the step is above 2 / omega of a mode that moves, and that mode grows.
+        For f = -K u this is (dt omega / 2)^2 times the strain energy in each mode of frequency omega. If the sum is
+        larger than the strain energy, the step is above 2 / omega of an excited mode, and that mode grows.
 
         Args:
-            foreign: ``(n, 3)`` [N], part of the force that is not this model's.
+            foreign: Part of the force that belongs to another model, shape (n, 3) [N].
         """
         force = self.push() - foreign
         for load in self._loads:
@@ -226,7 +231,7 @@ class ExplicitMotion(Motion):
         return 0.125 * self.step**2 * float(owned @ np.einsum("ni,ni,ni->n", force, force, self.mobility))
 
     def state(self) -> State:
-        """Return all that changes with time, for a checkpoint."""
+        """Return the time-dependent state, for a checkpoint."""
         local, tie = self.body.local, self.body.tie
         nodal = {"displacement": self.displacement, "velocity": self.velocity, "force": self.force}
         nodal |= {"ahead": self.ahead} if len(self.ahead) else {}
@@ -238,7 +243,7 @@ class ExplicitMotion(Motion):
         return {**rows, **scalars, "slave_force": at_slaves, "paths": paths, "loads": loads}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        """Restore the values that ``state`` returned, in a motion built from the same input."""
         for name in ("displacement", "velocity", "force", "slave_force", *(["ahead"] if len(self.ahead) else [])):
             getattr(self, name)[:] = state[name]
         self.gravity, self.time, self._body_work = state["gravity"], state["time"], state["body_work"]
@@ -248,10 +253,10 @@ class ExplicitMotion(Motion):
             load.restore(state["loads"][str(k)])
 
     def _terms_with_path(self) -> dict[str, TermWithPath]:
-        """Return the force terms whose history must be kept, each under a name that is the same on all ranks."""
-        kept = [(term, pace) for term, pace in self.body.paced if isinstance(term, TermWithPath)]
-        found: dict[str, TermWithPath] = {}
-        for term, pace in kept:
-            end = f" of {pace}" if pace > 1 else ""
-            found[f"{sum(pace == other for _, other in kept[: len(found)])}{end}"] = term
-        return found
+        """Return the path-dependent force terms, each under a name that is the same on all ranks."""
+        terms = [(term, pace) for term, pace in self.body.paced if isinstance(term, TermWithPath)]
+        named: dict[str, TermWithPath] = {}
+        for term, pace in terms:
+            suffix = f" of {pace}" if pace > 1 else ""
+            named[f"{sum(pace == other for _, other in terms[: len(named)])}{suffix}"] = term
+        return named

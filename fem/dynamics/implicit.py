@@ -6,9 +6,9 @@
 
 Second order and stable at any step for -1/3 <= alpha <= 0. alpha = 0 is the trapezoidal rule, which keeps the energy of
 a linear model to the last digits whatever the step: the default, because an oracle's balance then shows every mistake.
-Negative alpha damps what the step does not resolve, for loads that start with a jump.
+Negative alpha damps frequencies that the step does not resolve, for loads that start with a jump.
 
-It is the reference of explicit runs: same body, loads and force terms, linear elastic only.
+It serves as the reference for explicit runs: same body, loads and force terms, linear elastic only.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,39 +29,40 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.parallel.agreement import agreed
-from reflowshock.fem.parallel.portable import Rows, Same, Shares, State, Sum
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, Shares, State, Sum
 
 
 @dataclass(frozen=True, slots=True)
 class HHTScheme:
-    """Coefficients of one step: h [s], alpha."""
+    """Coefficients of the HHT-alpha method: step h [s] and alpha, from -1/3 to 0."""
 
     step: float
     alpha: float
 
     def __post_init__(self) -> None:
-        """Raise ``ValueError`` where they are out of range."""
+        """Raise ``ValueError`` if step or alpha is out of range."""
         if not self.step > 0.0:
-            raise ValueError(f"the implicit time step is {self.step:g} s, must be > 0")
+            raise ValueError(f"implicit time step = {self.step:g} s; must be > 0")
         if not -1.0 / 3.0 <= self.alpha <= 0.0:
-            raise ValueError(f"alpha of the HHT method is {self.alpha:g}, allowed are -1/3 to 0")
+            raise ValueError(f"alpha of the HHT method = {self.alpha:g}; allowed: -1/3 to 0")
 
     @property
     def beta(self) -> float:
-        """Return Newmark's beta."""
+        """Newmark's beta."""
         return 0.25 * (1.0 - self.alpha) ** 2
 
     @property
     def gamma(self) -> float:
-        """Return Newmark's gamma."""
+        """Newmark's gamma."""
         return 0.5 - self.alpha
 
 
 class ImplicitMotion(Motion):
-    """The state of one model on one rank, and its step.
+    """State of one model on one rank, advanced by the HHT-alpha method.
 
     Attributes:
-        factor: The factored matrix of a step. Others as ``Motion``; ``velocity`` is that at ``time``.
+        factor: Factored matrix of a step.
+        velocity: Velocity at ``time``, shape (n, 3) [m/s]; the other attributes are as in ``Motion``.
     """
 
     def __init__(self, comm: MPI.Comm, body: Body, loads: Sequence[Load], step: float, alpha: float = 0.0) -> None:
@@ -69,14 +70,14 @@ class ImplicitMotion(Motion):
 
         Args:
             comm: Communicator of the model.
-            body: The model.
-            loads: What acts on it.
-            step: h [s].
-            alpha: Of the HHT method, from -1/3 to 0.
+            body: Elements, masses and supports of the model.
+            loads: Loads and damping of the model.
+            step: Time step h [s].
+            alpha: Parameter of the HHT method, from -1/3 to 0.
 
         Raises:
             ValueError: Step or alpha out of range.
-            AgreedError: A material or kinematics is not linear, or memory ran out; on every rank.
+            AgreedError: The model is not linear, or memory ran out; on every rank.
         """
         self._scheme = HHTScheme(step, alpha)
         agreed(comm, lambda: self.check(body))
@@ -97,16 +98,16 @@ class ImplicitMotion(Motion):
         self._prescribed = body.free & ~self._free
         self._equations = Equations.of(comm, replace(body, free=self._free))
         self.factor = self._factorise()
-        self._works = np.zeros(3)  # of external forces, by damping, of the start
+        self._works = np.zeros(3)  # external work, damping energy, energy not counted at the start
         self._begin()
 
     @staticmethod
     def check(body: Body) -> None:
-        """Raise ``ValueError`` where one solution a step is not enough."""
+        """Raise ``ValueError`` if the model is not linear."""
         check_linear(body)
 
     def _factorise(self) -> Factorisation:
-        """Return the factor of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
+        """Return the factorisation of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
         h, scheme = self.step, self._scheme
         weight = 1.0 + scheme.alpha
         mass = self._equations.vector(np.repeat(self.body.mass[:, None], 3, axis=1))
@@ -119,24 +120,24 @@ class ImplicitMotion(Motion):
         return Factorisation(matrix)
 
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
-        """Let a velocity component of local nodes no longer follow from forces."""
+        """Fix a velocity component of local nodes, so that forces no longer change it."""
         self._free[nodes, component] = False
 
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
-        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes."""
+        """Add masses of shape (k,) [kg] to local nodes, outside the energy balance."""
         self._extra[nodes] += mass
 
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
-        """Return the acceleration ``(k, 3)`` [m/s^2] of some local nodes at ``time``."""
+        """Return the acceleration of local nodes at ``time``, shape (k, 3) [m/s^2]."""
         return self._acceleration[nodes]
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
-        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        """Give all free components an initial velocity of shape (3,) [m/s] before the first step."""
         self.velocity += np.where(self._free, velocity, 0.0)
         self.restart()
 
     def _begin(self) -> None:
-        """Take the loads and prescribed velocities of time zero."""
+        """Apply the loads and prescribed velocities of time zero."""
         for load in self._loads:
             load.add(self)
         self._nodal[:] = self.force
@@ -145,7 +146,7 @@ class ImplicitMotion(Motion):
         self.restart()
 
     def restart(self) -> None:
-        """Take displacement and velocity as they are now for the state at ``time``, the start of the energy balance."""
+        """Start the energy balance at ``time`` from the current displacement and velocity."""
         self._update_force()
         mass = (self.body.mass + self._extra)[:, None]
         self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
@@ -154,7 +155,7 @@ class ImplicitMotion(Motion):
         self._works[:] = 0.0, 0.0, self._stored_apart()
 
     def advance(self) -> None:
-        """Move from ``time`` to ``time + h``; the force is then out of date. Collective."""
+        """Advance by one step, from ``time`` to ``time + h``; call ``update_force`` afterwards; collective."""
         h, scheme, before = self.step, self._scheme, self._total_force()
         mean, following = self._driven(self.time), self._driven(self.time + h)
         start = self.displacement[self._prescribed]
@@ -172,7 +173,7 @@ class ImplicitMotion(Motion):
         self._acceleration[self._prescribed] = ((following - mean) / h)[self._prescribed]
 
     def _solve(self, before: NDArray[np.float64]) -> None:
-        """Find the accelerations of the predicted motion and add what they move; ``before`` all forces a step ago."""
+        """Solve for the acceleration and correct the prediction; ``before`` is the total force of the last step."""
         h, scheme = self.step, self._scheme
         self._update_force()
         right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
@@ -183,7 +184,7 @@ class ImplicitMotion(Motion):
         self.velocity += h * scheme.gamma * self._acceleration
 
     def update_force(self) -> None:
-        """Evaluate the force of the motion at ``time``, summed over ranks, and the work of the step before."""
+        """Evaluate the force at ``time``, summed over ranks, and add the work of the last step."""
         self._update_force()
         before, self._before = self._before, self._balance_fields()
         change, mean = self._before - before, 0.5 * (before + self._before)
@@ -194,15 +195,15 @@ class ImplicitMotion(Motion):
         self._older = before[3:].sum(axis=0)
 
     def _gain(self, change: NDArray[np.float64], mean: NDArray[np.float64]) -> float:
-        """Return the energy [J] that alpha adds to this rank's share in a step (negative: it takes some).
+        """Return the energy that alpha adds to this rank's share in a step, negative for dissipation [J].
 
-        With R all forces but inertia, bars for means over the step and D for changes, Newmark's formulas give
+        With R all forces except inertia, bars for means over the step and D for changes, Newmark's formulas give
         D(v.Mv)/2 - R_bar.Du = h v_bar.(M a_bar - R_bar + (gamma - 1/2) M Da) - h^2 (beta - gamma/2) R_bar.Da, and the
-        HHT method M a_bar - R_bar = alpha (R' - R_older) / 2, older by two steps.
+        HHT method gives M a_bar - R_bar = alpha (R' - R_older) / 2, where R_older is two steps old.
 
         Args:
-            change: ``(6, n, 3)`` change of ``_balance_fields`` over the step.
-            mean: Their means.
+            change: Change of ``_balance_fields`` over the step, shape (6, n, 3).
+            mean: Mean of ``_balance_fields`` over the step, shape (6, n, 3).
         """
         h, scheme, solved = self.step, self._scheme, self._equations.own
         if not scheme.alpha:
@@ -214,30 +215,30 @@ class ImplicitMotion(Motion):
         return float(np.sum((h * mean[1] * unbalanced - apart)[solved]))
 
     def _balance_fields(self) -> NDArray[np.float64]:
-        """Return displacement, velocity, acceleration, forces of loads, damping, elements: ``(6, n, 3)``."""
+        """Return displacement, velocity, acceleration and forces of loads, damping and elements, shape (6, n, 3)."""
         elastic = self.force - self._nodal - self._drag
         external = self._total_force() - elastic - self._drag
         return np.array([self.displacement, self.velocity, self._acceleration, external, self._drag, elastic])
 
     def _stored_apart(self) -> float:
-        """Return the kinetic energy [J] of prescribed components less that of masses that do not count."""
+        """Return the kinetic energy of prescribed components minus that of uncounted masses [J]."""
         owned = self.body.shared.owned[:, None]
         mass = np.where(self._prescribed, self.body.mass[:, None], 0.0) - self._extra[:, None]
         return 0.5 * float(np.sum(np.where(owned, mass, 0.0) * self.velocity**2))
 
     def _driven(self, time: float) -> NDArray[np.float64]:
-        """Return the mean velocity ``(n, 3)`` [m/s] of prescribed components over the step that begins at a time."""
+        """Return the mean prescribed velocity over the step that begins at ``time``, shape (n, 3) [m/s]."""
         velocity = np.zeros_like(self.velocity)
         for load in self._loads:
             load.drive(velocity, time)
         return velocity
 
     def _total_force(self) -> NDArray[np.float64]:
-        """Return all forces but inertia ``(n, 3)`` [N]."""
+        """Return the total force except inertia, shape (n, 3) [N]."""
         return self.force + (self.body.mass + self._extra)[:, None] * self.gravity
 
     def _update_force(self) -> None:
-        """Write the force of elements, damping and nodal loads; slaves go with their masters."""
+        """Update the force of elements, damping and nodal loads; slaves follow their masters."""
         self.body.tie.spread(self.displacement)
         self.body.tie.spread(self.velocity)
         self.slave_force = self._add_internal(self.displacement, self.force)
@@ -249,7 +250,7 @@ class ImplicitMotion(Motion):
         self.force += self._drag + self._nodal
 
     def _add_internal(self, field: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Write -K times a field into ``force``, summed over ranks; return this rank's part at the slaves."""
+        """Write -K times a field into ``force``, summed over ranks; return this rank's contribution at the slaves."""
         force.fill(0.0)
         for term in self.body.terms:
             term.add(field, force)
@@ -259,36 +260,36 @@ class ImplicitMotion(Motion):
         return at_slaves
 
     def present_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
+        """Return the velocity at ``time``, shape (n, 3) [m/s]."""
         return self.velocity
 
     @property
     def external_work(self) -> float:
-        """Return the work of all loads on this rank's share [J]; of a large mass, what it passes on."""
+        """Work of all loads on this rank's share [J]; for a large mass, the work that it transmits to the model."""
         return float(self._works[0] + self._stored_apart() - self._works[2])
 
     @property
     def damping_energy(self) -> float:
-        """Return the energy that damping and a negative alpha have taken from this rank's share [J]."""
+        """Energy that damping and a negative alpha have dissipated in this rank's share [J]."""
         return float(self._works[1])
 
     def reaction(self) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        """Return the forces of supports and prescribed motion on the nodes that this rank owns, shape (n, 3) [N]."""
         force = self.force.copy()
         for load in self._loads:
             load.release(force)
         return self.counted_mass[:, None] * (self._acceleration - self.gravity) - force
 
     def kinetic_energy(self) -> float:
-        """Return the kinetic energy [J] of this rank's share."""
+        """Return the kinetic energy of this rank's share [J]."""
         return 0.5 * float(self.counted_mass @ np.sum(self.velocity**2, axis=1))
 
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return zero: no step is too large for stability."""
+        """Return zero: every step is stable."""
         return 0.0
 
     def state(self) -> State:
-        """Return all that changes with time, for a checkpoint."""
+        """Return the time-dependent state, for a checkpoint."""
         nodes, tie = self.body.local.nodes, self.body.tie
         nodal = {"state": self._state.transpose(1, 0, 2), "before": self._before.transpose(1, 0, 2)}
         rows = {name: Rows(nodes, value) for name, value in (nodal | {"older": self._older}).items()}
@@ -298,7 +299,7 @@ class ImplicitMotion(Motion):
         return {**rows, **scalars, "slave_force": at_slaves, "loads": loads}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned, in a motion that was built alike."""
+        """Restore the values that ``state`` returned, in a motion built from the same input."""
         self._state[:], self._works[:] = state["state"].transpose(1, 0, 2), state["works"]
         self._before = state["before"].transpose(1, 0, 2)
         self.slave_force, self._older, self.time = state["slave_force"], state["older"], state["time"]
@@ -308,13 +309,13 @@ class ImplicitMotion(Motion):
 
 
 def check_linear(body: Body) -> None:
-    """Raise ``ValueError`` where the force of an element is not a matrix times the displacement."""
-    foreign = [
+    """Raise ``ValueError`` if the force of an element is not a constant matrix times the displacement."""
+    nonlinear = [
         term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements | BeddedFacets)
     ]
-    if foreign:
-        names = ", ".join(type(term).__name__ for term in foreign)
+    if nonlinear:
+        names = ", ".join(type(term).__name__ for term in nonlinear)
         raise ValueError(
-            f"the implicit solver is linear and cannot take {names}: materials must be elastic and kinematics small, or"
-            " the solver explicit"
+            f"the implicit solver is linear and does not support {names}; use elastic materials and small kinematics,"
+            " or the explicit solver"
         )

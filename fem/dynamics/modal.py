@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes: K x = omega^2 M x by shift and inverse, with SLEPc or else with SciPy."""
+"""Natural frequencies and mode shapes, K x = omega^2 M x by shift-and-invert, with SLEPc or else with SciPy."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ try:
 except ImportError:
     SLEPc = None
 
-# The shift lies below zero, so that the matrix to factor is positive definite even for a free body: by this fraction of
-# the largest omega^2. Smaller ones lose digits to its condition, larger ones bunch the wanted modes together.
+# The shift is -SHIFT times the largest omega^2, so that the factored matrix is positive definite even for a free body.
+# A smaller shift loses digits to the condition number, a larger one brings the lowest modes too close together.
 SHIFT = 1e-10
 TOLERANCE = 1e-9
 
@@ -28,9 +28,10 @@ class Modes:
     """The lowest modes of a model.
 
     Attributes:
-        frequency: ``(k,)`` [Hz], ascending; about zero for a rigid motion.
-        shape: ``(k, n, 3)`` [1/sqrt(kg)] at the nodes of this rank, x . M x = 1 over all ranks; of either sign.
-        effective_mass: ``(k, 3)`` [kg] that moves with each mode when the supports are shaken along x, y, z.
+        frequency: Natural frequencies in ascending order, shape (k,) [Hz]; about zero for rigid-body modes.
+        shape: Mode shapes at the nodes of this rank with x . M x = 1 over all ranks, shape (k, n, 3) [1/sqrt(kg)]; the
+            sign is arbitrary.
+        effective_mass: Effective modal mass for base excitation along x, y, z, shape (k, 3) [kg].
     """
 
     frequency: NDArray[np.float64]
@@ -39,18 +40,18 @@ class Modes:
 
 
 def natural_modes(equations: Equations, count: int) -> Modes:
-    """Return the lowest modes of a model; collective.
+    """Compute the lowest natural modes of a model; collective.
 
     Args:
-        equations: The model.
-        count: Modes wanted, fewer than there are equations.
+        equations: Numbered equations of the model.
+        count: Number of modes, less than the number of equations.
 
     Raises:
         ValueError: ``count`` is out of range, or there are several ranks and no SLEPc.
-        AgreedError: Fewer modes converged than are wanted; on every rank.
+        AgreedError: Fewer than ``count`` modes converged; on every rank.
     """
     if not 0 < count < equations.total:
-        raise ValueError(f"{count} modes are wanted, allowed are 1 to {equations.total - 1}")
+        raise ValueError(f"number of modes = {count}; allowed: 1 to {equations.total - 1}")
     solve = scipy_modes if SLEPc is None else slepc_modes
     stiffness, mass = equations.stiffness(), equations.mass()
     shift = -SHIFT * float((stiffness.getDiagonal() / mass).max()[1])
@@ -68,7 +69,7 @@ def natural_modes(equations: Equations, count: int) -> Modes:
 
 
 def momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sum over all ranks of mass times shape: ``(3,)``."""
+    """Return the sum over all ranks of mass times mode shape, shape (3,) [sqrt(kg)]."""
     owned = equations.body.shared.owned
     return np.asarray(equations.comm.allreduce(equations.body.mass[owned] @ shape[owned]))
 
@@ -76,7 +77,7 @@ def momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.flo
 def slepc_modes(
     stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
 ) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
-    """Return squared circular frequencies [1/s^2] and vectors; Krylov-Schur on any number of ranks."""
+    """Return squared circular frequencies [1/s^2] and eigenvectors by SLEPc's Krylov-Schur, on any number of ranks."""
     solver = SLEPc.EPS().create(stiffness.comm)
     solver.setOperators(stiffness, diagonal_matrix(mass))
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
@@ -98,7 +99,7 @@ def slepc_modes(
 
 
 def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
-    """Return a diagonal matrix in compressed rows."""
+    """Return a sparse diagonal matrix with the given diagonal."""
     matrix = PETSc.Mat().createAIJ((diagonal.sizes, diagonal.sizes), nnz=(1, 0), comm=diagonal.comm)
     matrix.setDiagonal(diagonal)
     matrix.assemble()
@@ -108,7 +109,7 @@ def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
 def scipy_modes(
     stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
 ) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
-    """Return the same with ARPACK, on one rank."""
+    """Return squared circular frequencies [1/s^2] and eigenvectors by SciPy's ARPACK, on one rank."""
     if stiffness.comm.size > 1:
         raise ValueError("modes on several ranks need SLEPc (package python3-slepc4py-real)")
     shifted, right, solution = stiffness.copy(), mass.duplicate(), mass.duplicate()

@@ -1,4 +1,4 @@
-"""What a run asks of a motion, be it explicit or implicit."""
+"""Common interface of explicit and implicit time integration of one model."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.loads.load import Loaded
-from reflowshock.fem.parallel.portable import State
+from reflowshock.fem.parallel.checkpoint_state import State
 
 
 class Motion(Loaded):
-    """The state of one model on one rank; energies and works are those of the rank's share [J].
+    """State of one model on one rank and its time integration; energies and works count the rank's share [J].
 
     Attributes:
-        slave_force: ``(ns, 3)`` [N] of this rank's elements on the slaves, before it is moved.
+        slave_force: Force of this rank's elements on the slaves before it is moved to the masters, shape (ns, 3) [N].
     """
 
     slave_force: NDArray[np.float64]
@@ -23,51 +23,51 @@ class Motion(Loaded):
     @property
     @abstractmethod
     def external_work(self) -> float:
-        """Return the work of all loads."""
+        """Work of all loads [J]."""
 
     @property
     @abstractmethod
     def damping_energy(self) -> float:
-        """Return the energy that damping has taken."""
+        """Energy that damping has dissipated [J]."""
 
     @abstractmethod
     def launch(self, velocity: NDArray[np.float64]) -> None:
-        """Give all free components an initial velocity ``(3,)`` [m/s]; before the first step."""
+        """Give all free components an initial velocity of shape (3,) [m/s] before the first step."""
 
     @abstractmethod
     def advance(self) -> None:
-        """Move from ``time`` to ``time + dt``; the force is then out of date."""
+        """Advance displacement and velocity by one step; call ``update_force`` afterwards."""
 
     @abstractmethod
     def update_force(self) -> None:
-        """Evaluate the force at the present displacement, once a step."""
+        """Evaluate the force at the current displacement, once per step."""
 
     def take_steps(self, count: int) -> None:
-        """Take steps, each with its force."""
+        """Take ``count`` steps, each with its force update."""
         for _ in range(count):
             self.advance()
             self.update_force()
 
     @abstractmethod
     def present_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(n, 3)`` [m/s] at ``time``."""
+        """Return the velocity at ``time``, shape (n, 3) [m/s]."""
 
     @abstractmethod
     def reaction(self) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] of supports and prescribed motion on the nodes that this rank counts."""
+        """Return the forces of supports and prescribed motion on the nodes that this rank owns, shape (n, 3) [N]."""
 
     @abstractmethod
     def kinetic_energy(self) -> float:
-        """Return the kinetic energy."""
+        """Return the kinetic energy [J]."""
 
     @abstractmethod
     def step_energy(self, foreign: NDArray[np.float64]) -> float:
-        """Return what exceeds the strain energy where the step is too large for stability, see ``ExplicitMotion``."""
+        """Return an energy [J] that exceeds the strain energy if the step is unstable, see ``ExplicitMotion``."""
 
     @abstractmethod
     def state(self) -> State:
-        """Return all that changes with time, for a checkpoint."""
+        """Return the time-dependent state, for a checkpoint."""
 
     @abstractmethod
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""

@@ -1,8 +1,8 @@
-"""The participants of a run: what all of them do in a window, and one model alone.
+"""Participants of a coupled run: their common interface, and a single uncoupled model.
 
-``begin_window`` and ``finish_window`` are apart, so that one rank can also carry several models and take turns: what
-others wait for is sent in the first, what needs their answer is done in the second. Messages between models go through
-two channels and nothing else. The participants of each scheme are in ``fem/coupling``.
+A window has two halves, so that one rank can carry several models in turn: ``begin_window`` sends the messages that
+other models wait for, ``finish_window`` does the work that needs their answers. Models exchange messages only through
+the two channels of the interface. The participants of each scheme are in ``fem/coupling``.
 """
 
 from collections.abc import Mapping
@@ -16,15 +16,15 @@ from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.parallel.portable import State, Sum
+from reflowshock.fem.parallel.checkpoint_state import State, Sum
 
 
 class Participant(Protocol):
-    """One model on one rank.
+    """One model on one rank, advanced window by window.
 
     Attributes:
-        plan: Window and substeps.
-        interface_work: Work [J] of this rank's share across the interface: put in by the macro model, received by the
+        plan: Length of the window and number of substeps.
+        interface_work: Work of this rank's share across the interface [J]: done by the macro model, or received by the
             meso model.
     """
 
@@ -33,33 +33,33 @@ class Participant(Protocol):
 
     @property
     def motion(self) -> Motion:
-        """Return its state."""
+        """State of the model."""
 
     def begin_window(self) -> None:
-        """Do what must come before other models of the rank have their turn."""
+        """Do the first half of the window: everything that other models of the rank wait for."""
 
     def finish_window(self) -> None:
-        """Do the rest of the window."""
+        """Do the second half of the window, with the answers of the other models."""
 
     def interface_force(self) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] across the interface as this participant knows them, zero elsewhere."""
+        """Return this participant's forces across the interface, zero elsewhere, shape (n, 3) [N]."""
 
     def foreign_force(self) -> NDArray[np.float64]:
-        """Return the part ``(n, 3)`` [N] of ``motion.force`` that belongs to the other model."""
+        """Return the part of ``motion.force`` that belongs to the other model, shape (n, 3) [N]."""
 
     def state(self) -> State:
-        """Return all that changes from window to window, for a checkpoint."""
+        """Return the time-dependent state, for a checkpoint."""
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""
 
 
-class Continued:
-    """What a participant keeps for a restart.
+class Restartable:
+    """Checkpoint and restart of a participant.
 
     Attributes:
-        motion: Its state.
-        interface_work: See ``Participant``.
+        motion: State of the model.
+        interface_work: Work across the interface [J], see ``Participant``.
     """
 
     motion: Motion
@@ -70,37 +70,37 @@ class Continued:
         return {"motion": self.motion.state(), "interface_work": Sum(self.interface_work)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""
         self.motion.restore(state["motion"])
         self.interface_work = state["interface_work"]
 
 
-class Alone(Continued):
-    """One model without an interface: a DNS, all steps small, or a structure."""
+class SingleModel(Restartable):
+    """Participant of a run with one model and no interface: a DNS or a structure."""
 
     def __init__(self, motion: Motion, plan: WindowPlan) -> None:
-        """Take a motion that is ready to advance by the plan's steps."""
+        """Wrap a motion whose step is the substep of the plan."""
         self.motion = motion
         self.interface_work = 0.0
         self.plan = plan
         self._zero = np.zeros_like(self.motion.force)
 
     def begin_window(self) -> None:
-        """Take m substeps."""
+        """Take all substeps of the window."""
         self.motion.take_steps(self.plan.substeps)
 
     def finish_window(self) -> None:
-        """Do nothing: the window is done."""
+        """Do nothing: ``begin_window`` has finished the window."""
 
     def interface_force(self) -> NDArray[np.float64]:
         """Return zero: there is no coupling interface."""
         return self._zero
 
     def foreign_force(self) -> NDArray[np.float64]:
-        """Return zero: all forces are this model's."""
+        """Return zero: all forces belong to this model."""
         return self._zero
 
 
 def explicit_motion(body: Body, loads: list[Load], step: float) -> ExplicitMotion:
-    """Return the motion from rest of a model without an interface."""
+    """Return the explicit motion of a model without an interface, starting at rest."""
     return ExplicitMotion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))

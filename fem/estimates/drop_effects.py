@@ -1,11 +1,11 @@
-"""The effects of a board's drop, from dimensionless numbers: for ``plan`` and the run itself."""
+"""Effects of a board drop, decided from dimensionless numbers, for plans and runs; ``DROP_EFFECTS`` lists them all."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any
 
-from reflowshock.effect import Decision, Effect, Switch, Toggle, decision
+from reflowshock.effect import Decision, Switch, Toggle, decision
+from reflowshock.fem.estimates.drop_effect import Drop, DropEffect, DropRun
 from reflowshock.fem.estimates.material_effects import (
     OF_YIELD_STRESS,
     MaterialEffect,
@@ -15,105 +15,25 @@ from reflowshock.fem.estimates.material_effects import (
 )
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.kinematics import Kinematics, finite_rotation
-from reflowshock.fem.problem.shock import Shock
 from reflowshock.materials.library import SAC405
 from reflowshock.materials.parameters import Material
 from reflowshock.parameters import changed
 
-NEGLIGIBLE_WEIGHT = 1e-3  # of the peak acceleration: weight below it is left out
-# A strip between ends that do not approach each other: w deflects it against k w (1 + 3 (w / t)^2), since its tension
-# E A / (4 L^2) (pi w)^2 adds N (pi / L)^2 to the bending stiffness (Woinowsky-Krieger, J. Appl. Mech. 17, 1950).
+NEGLIGIBLE_WEIGHT = 1e-3  # g over the peak acceleration below which gravity is neglected
+# Strip between immovable ends: the restoring force at the deflection w is k w (1 + 3 (w / t)^2), because the tension
+# N = E A / (4 L^2) (pi w)^2 adds N (pi / L)^2 to the bending stiffness (Woinowsky-Krieger, J. Appl. Mech. 17, 1950).
 STIFFENING_BOUND = 3.0
-# The same of boards held at four holes, whose edges draw in: from runs 0.11 (cases/jedec_board, 5.0 instead of 7.7
-# thicknesses), 0.35 (bare board of cases/bga_drop, 4.8 instead of 10.9) and 0.73 (the same at 150 G, 0.95 instead of
-# 1.09), so that what it predicts is right within a factor of two.
+# The same coefficient for boards held at four holes, whose edges draw in. Runs gave 0.11 (cases/jedec_board, deflection
+# 5.0 instead of 7.7 thicknesses), 0.35 (bare board of cases/bga_drop, 4.8 instead of 10.9) and 0.73 (the same at 150 G,
+# 0.95 instead of 1.09), so the predicted change is right within a factor of two.
 STIFFENING_OF_BOARD = 0.35
-NEGLIGIBLE_STIFFENING = 1e-2  # of the deflection, by the bound
-YIELDS_FROM = 0.5  # of the yield stress, by the peel stress of a pad: von Mises stress is up to 1.6 times that
-ADDED_MASS_LIMIT = 0.05  # of the mass of the model, by mass scaling
-
-
-class Deflection(NamedTuple):
-    """Largest deflection of a board's middle [m], of its slope, and the angular frequency of the mode [rad/s]."""
-
-    largest: float
-    slope: float
-    omega: float
-
-
-class Drop(Protocol):
-    """A drop before it runs."""
-
-    @property
-    def shock(self) -> Shock:
-        """Its parameters."""
-
-    @property
-    def materials(self) -> Mapping[str, Material]:
-        """Role -> material."""
-
-    @property
-    def thickness(self) -> float:
-        """Of the board [m]."""
-
-    @property
-    def symmetry(self) -> Literal["full", "quarter"]:
-        """Of the model."""
-
-    @property
-    def weight(self) -> Decision:
-        """Whether weight acts, from g over the peak acceleration."""
-
-    @property
-    def yielding(self) -> Decision:
-        """Whether solder yields that can, from the expected peel stress over its yield stress."""
-
-    @property
-    def cooled(self) -> bool:
-        """Whether it begins with the stress of cooling."""
-
-    @property
-    def duration(self) -> float:
-        """How long it is followed, at most [s]."""
-
-    @property
-    def expected(self) -> Deflection:
-        """How the shock bends the board."""
-
-    @property
-    def bent_by_weight(self) -> float:
-        """Deflection of the board [m] by weight alone."""
-
-
-@dataclass(frozen=True, slots=True)
-class DropRun:
-    """A drop that has ended.
-
-    Attributes:
-        shock: Its parameters.
-        materials: Role -> material.
-        weight: Whether weight acted.
-        added_mass: Mass that scaling has added [kg].
-        neglected_strain: Largest strain that small kinematics have left out.
-    """
-
-    shock: Shock
-    materials: Mapping[str, Material]
-    weight: Decision
-    added_mass: float
-    neglected_strain: float
-
-
-class DropEffect(Effect[Drop]):
-    """An effect of a drop."""
-
-    def tell(self, run: DropRun) -> Decision | None:
-        """Return what a run that has ended says of it; None where it says nothing."""
-        return None
+NEGLIGIBLE_STIFFENING = 1e-2  # relative change of the deflection, by the bound
+YIELDS_FROM = 0.5  # peel stress at a pad over the yield stress; the von Mises stress is up to 1.6 times higher
+ADDED_MASS_LIMIT = 0.05  # mass added by mass scaling over the mass of the model
 
 
 class WeightEffect(DropEffect):
-    """Gravity beside the shock: all is linear in their sum."""
+    """Gravity during the shock."""
 
     name = "gravity_in_the_shock"
     adds = "f = M g"
@@ -126,7 +46,7 @@ class WeightEffect(DropEffect):
 
     @staticmethod
     def beside(switch: Switch, peak: float, gravity: float) -> Decision:
-        """Decide whether weight acts beside a shock of a peak acceleration [m/s^2]."""
+        """Decide on gravity in a shock, from the switch, the peak acceleration and g [m/s^2]."""
         ratio = gravity / peak if peak > 0.0 else math.inf
         reason = f"1 G is {ratio:.3g} of the peak acceleration"
         if switch != "auto":
@@ -135,28 +55,28 @@ class WeightEffect(DropEffect):
         return decision(on, f"{reason}, {'at least' if on else 'below'} {NEGLIGIBLE_WEIGHT:g}", min(ratio, 1.0))
 
     def decide(self, drop: Drop) -> Decision:
-        """Tell how far it bends the board alone.
+        """Return the decision on gravity, with its static deflection over the largest deflection as influence.
 
-        It lasts, and a pulse does not: a board that is slow against the pulse feels it more than g over the peak says.
+        Gravity lasts longer than the pulse, so a board whose period is long against the pulse responds to gravity more
+        than g over the peak acceleration suggests.
         """
         largest = drop.expected.largest
         influence = min(1.0, drop.bent_by_weight / largest) if largest > 0.0 else 1.0
         return decision(drop.weight["on"], drop.weight["why"], influence)
 
-    def tell(self, run: DropRun) -> Decision:
-        """Tell what was decided."""
+    def report(self, run: DropRun) -> Decision:
+        """Return the decision of the plan."""
         return run.weight
 
 
 def stiffened(ratio: float, coefficient: float) -> float:
-    """Return by how much of itself a deflection shrinks when stretching is counted.
+    """Return the relative reduction of a deflection by membrane stiffening, 1 - w / w0.
 
-    The energy that a shock brings bends a linear plate by w0, and one that stiffens by w:
-    w0^2 = w^2 + c w^4 / (2 t^2).
+    The same energy bends a linear plate by w0 and a stiffening plate by w: w0^2 = w^2 + c w^4 / (2 t^2).
 
     Args:
-        ratio: w0 / t, linear deflection over thickness.
-        coefficient: c.
+        ratio: Linear deflection over thickness, w0 / t.
+        coefficient: Stiffening coefficient c.
     """
     if ratio == 0.0:
         return 0.0
@@ -165,11 +85,12 @@ def stiffened(ratio: float, coefficient: float) -> float:
 
 
 def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
-    """Decide kinematics from a board's deflection over its thickness, and say why.
+    """Return the kinematics that a deflection calls for, and the reason as text.
 
     Args:
-        ratio: Deflection over thickness.
-        cooled: Whether a shock begins with the stress of cooling, which takes a path in all elements that turn.
+        ratio: Deflection of the board over its thickness.
+        cooled: Whether the shock begins with residual stress, which requires path-dependent elements at finite
+            rotations.
     """
     bound = stiffened(ratio, STIFFENING_BOUND)
     turns = bound > NEGLIGIBLE_STIFFENING
@@ -181,7 +102,7 @@ def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
 
 
 class FiniteRotation(DropEffect):
-    """Rotations that are finite: what stretches where it bends is stiffer."""
+    """Finite rotations, which include the membrane stiffening of a bent board."""
 
     name = "finite_rotation"
     adds = "F = R U, P = R s U^-1 instead of eps = sym grad u"
@@ -194,26 +115,26 @@ class FiniteRotation(DropEffect):
     toggle = Toggle("shock.numerics.kinematics", "corotational", "small")
 
     def decide(self, drop: Drop) -> Decision:
-        """By the deflection that is expected, and what small rotations would leave out."""
+        """Decide by the expected deflection over the thickness."""
         kinematics, ratio = drop.shock.numerics.kinematics, drop.expected.largest / drop.thickness
-        wanted, reason = called_for(ratio, drop.cooled)
-        taken = wanted if kinematics == "auto" else kinematics
-        finite, why = finite_rotation("shock.numerics", taken, 0.5 * drop.expected.slope**2)
+        required, reason = called_for(ratio, drop.cooled)
+        chosen = required if kinematics == "auto" else kinematics
+        finite, why = finite_rotation("shock.numerics", chosen, 0.5 * drop.expected.slope**2)
         if kinematics == "auto":
             why = f"shock.numerics.kinematics = auto: {reason}"
         elif not finite:
-            why += "" if wanted == "small" else f"; auto would choose {wanted}"
+            why += "" if required == "small" else f"; auto would choose {required}"
         why = f"the board is expected to deflect by about {ratio:.3g} times its thickness; {why}"
         return decision(finite, why, stiffened(ratio, STIFFENING_OF_BOARD))
 
-    def tell(self, run: DropRun) -> Decision:
-        """Tell the strain that was left out."""
+    def report(self, run: DropRun) -> Decision:
+        """Return the kinematics of the run with the strain that they neglect."""
         kinematics = run.shock.numerics.decided_kinematics
         return decision(*finite_rotation("shock.numerics", kinematics, run.neglected_strain))
 
 
 class SolderPlasticity(DropEffect):
-    """Solder that yields and hardens."""
+    """Plasticity of the solder."""
 
     name, adds, place, source = Plasticity.name, Plasticity.adds, Plasticity.place, Plasticity.source
     number = "expected peel stress / sigma_y, peel = K sqrt(k E t^3 / 12) pitch^2 / A, board bent by K on springs k"
@@ -223,34 +144,41 @@ class SolderPlasticity(DropEffect):
 
     @staticmethod
     def called_for(switch: Switch, materials: Mapping[str, Material], stress: float, cooled: bool) -> Decision:
-        """Decide whether solder yields that bears an expected peel stress [Pa], or cools down before."""
+        """Decide on plasticity of the solder.
+
+        Args:
+            switch: Value of ``shock.numerics.plasticity``.
+            materials: Materials by role.
+            stress: Expected peel stress [Pa].
+            cooled: Whether the shock begins with the residual stress of cooling.
+        """
         law = materials["solder"].plasticity
         if law is None:
             return decision(False, "the solder is elastic")
-        told = f"shock.numerics.plasticity = {switch}; {yields('solder', law)}"
+        reason = f"shock.numerics.plasticity = {switch}; {yields('solder', law)}"
         if switch != "auto":
-            return decision(switch == "on", told)
+            return decision(switch == "on", reason)
         ratio = stress / law.A
-        told += f"; a peel stress of {1e-6 * stress:.3g} MPa is expected, {ratio:.3g} of that"
+        reason += f"; a peel stress of {1e-6 * stress:.3g} MPa is expected, {ratio:.3g} of that"
         if cooled:
-            return decision(True, f"{told}; it yields while it cools")
+            return decision(True, f"{reason}; it yields while it cools")
         on = ratio >= YIELDS_FROM
-        return decision(on, f"{told}, {'at least' if on else 'below'} {YIELDS_FROM:g}")
+        return decision(on, f"{reason}, {'at least' if on else 'below'} {YIELDS_FROM:g}")
 
     def decide(self, drop: Drop) -> Decision:
-        """By the stress that is expected."""
+        """Decide by the expected peel stress."""
         return drop.yielding
 
-    def tell(self, run: DropRun) -> Decision:
-        """Tell the laws that acted."""
+    def report(self, run: DropRun) -> Decision:
+        """Return the plastic materials of the run."""
         laws = plastic_laws(run.materials)
         why = f"shock.numerics.plasticity = {run.shock.numerics.plasticity}"
         return decision(bool(laws), "; ".join([why, *(yields(name, law) for name, law in laws.items())]))
 
     def other_way(self, case: Any, acts: bool) -> Any:
-        """Return a package's case with solder that stays elastic, or that yields."""
-        able = case if acts or case.materials.solder.plasticity else changed(case, "materials.solder", SAC405)
-        return changed(able, "shock.numerics.plasticity", "off" if acts else "on")
+        """Return the case of a package with elastic solder if it is plastic, else with plastic solder."""
+        with_law = case if acts or case.materials.solder.plasticity else changed(case, "materials.solder", SAC405)
+        return changed(with_law, "shock.numerics.plasticity", "off" if acts else "on")
 
 
 class RayleighEffect(DropEffect):
@@ -265,22 +193,22 @@ class RayleighEffect(DropEffect):
     source = "Rayleigh"
 
     def decide(self, drop: Drop) -> Decision:
-        """Tell what it takes from the board's first mode."""
+        """Decide by the coefficients, with the damping of the first mode of the board as influence."""
         (alpha, beta), omega = drop.shock.damping.coefficients, drop.expected.omega
         if not (alpha or beta):
             return decision(False, "shock.damping gives none", 0.0)
         ratio = 0.5 * (alpha / omega + beta * omega)
-        taken = -math.expm1(-ratio * omega * drop.duration)
-        return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", taken)
+        loss = -math.expm1(-ratio * omega * drop.duration)
+        return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", loss)
 
-    def tell(self, run: DropRun) -> Decision:
-        """Tell the coefficients."""
+    def report(self, run: DropRun) -> Decision:
+        """Return the coefficients of Rayleigh damping."""
         alpha, beta = run.shock.damping.coefficients
         return decision(bool(alpha or beta), f"Rayleigh damping, alpha = {alpha:.4g} 1/s, beta = {beta:.4g} s")
 
 
 class Failing(DropEffect):
-    """Joints that are judged by limits."""
+    """Failure criteria of joints."""
 
     name = "failure"
     adds = "peel stress, von Mises stress and plastic work at each pad against limits"
@@ -293,17 +221,17 @@ class Failing(DropEffect):
 
     @staticmethod
     def by_limits(failure: Failure) -> Decision:
-        """Decide whether joints are judged: where a measure has a limit. Judging changes no result."""
+        """Decide whether failure is assessed: if any measure has a limit. Assessment changes no result."""
         why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
         return decision(bool(failure.limits), why if failure.limits else "shock.failure gives no limit", 0.0)
 
     def decide(self, drop: Drop) -> Decision:
-        """By the limits of the case."""
+        """Decide by the limits of the case."""
         return self.by_limits(drop.shock.failure)
 
 
 class DrivenJoints(DropEffect):
-    """A coarse model that drives the joints, which do not act on it."""
+    """One-way coupling: a coarse model drives the joints without feedback."""
 
     name = "one_way"
     adds = "nothing: F_G += N^T F_L is left out, a coarse model drives"
@@ -314,7 +242,7 @@ class DrivenJoints(DropEffect):
     toggle = Toggle("shock.coupling.direction", "one_way", "two_way")
 
     def decide(self, drop: Drop) -> Decision:
-        """As the case says, where there are two models."""
+        """Decide by the coupling of the case, for two models."""
         coupled = "two_scale" in drop.shock.numerics.modes
         one_way = coupled and drop.shock.coupling.direction == "one_way"
         why = f"shock.coupling.direction = {drop.shock.coupling.direction}" if coupled else "one model"
@@ -322,7 +250,7 @@ class DrivenJoints(DropEffect):
 
 
 class MassScaling(DropEffect):
-    """Mass added to small elements, for longer steps."""
+    """Mass scaling: mass added to small elements for a longer time step."""
 
     name = "mass_scaling"
     adds = "rho times (dt_target / dt)^2 in small elements"
@@ -335,18 +263,18 @@ class MassScaling(DropEffect):
     toggle = Toggle("shock.numerics.mass_scaled", ("copper",), ())
 
     def decide(self, drop: Drop) -> Decision:
-        """As the case says."""
+        """Decide by the setting of the case."""
         scaled = drop.shock.numerics.mass_scaled
         return decision(bool(scaled), f"shock.numerics.mass_scaled = {list(scaled)}")
 
-    def tell(self, run: DropRun) -> Decision:
-        """Tell the mass."""
+    def report(self, run: DropRun) -> Decision:
+        """Return the added mass."""
         why = f"shock.numerics.mass_scaled = {list(run.shock.numerics.mass_scaled)}; adds {run.added_mass:.3e} kg"
         return decision(run.added_mass > 0.0, why)
 
 
 class ByLargeMass(DropEffect):
-    """Input-G by a large mass at the holes."""
+    """Input-G by a large mass at the mounting holes."""
 
     name = "large_mass"
     adds = "a mass at the holes, pushed: M_L (x'' - a(t)) = 0"
@@ -356,12 +284,12 @@ class ByLargeMass(DropEffect):
     source = "H 4.4"
 
     def decide(self, drop: Drop) -> Decision:
-        """As the case says."""
+        """Decide by the setting of the case."""
         return decision(drop.shock.method == "large_mass", f"shock.method = {drop.shock.method}", 0.0)
 
 
 class Symmetry(DropEffect):
-    """A quarter of the board for the whole."""
+    """Symmetry: a quarter of the board instead of the whole."""
 
     name = "symmetry"
     adds = "u_n = 0 on x = 0 and y = 0: a quarter of the elements"
@@ -371,7 +299,7 @@ class Symmetry(DropEffect):
     source = "symmetry"
 
     def decide(self, drop: Drop) -> Decision:
-        """As the case says."""
+        """Decide by the setting of the case."""
         return decision(drop.symmetry == "quarter", f"board.symmetry = {drop.symmetry}", 0.0)
 
 
@@ -389,7 +317,7 @@ DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
 )
 
 
-def told(run: DropRun) -> dict[str, Decision]:
-    """Return what a run that has ended says of its effects; gravity under its short name."""
-    found = {effect.name.removesuffix("_in_the_shock"): effect.tell(run) for effect in DROP_EFFECTS}
-    return {name: decision for name, decision in found.items() if decision is not None}
+def reported_effects(run: DropRun) -> dict[str, Decision]:
+    """Return the decisions on all effects of a completed run by name; gravity has its short name."""
+    decisions = {effect.name.removesuffix("_in_the_shock"): effect.report(run) for effect in DROP_EFFECTS}
+    return {name: decision for name, decision in decisions.items() if decision is not None}

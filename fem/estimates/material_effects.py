@@ -1,4 +1,4 @@
-"""The effects of materials that yield. Plain Python, for ``plan`` and for the run itself."""
+"""Effects of plastic materials, for plans and runs."""
 
 from collections.abc import Mapping
 from math import log
@@ -7,38 +7,38 @@ from typing import Protocol
 from reflowshock.effect import Decision, Effect, decision
 from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
-RATE_OF_DROPS = 100.0  # [1/s] of solder: cases/bga_drop finds up to 50
+RATE_OF_DROPS = 100.0  # strain rate of solder in drops [1/s]; up to 50 in cases/bga_drop
 
 
 class OfMaterials(Protocol):
-    """A scene with materials."""
+    """Scene with materials."""
 
     @property
     def materials(self) -> Mapping[str, Material]:
-        """Part or role -> its material."""
+        """Materials by part or role."""
 
 
 class MaterialEffect(Effect[OfMaterials]):
-    """An effect of materials that yield."""
+    """Effect of plastic materials."""
 
     source = "Johnson & Cook 1983"
 
     def decide(self, scene: OfMaterials) -> Decision:
-        """Nothing where all are elastic."""
+        """Decide by the plastic laws of the materials; the effect is off if all materials are elastic."""
         laws = plastic_laws(scene.materials)
         return self.of_laws(scene, laws) if laws else decision(False, "all materials are elastic")
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
-        """Decide where some yield, by their laws."""
+        """Decide by the plastic laws of at least one material."""
         raise NotImplementedError
 
-    def tell(self, run: OfMaterials) -> Decision:
-        """Return what a run says of it: the same."""
+    def report(self, run: OfMaterials) -> Decision:
+        """Return the decision for the results of a run, equal to that of the plan."""
         return self.decide(run)
 
 
 class Plasticity(MaterialEffect):
-    """Yielding and hardening."""
+    """Plastic flow with isotropic hardening."""
 
     name = "plasticity"
     adds = "deps_p = 3/2 dp s / sigma_eq, sigma_eq <= sigma_y(p)"
@@ -50,12 +50,12 @@ class Plasticity(MaterialEffect):
     source = "von Mises; Johnson & Cook 1983"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
-        """Say from which stress on each yields."""
+        """Return the decision, with the yield stress of each material as reason."""
         return decision(True, "; ".join(yields(name, law) for name, law in laws.items()))
 
 
 class StrainRate(MaterialEffect):
-    """Yield stress that rises with the rate."""
+    """Yield stress that increases with the strain rate."""
 
     name = "strain_rate"
     adds = "sigma_y times 1 + C ln max(1, p' / p0')"
@@ -66,7 +66,7 @@ class StrainRate(MaterialEffect):
     switch = "materials.*.plasticity.C"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
-        """By the constant C."""
+        """Decide by the constant C."""
         raised = max(law.C * log(RATE_OF_DROPS / law.reference_rate) for law in laws.values())
         fast = [
             f"{name}: C = {law.C:g} above {law.reference_rate:g} 1/s at which A and B are measured"
@@ -77,7 +77,7 @@ class StrainRate(MaterialEffect):
 
 
 class ThermalSoftening(MaterialEffect):
-    """Yield stress that falls with temperature."""
+    """Yield stress that decreases with temperature."""
 
     name = "thermal_softening"
     adds = "sigma_y times 1 - T*^m"
@@ -88,7 +88,7 @@ class ThermalSoftening(MaterialEffect):
     switch = "materials.*.temperature"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
-        """By the temperature of each."""
+        """Decide by the temperature of each material."""
         isotropic = {name: item for name, item in scene.materials.items() if isinstance(item, Isotropic)}
         soft = {name: item.softening for name, item in isotropic.items() if item.softening < 1.0}
         why = "; ".join(f"{name}: yield stress times {factor:.3g}" for name, factor in soft.items())
@@ -101,11 +101,11 @@ MATERIAL_EFFECTS: tuple[MaterialEffect, ...] = (Plasticity(), *OF_YIELD_STRESS)
 
 
 def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:
-    """Return the yield stress of the materials that have one, by name."""
+    """Return the Johnson-Cook parameters of the plastic materials by name."""
     return {name: material.plasticity for name, material in materials.items() if material.plasticity is not None}
 
 
 def yields(name: str, law: JohnsonCook) -> str:
-    """Say when a material yields."""
+    """Return a sentence on the yield stress and the hardening of a material."""
     hardening = f", hardening {1e-6 * law.B:g} MPa p^{law.n:g}" if law.B > 0.0 else ", no hardening"
     return f"{name} yields from {1e-6 * law.A:g} MPa on{hardening}"

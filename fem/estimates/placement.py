@@ -116,12 +116,12 @@ def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
     """Return the predicted seconds of the fastest placement on ranks of speed one, however many these are."""
     size, found = ranks.total, []
     if ranks.placement != "disjoint":
-        macro, meso = (model_seconds(model, (size, size > 1), cost.latency) for model in (cost.macro, cost.meso))
+        macro, meso = (model_seconds(model, size, size > 1, cost.latency) for model in (cost.macro, cost.meso))
         found.append(_together(cost, macro, meso, 2.0 * (size > 1)))
     if ranks.placement != "shared":
         for count in [ranks.macro] if ranks.macro else range(1, size):
-            macro = model_seconds(cost.macro, (count, count > 1), cost.latency)
-            meso = model_seconds(cost.meso, (size - count, size - count > 1), cost.latency)
+            macro = model_seconds(cost.macro, count, count > 1, cost.latency)
+            meso = model_seconds(cost.meso, size - count, size - count > 1, cost.latency)
             found.append(_together(cost, macro, meso, None))
     return min(found)
 
@@ -133,8 +133,8 @@ def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCo
     """
     power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
     several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
-    macro = model_seconds(cost.macro, (power["macro"], several["macro"]), cost.latency)
-    meso = model_seconds(cost.meso, (power["meso"], several["meso"]), cost.latency)
+    macro = model_seconds(cost.macro, power["macro"], several["macro"], cost.latency)
+    meso = model_seconds(cost.meso, power["meso"], several["meso"], cost.latency)
     return _together(cost, macro, meso, 2.0 * several["macro"] if placement.name == "shared" else None)
 
 
@@ -145,17 +145,23 @@ def _together(cost: WindowCost, macro: float, meso: float, sharing: float | None
     return (max if cost.overlap else sum)((macro, meso)) + 2.0 * cost.latency
 
 
-def model_seconds(cost: ModelCost, ranks: tuple[float, bool], latency: float) -> float:
-    """Return the seconds of a window of one model on ranks whose speeds add up to a number, and may be several."""
-    power, several = ranks
-    return cost.work / power + cost.calls + several * cost.sums * latency
+def model_seconds(cost: ModelCost, speed: float, several: bool, latency: float) -> float:
+    """Return the predicted time of one window of one model [s].
+
+    Args:
+        cost: Cost of the window.
+        speed: Sum of the speeds of the ranks.
+        several: Whether the model is on more than one rank.
+        latency: Time of one message [s].
+    """
+    return cost.work / speed + cost.calls + several * cost.sums * latency
 
 
 def check_size(ranks: Ranks, size: int) -> None:
-    """Check that as many ranks were started as two models were to have.
+    """Check that the number of MPI ranks is that of the input.
 
     Raises:
-        RankError: Another number of ranks.
+        RankError: The numbers differ.
     """
     if size != ranks.total:
         raise RankError(f"the input asks for {ranks.total} ranks (ranks.total), mpirun started {size}")

@@ -1,4 +1,4 @@
-"""The effects of a structure's motion, before a run and after it."""
+"""Effects of the motion of a structure, for plans and runs; ``STRUCTURE_EFFECTS`` lists them all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,18 +6,19 @@ from dataclasses import dataclass
 from reflowshock.effect import Decision, Effect, Toggle, decided, decision
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
 from reflowshock.fem.problem.kinematics import finite_rotation
-from reflowshock.fem.problem.structure import KINDS, Pulsed, StructureProblem
+from reflowshock.fem.problem.load_kinds import KINDS, Pulsed
+from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.materials.parameters import Material
 
 
 @dataclass(frozen=True, slots=True)
 class MotionScene:
-    """The motion of a structure.
+    """Motion of a structure, before or after a run.
 
     Attributes:
-        problem: Its parameters.
-        added_mass: Mass that scaling adds [kg].
-        neglected_strain: Largest strain that a run of small kinematics has left out; None before a run.
+        problem: Parameters of the structure and its motion.
+        added_mass: Mass added by mass scaling [kg].
+        neglected_strain: Largest strain neglected by the kinematics of a run; None before a run.
     """
 
     problem: StructureProblem
@@ -26,42 +27,42 @@ class MotionScene:
 
     @property
     def materials(self) -> Mapping[str, Material]:
-        """Layer -> its material."""
+        """Materials by layer."""
         return self.problem.layer_materials
 
 
 class Loading(Effect[MotionScene]):
-    """Loads of one kind."""
+    """Loads of one kind, a class of ``problem.load_kinds``."""
 
     def __init__(self, kind: type[Pulsed]) -> None:
-        """Take the name from the kind."""
+        """Name the effect after the kind."""
         self.kind, self.name = kind, kind.effect
 
     def decide(self, motion: MotionScene) -> Decision:
-        """By the loads of the case."""
+        """Decide by the loads of the case."""
         names = [f"loads.{name}" for name, load in motion.problem.loads.items() if isinstance(load, self.kind)]
         return decision(bool(names), ", ".join(names) or f"no load of kind {self.kind.model_fields['kind'].default}")
 
 
 class InitialVelocity(Effect[MotionScene]):
-    """A velocity at the start."""
+    """Initial velocity of the structure."""
 
     name = "initial_velocity"
 
     def decide(self, motion: MotionScene) -> Decision:
-        """As the case says."""
+        """Decide by the setting of the case."""
         velocity = motion.problem.dynamics.initial_velocity
         return decision(any(velocity), f"dynamics.initial_velocity = {list(velocity)} m/s")
 
 
 class StructureRotation(Effect[MotionScene]):
-    """Rotations that are finite."""
+    """Finite rotations."""
 
     name = "finite_rotation"
     toggle = Toggle("dynamics.kinematics", "finite", "small")
 
     def decide(self, motion: MotionScene) -> Decision:
-        """As the case says, with the strain that was left out."""
+        """Decide by the kinematics of the case, with the neglected strain as reason."""
         return decision(*finite_rotation("dynamics", motion.problem.dynamics.kinematics, motion.neglected_strain))
 
 
@@ -71,31 +72,31 @@ class StructureDamping(Effect[MotionScene]):
     name = "damping"
 
     def decide(self, motion: MotionScene) -> Decision:
-        """As the case says."""
+        """Decide by the setting of the case."""
         keys = motion.problem.dynamics.damping.model_dump().items()
-        given = [f"{key} = {value:g}" for key, value in keys if value and key != "frequency"]
-        return decision(bool(given), ", ".join(given) or "none is given")
+        settings = [f"{key} = {value:g}" for key, value in keys if value and key != "frequency"]
+        return decision(bool(settings), ", ".join(settings) or "none is given")
 
 
 class StructureMassScaling(Effect[MotionScene]):
-    """Mass added to small elements, for longer steps."""
+    """Mass scaling: mass added to small elements for a longer time step."""
 
     name = "mass_scaling"
 
     def decide(self, motion: MotionScene) -> Decision:
-        """By the mass that it adds."""
+        """Decide by the added mass."""
         scaled = list(motion.problem.dynamics.numerics.mass_scaled)
         why = f"dynamics.numerics.mass_scaled = {scaled}; adds {motion.added_mass:.3e} kg"
         return decision(motion.added_mass > 0.0, why)
 
 
 class HourglassStiffness(Effect[MotionScene]):
-    """Stiffness of the modes that one integration point misses."""
+    """Hourglass stiffness of one-point hexahedra."""
 
     name = "hourglass_stiffness"
 
     def decide(self, motion: MotionScene) -> Decision:
-        """By the formulation."""
+        """Decide by the formulation of the elements."""
         formulation = motion.problem.structure.formulation
         return decision(formulation == "one_point", f"structure.formulation = {formulation}")
 
@@ -112,5 +113,5 @@ STRUCTURE_EFFECTS: tuple[Effect[MotionScene] | MaterialEffect, ...] = (
 
 
 def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Decision]:
-    """Decide the effects of a structure, see ``MotionScene``."""
+    """Decide on the effects of a structure; arguments as the attributes of ``MotionScene``."""
     return decided(STRUCTURE_EFFECTS, MotionScene(problem, added_mass, neglected_strain))

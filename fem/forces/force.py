@@ -20,7 +20,7 @@ from reflowshock.fem.forces.force_congruent import CongruentElements, in_rows
 from reflowshock.fem.forces.force_corotational import corotational_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
-from reflowshock.fem.parallel.portable import Rows
+from reflowshock.fem.parallel.checkpoint_state import Rows
 from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.materials.parameters import Material
 from reflowshock.materials.plasticity import FIRST_YIELD, plastic_constants

@@ -35,7 +35,7 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
-from reflowshock.fem.parallel.portable import Rows
+from reflowshock.fem.parallel.checkpoint_state import Rows
 from reflowshock.materials.plasticity import NEVER_YIELDS
 
 AnyBlocks = Blocks | OnePointBlocks | HexahedronBlocks

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.parallel.portable import Rows
+from reflowshock.fem.parallel.checkpoint_state import Rows
 
 Expression = Any  # of UFL, whose classes have no common name in all versions
 Internal = Mapping[str, Expression]

@@ -1,4 +1,4 @@
-"""Rayleigh damping C = alpha M + beta K: a force at the nodes, and the energy that it takes."""
+"""Rayleigh damping C = alpha M + beta K: nodal forces and dissipated energy."""
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
@@ -15,45 +15,51 @@ from reflowshock.fem.model.body import Body
 
 
 class RayleighDamping(Load):
-    """Damping of the velocity: -alpha M v at the middle of the step, -beta K v half a step late.
+    """Rayleigh damping: -alpha M v at the middle of the step, -beta K v half a step late.
 
-    The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, which needs no smaller step. The stiffness term
-    takes v(t - dt/2), as K v(t) would need a solve, and lowers the critical step (``estimate.damped_critical_step``).
-    With v(t) = (v(t - dt/2) + dt a / 2) / (1 + alpha dt / 2), a without drag, no equation is left to solve.
+    The mass term is implicit, -alpha M (v(t - dt/2) + v(t + dt/2)) / 2, and does not lower the critical time step. The
+    stiffness term uses v(t - dt/2), because K v(t) would require a solve; it lowers the critical time step
+    (``estimate.damped_critical_step``). With v(t) = (v(t - dt/2) + dt a / 2) / (1 + alpha dt / 2), a being the
+    acceleration without the mass term, the scheme is explicit.
 
     Attributes:
-        force: ``(n, 3)`` [N] at the motion's time, summed over ranks.
+        force: Damping force at the time of the motion, summed over ranks, shape (n, 3) [N].
     """
 
     account: ClassVar[Literal["external", "damping"]] = "damping"
     kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "force": "nodes"}
 
     def __init__(self, mass: float, stiffness: float, terms: Sequence[InternalForce]) -> None:
-        """Make damping from coefficients.
+        """Store the coefficients and the force terms.
 
         Args:
-            mass: alpha [1/s].
-            stiffness: beta [s].
-            terms: Terms that are linear in the displacement, whose stiffness is K.
+            mass: Coefficient alpha of the mass [1/s].
+            stiffness: Coefficient beta of the stiffness [s].
+            terms: Force terms linear in the displacement, with the stiffness K.
         """
         self.mass, self.stiffness = mass, stiffness
         self._terms = terms if stiffness else ()
         self.force = np.empty((0, 3))
         self._velocity = np.empty((0, 3))
-        self._runs = np.empty((0, 2), np.int64)  # of nodes that this rank counts
+        self._runs = np.empty((0, 2), np.int64)  # runs of nodes owned by this rank
 
     @classmethod
-    def build(cls, body: Body, coefficients: tuple[float, float]) -> "RayleighDamping":
-        """Make the damping of a body from alpha [1/s] and beta [s]; K is that of its elastic elements.
+    def build(cls, body: Body, mass: float, stiffness: float) -> "RayleighDamping":
+        """Return the damping of a body, with K the stiffness of its elastic elements.
 
-        The terms of the body serve for it where they are linear.
+        Linear force terms of the body are reused; otherwise linear terms are built for K.
+
+        Args:
+            body: Damped model.
+            mass: Coefficient alpha of the mass [1/s].
+            stiffness: Coefficient beta of the stiffness [s].
         """
         nonlinear = body.turns or any(term.history for term in body.terms)
         linear = [term for term in body.terms if not isinstance(term, Pretension)]
-        return cls(*coefficients, linear_terms(body.elements) if nonlinear and coefficients[1] else linear)
+        return cls(mass, stiffness, linear_terms(body.elements) if nonlinear and stiffness else linear)
 
     def begin(self, motion: Loaded) -> None:
-        """Make room."""
+        """Allocate the arrays."""
         self.force = np.zeros_like(motion.force)
         if self._terms:
             self._velocity = np.empty_like(motion.velocity)
@@ -61,7 +67,7 @@ class RayleighDamping(Load):
         self._runs = np.flatnonzero(edges).reshape(-1, 2)
 
     def add(self, motion: Loaded) -> None:
-        """Add both forces; those of the loads are there, those of elements too."""
+        """Add both forces to the force of the motion, which includes all loads and elements."""
         self.force.fill(0.0)
         if self._terms:
             np.multiply(motion.velocity, self.stiffness, out=self._velocity)
@@ -75,9 +81,9 @@ class RayleighDamping(Load):
         add_damping(motion.velocity, motion.mobility, motion.gravity, coefficients, (self.force, motion.force))
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract both from a copy."""
+        """Subtract both forces from a copy of the force of the motion."""
         force -= self.force
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work."""
+        """Add the work over half a step."""
         self.work += 0.5 * motion.step * power(self._runs, self.force, motion.velocity)

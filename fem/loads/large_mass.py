@@ -12,7 +12,7 @@ from reflowshock.fem.errors import LoadError
 from reflowshock.fem.loads.load import Kept, Load, Loaded
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.parallel.portable import Rows, State
+from reflowshock.fem.parallel.checkpoint_state import Rows, State
 
 MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
 

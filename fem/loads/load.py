@@ -19,7 +19,7 @@ from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.loads.pulse import HalfSine, Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
-from reflowshock.fem.parallel.portable import Entry, Rows, Same, State, Sum
+from reflowshock.fem.parallel.checkpoint_state import Entry, Rows, Same, State, Sum
 
 # A package that is dropped looks towards the ground, so the table's upward acceleration points along -z and the board,
 # seen from the table, is pushed along +z; so does its weight.

@@ -1,4 +1,4 @@
-"""Loads of a drop shock: from its parameters to the objects that act on each model."""
+"""Loads and damping of a drop shock: objects that act on each model, built from parameters."""
 
 from collections.abc import Iterable
 
@@ -16,10 +16,10 @@ from reflowshock.fem.problem.shock import Shock
 
 
 def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:
-    """Find out before anything is distributed whether a large mass has nodes to act on.
+    """Check that a large mass has support nodes to act on.
 
     Raises:
-        LoadError: No model has any.
+        LoadError: No model has support nodes.
     """
     if shock.method == "large_mass" and not any(len(item.shaken) for item in tables):
         raise LoadError("shock.method = large_mass needs mounting holes: the facet set mounting_holes is empty")
@@ -28,23 +28,23 @@ def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:
 def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, shock: Shock) -> list[Load]:
     """Return the loads and the damping of one model on this rank; collective over the model.
 
-    A model without holes for a large mass to act on tells its results from that frame, and has no load at nodes.
+    With a large mass, a model without support nodes has no nodal load; its results refer to the frame of the mass.
 
     Args:
         comm: Communicator of the model.
-        mass: Of all models, which a large mass is to move [kg].
-        body: The model.
-        tables: Its support nodes.
-        shock: Pulse, method, gravity, damping.
+        mass: Total mass of all models, for the size of a large mass [kg].
+        body: Model on this rank.
+        tables: Tables of the model, with its support nodes.
+        shock: Parameters of the shock.
     """
-    chosen = shock_pulse(shock)
-    made: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if chosen.gravity["on"] else []
+    pulse = shock_pulse(shock)
+    loads: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if pulse.gravity["on"] else []
     if shock.method == "direct":
-        made.append(BodyAcceleration(DOWN, chosen.pulse))
+        loads.append(BodyAcceleration(DOWN, pulse.pulse))
     elif not len(tables.shaken):
-        made.append(ShakenBase(DOWN, chosen.pulse))
+        loads.append(ShakenBase(DOWN, pulse.pulse))
     else:
-        made.append(LargeMass.build(comm, body, tables.shaken, (DOWN, chosen.pulse), mass))
+        loads.append(LargeMass.build(comm, body, tables.shaken, (DOWN, pulse.pulse), mass))
     if any(shock.damping.coefficients):
-        made.append(RayleighDamping.build(body, shock.damping.coefficients))
-    return made
+        loads.append(RayleighDamping.build(body, *shock.damping.coefficients))
+    return loads

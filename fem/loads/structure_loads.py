@@ -1,6 +1,11 @@
-"""Loads and damping of a structure: from their parameters to the objects that act on a motion."""
+"""Loads and damping of a structure: objects that act on a motion, built from parameters.
 
-from collections.abc import Mapping
+``BUILDERS`` has one row for each kind of load of ``problem.load_kinds``.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -14,43 +19,82 @@ from reflowshock.fem.loads.load import BodyAcceleration, Load, NodalForces, Pres
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem.fittings import AXES
+from reflowshock.fem.problem.load_kinds import Gravity, InputG, PointForce, PrescribedMotion, Pressure, Pulsed
 from reflowshock.fem.problem.shock import Damping
-from reflowshock.fem.problem.structure import Gravity, InputG, PointForce, Pressure, StructureProblem
+from reflowshock.fem.problem.structure import StructureProblem
 
 
-def structure_loads(
-    comm: MPI.Comm, body: Body, tables: StructureTables, problem: StructureProblem, pulses: Mapping[str, Pulse]
-) -> list[Load]:
-    """Return the loads of a structure on this rank, in the order of the problem; collective."""
-    made: list[Load] = []
-    for name, load in problem.loads.items():
-        pulse = pulses[name]
-        if isinstance(load, Pressure) and problem.dynamics.kinematics != "small":
-            made.append(FollowerPressure.build(body, tables.pressed[load.on], pulse))
-        elif isinstance(load, Pressure):
-            nodes, areas = tables.areas[load.on]
-            made.append(NodalForces.build(body, nodes, -areas, pulse))
-        elif isinstance(load, InputG) and load.method == "large_mass":
-            shaken = [tables.nodes_of[problem.supports[support].on] for support in shaken_supports(problem)]
-            nodes = np.unique(np.concatenate(shaken))
-            made.append(LargeMass.build(comm, body, nodes, (-unit(load.direction), pulse)))
-        elif isinstance(load, InputG | Gravity):
-            push = -1.0 if isinstance(load, InputG) else 1.0  # seen from the supports, the body is pushed the other way
-            made.append(BodyAcceleration(push * unit(load.direction), pulse))
-        elif isinstance(load, PointForce):
-            nodes, shares = tables.pushed[name]
-            made.append(NodalForces.build(body, nodes, np.outer(shares, unit(load.direction)), pulse))
-        else:
-            local = body.local.locate(tables.nodes_of[load.on])
-            made.append(PrescribedVelocity(local[local >= 0], AXES.index(load.component), pulse))
-    return made
+@dataclass(frozen=True, slots=True)
+class LoadedModel:
+    """Model on which loads act.
+
+    Attributes:
+        comm: Communicator of the model.
+        body: Model on this rank.
+        tables: Nodes and areas of facet sets, nodes at point forces.
+        problem: Parameters of the structure.
+    """
+
+    comm: MPI.Comm
+    body: Body
+    tables: StructureTables
+    problem: StructureProblem
+
+
+def structure_loads(model: LoadedModel, pulses: Mapping[str, Pulse]) -> list[Load]:
+    """Return the loads of a structure on this rank, in the order of the case file; collective.
+
+    Args:
+        model: Model on which the loads act.
+        pulses: Pulse of each load by name.
+    """
+    return [BUILDERS[type(load)](model, name, load, pulses[name]) for name, load in model.problem.loads.items()]
+
+
+def _input_g(model: LoadedModel, name: str, load: InputG, pulse: Pulse) -> Load:
+    if not load.is_large_mass:
+        return BodyAcceleration(-unit(load.direction), pulse)  # inertia acts against the acceleration of the supports
+    supports = [model.tables.nodes_of[model.problem.supports[name].on] for name in shaken_supports(model.problem)]
+    nodes = np.unique(np.concatenate(supports))
+    return LargeMass.build(model.comm, model.body, nodes, (-unit(load.direction), pulse))
+
+
+def _gravity(model: LoadedModel, name: str, load: Gravity, pulse: Pulse) -> Load:
+    return BodyAcceleration(unit(load.direction), pulse)
+
+
+def _pressure(model: LoadedModel, name: str, load: Pressure, pulse: Pulse) -> Load:
+    if model.problem.dynamics.kinematics != "small":
+        return FollowerPressure.build(model.body, model.tables.pressed[load.on], pulse)
+    nodes, areas = model.tables.areas[load.on]
+    return NodalForces.build(model.body, nodes, -areas, pulse)
+
+
+def _prescribed_motion(model: LoadedModel, name: str, load: PrescribedMotion, pulse: Pulse) -> Load:
+    local = model.body.local.locate(model.tables.nodes_of[load.on])
+    return PrescribedVelocity(local[local >= 0], AXES.index(load.component), pulse)
+
+
+def _point_force(model: LoadedModel, name: str, load: PointForce, pulse: Pulse) -> Load:
+    nodes, shares = model.tables.pushed[name]
+    return NodalForces.build(model.body, nodes, np.outer(shares, unit(load.direction)), pulse)
+
+
+Builder = Callable[[LoadedModel, str, Any, Pulse], Load]
+BUILDERS: Mapping[type[Pulsed], Builder] = {
+    InputG: _input_g,
+    Gravity: _gravity,
+    Pressure: _pressure,
+    PrescribedMotion: _prescribed_motion,
+    PointForce: _point_force,
+}
 
 
 def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return a vector ``(3,)`` of length one."""
+    """Return the unit vector along a direction, shape (3,)."""
     return np.array(direction) / np.linalg.norm(direction)
 
 
 def damping_loads(damping: Damping, body: Body) -> list[Load]:
-    """Return the damping of a structure, an empty list where there is none."""
-    return [RayleighDamping.build(body, damping.coefficients)] if any(damping.coefficients) else []
+    """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping."""
+    return [RayleighDamping.build(body, *damping.coefficients)] if any(damping.coefficients) else []

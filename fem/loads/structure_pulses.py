@@ -1,4 +1,4 @@
-"""Pulses of a structure's loads, from their parameters. Plain NumPy, for ``plan`` and for the run itself."""
+"""Pulses of the loads of a structure, from their parameters; plain NumPy, for plans and runs."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,13 +7,13 @@ import numpy as np
 
 from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated, service_condition
 from reflowshock.fem.loads.pulse_table import read_pulse
-from reflowshock.fem.problem.structure import InputG, StructureLoad
+from reflowshock.fem.problem.load_kinds import StructureLoad
 
 SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "haversine": Haversine}
 
 
 def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
-    """Return the pulse of each load.
+    """Return the pulse of each load by name.
 
     Raises:
         PulseError: A table cannot be read.
@@ -22,11 +22,11 @@ def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
 
 
 def pulse_of(load: StructureLoad) -> Pulse:
-    """Return the pulse of a load, in its own unit; errors as ``pulses_of``."""
+    """Return the pulse of a load in SI units of its quantity; errors as ``pulses_of``."""
     if load.table is not None:
         return read_pulse(Path(load.table), load.quantity, load.table_column)
-    if isinstance(load, InputG) and load.service_condition is not None:
-        return service_condition(load.service_condition)
+    if load.jedec_condition is not None:
+        return service_condition(load.jedec_condition)
     if load.peak is None:
         raise ValueError(f"a load of kind {load.kind} has neither peak nor table")
     if load.pulse != "constant" and load.duration is not None:
@@ -35,6 +35,6 @@ def pulse_of(load: StructureLoad) -> Pulse:
 
 
 def pulse_durations(pulses: Mapping[str, Pulse]) -> list[float]:
-    """Return the durations [s] of those pulses that have a course of their own."""
+    """Return the durations of all pulses that are not constant [s]."""
     sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine | Haversine)]
     return sines + [float(np.ptp(pulse.times)) for pulse in pulses.values() if isinstance(pulse, Tabulated)]

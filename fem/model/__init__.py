@@ -1,1 +1,1 @@
-"""One model on one rank: body, mass, step levels, critical steps; start with `body.py`."""
+"""One model on one rank: elements, masses, force terms, local time steps, critical steps; start with `body.py`."""

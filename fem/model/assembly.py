@@ -1,4 +1,4 @@
-"""From the mesh of a rank and the tables of its model to a body: materials, masses, force terms, tie."""
+"""Assembly of a model on one rank, from its mesh and tables to materials, masses, force terms and tie."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,17 +30,17 @@ MASS_TOLERANCE = 1e-10
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """The elements of one rank before their masses are fixed.
+    """Elements of one rank with their materials and critical steps, before mass scaling.
 
     Attributes:
-        local: The rank's mesh.
-        elements: Its elements with the density of their material.
-        geometry: Their volumes and mean gradients.
-        steps: ``(ne,)`` critical step of each element [s].
-        roles: ``(ne,)`` material role of each element.
-        parts: ``(ne,)`` part of each element.
+        local: Mesh of the rank.
+        elements: Elements with the density of their material.
+        geometry: Volumes and mean gradients of the elements.
+        steps: Critical step of each element, shape (ne,) [s].
+        roles: Material role of each element, shape (ne,).
+        parts: Part number of each element, shape (ne,).
         materials: Material of each part.
-        laws: Part -> law in UFL in the place of its material.
+        laws: UFL material law by part number, used instead of the material.
     """
 
     local: LocalMesh
@@ -53,14 +53,14 @@ class Pieces:
     laws: Mapping[int, Law] = field(default_factory=dict)
 
     def with_laws(self, part_names: Sequence[str], laws: Mapping[str, Law]) -> "Pieces":
-        """Give parts laws in UFL: they take the place of their material, whose density remains.
+        """Replace the materials of some parts by UFL laws; the densities remain.
 
         Args:
-            part_names: Of the model's tables.
-            laws: Name of a part -> law.
+            part_names: Part names of the model's tables.
+            laws: UFL law by part name.
 
         Raises:
-            ValueError: There is no such part.
+            ValueError: A part does not exist.
         """
         missing = [name for name in laws if name not in part_names]
         if missing:
@@ -76,12 +76,12 @@ class Pieces:
 
 @dataclass(frozen=True, slots=True)
 class ForceOptions:
-    """What the internal force depends on besides elements and materials.
+    """Options of the internal force apart from elements and materials.
 
     Attributes:
-        kinematics: Whether rotations and strains are small.
-        step: dt [s], of laws that depend on the rate, and of levels below it; infinity stands for slow.
-        stiffness: beta of damping [s], which levels make room for.
+        kinematics: Small, corotational or finite kinematics.
+        step: Time step of rate-dependent laws and of local time steps [s]; infinity for quasi-static loading.
+        stiffness: Coefficient beta of stiffness-proportional damping [s], which local time steps allow for.
     """
 
     kinematics: Kinematics = "small"
@@ -95,21 +95,21 @@ def make_pieces(
     materials: Materials | Mapping[str, Material],
     formulation: str = HEXAHEDRON.name,
 ) -> Pieces:
-    """Give the local elements their materials, and find their critical steps.
+    """Assign materials to the local elements and compute their critical steps.
 
     Args:
-        local: The rank's mesh.
-        tables: The model's tables.
-        materials: Material of each role, or of each part.
-        formulation: Of hexahedra, see ``element.element_kind``.
+        local: Mesh of the rank.
+        tables: Tables of the model.
+        materials: Material of each role or of each part.
+        formulation: Formulation of hexahedra, see ``element.element_kind``.
 
     Raises:
-        RankError: There is no element on this rank.
-        MeshError: An element is turned inside out.
+        RankError: This rank has no element.
+        MeshError: An element is inverted.
     """
     if not len(local.cells):
-        raise RankError("a rank has no element of the mesh: take fewer ranks")
-    local = often_moved_first(local.with_nodes(*masters_of(local, tables)), tables)
+        raise RankError("a rank has no element of the mesh; use fewer ranks")
+    local = sorted_by_pace(local.with_nodes(*masters_of(local, tables)), tables)
     number = tables.part[local.cell_numbers]
     names, assigned = materials_of_parts(tables.part_names, materials)
     elements = elements_of(local.points, local.cells, number, assigned, formulation)
@@ -119,27 +119,27 @@ def make_pieces(
     return Pieces(local, elements, geometry, steps, roles, number, assigned)
 
 
-def often_moved_first(local: LocalMesh, tables: Tables) -> LocalMesh:
-    """Return a mesh with its nodes in the order of the smallest pace at which elements act on them."""
+def sorted_by_pace(local: LocalMesh, tables: Tables) -> LocalMesh:
+    """Return a mesh with nodes sorted by the smallest pace of their elements."""
     largest = int(tables.every.max())
     if largest == 1:
         return local
-    every = tables.every[local.cell_numbers]
-    _, node = paces_of_nodes(local.cells, every, local_tie(local, tables.tie), len(local.nodes), largest)
-    return local.reordered(np.argsort(node, kind="stable"))
+    paces = tables.every[local.cell_numbers]
+    _, node_paces = paces_of_nodes(local.cells, paces, local_tie(local, tables.tie), len(local.nodes), largest)
+    return local.reordered(np.argsort(node_paces, kind="stable"))
 
 
 def masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
-    """Return the masters of this rank's slaves: nodes ``(k,)``, points ``(k, 3)`` [m]."""
-    here = local.locate(tables.tie.slave) >= 0
-    return tables.tie.master[here].ravel(), tables.master_points[here].reshape(-1, 3)
+    """Return nodes (k,) and points (k, 3) [m] of the masters of this rank's slaves."""
+    local_slaves = local.locate(tables.tie.slave) >= 0
+    return tables.tie.master[local_slaves].ravel(), tables.master_points[local_slaves].reshape(-1, 3)
 
 
 def local_tie(local: LocalMesh, tie: Tie) -> Tie:
-    """Return the rows of a tie that belong to this rank's nodes, in local numbers."""
+    """Return the rows of a tie whose slaves are on this rank, in local node numbers."""
     slave = local.locate(tie.slave)
-    here = slave >= 0
-    return Tie(slave[here], local.locate(tie.master[here].ravel()).reshape(-1, 4), tie.weight[here])
+    is_local = slave >= 0
+    return Tie(slave[is_local], local.locate(tie.master[is_local].ravel()).reshape(-1, 4), tie.weight[is_local])
 
 
 def make_body(
@@ -149,14 +149,14 @@ def make_body(
     mass_factor: NDArray[np.float64],
     response: ForceOptions | None = ForceOptions(),
 ) -> Body:
-    """Assemble masses and forces of a model; collective.
+    """Assemble masses and force terms of a model; collective.
 
     Args:
         comm: Communicator of the model.
-        pieces: The rank's elements.
-        tables: The model's tables.
-        mass_factor: ``(ne,)`` factor on the density of each element.
-        response: Kinematics and step; None for elastic terms at small strains whatever the materials.
+        pieces: Elements of the rank.
+        tables: Tables of the model.
+        mass_factor: Factor on the density of each element, shape (ne,).
+        response: Kinematics and step; None for linear elastic terms whatever the materials.
     """
     local = pieces.local
     plain = pieces.elements
@@ -181,35 +181,35 @@ def make_body(
 
 
 def with_paces(body: Body, pieces: Pieces, tables: Tables, response: ForceOptions) -> Body:
-    """Return a body with force terms for each of the paces at which its elements act.
+    """Return a body with separate force terms for the elements of each pace.
 
     Raises:
-        LevelError: Some elements have a law in UFL; on every rank.
+        LevelError: An element has a UFL law; on every rank.
     """
     if pieces.laws:
-        raise LevelError("parts with a law in UFL act in each step: choose coupling.levels = 1")
-    every, schedule = tables.every[body.local.cell_numbers], np.unique(tables.every).tolist()
+        raise LevelError("a UFL law needs every time step; set coupling.levels = 1")
+    element_paces, schedule = tables.every[body.local.cell_numbers], np.unique(tables.every).tolist()
     terms: list[ForceTerm] = []
     paces: list[int] = []
     for pace in schedule:
         step = pace * response.step
-        found = terms_of(body.elements, every == pace, pieces.materials, response.kinematics, step)
-        terms, paces = [*terms, *found], [*paces, *[pace] * len(found)]
-    return replace(body, terms=terms, paces=tuple(paces), schedule=tuple(schedule), element_paces=every)
+        pace_terms = terms_of(body.elements, element_paces == pace, pieces.materials, response.kinematics, step)
+        terms, paces = [*terms, *pace_terms], [*paces, *[pace] * len(pace_terms)]
+    return replace(body, terms=terms, paces=tuple(paces), schedule=tuple(schedule), element_paces=element_paces)
 
 
 def response_terms(
     comm: MPI.Comm, body: Body, pieces: Pieces, tables: Tables, response: ForceOptions
 ) -> list[ForceTerm]:
-    """Return the force terms of a body, one of them with all elements that take smaller steps; collective.
+    """Return the force terms of a body, with one term for all elements that take local time steps; collective.
 
     Raises:
-        LevelError: Not all elements of a body with levels are linear elastic; on every rank.
+        LevelError: A body with local time steps has an element that is not linear elastic; on every rank.
     """
     if not tables.level.any():
         return force_terms(body.elements, pieces.materials, response.kinematics, response.step, pieces.laws)
     if pieces.laws:
-        raise LevelError("parts with a law in UFL take no smaller steps: choose a coupling scheme without local steps")
+        raise LevelError("a UFL law does not support local time steps; choose a coupling.scheme other than local_steps")
     check_elastic(pieces.materials, response.kinematics, tables.ratios)
     level = tables.level[body.local.cell_numbers]
     levels = SubsteppedElements.build(
@@ -219,13 +219,13 @@ def response_terms(
 
 
 def warm_up(terms: Sequence[ForceTerm], count: int) -> None:
-    """Have the kernels of terms compiled before the first step, whose time is measured; rest leaves no path."""
+    """Compile the kernels of the force terms at rest, before timing starts; their history does not change."""
     for term in terms:
         term.add(np.zeros((count, 3)), np.zeros((count, 3)))
 
 
 def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: SharedNodes) -> NDArray[np.float64]:
-    """Return the lumped mass ``(n,)`` [kg] summed over ranks, the slaves' moved to their masters: rowsum(N^T M N)."""
+    """Return the lumped mass over all ranks, moved from slaves to masters, rowsum(T^T M T), shape (n,) [kg]."""
     column = np.repeat(lumped_mass(elements, geometry.nodal_volume)[:, None], 3, axis=1)
     tie.gather(column)
     shared.add(column)
@@ -233,11 +233,11 @@ def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: Sha
 
 
 def check_mass(comm: MPI.Comm, lumped: float, integrated: float) -> None:
-    """Compare the sum of lumped masses with density times volume over all ranks.
+    """Check that lumped masses [kg] add up to density times volume [kg] over all ranks; collective.
 
     Raises:
-        MassError: They differ by more than 1e-10.
+        MassError: They differ by a fraction of more than ``MASS_TOLERANCE``.
     """
     lumped, integrated = comm.allreduce(lumped), comm.allreduce(integrated)
     if abs(lumped - integrated) > MASS_TOLERANCE * integrated:
-        raise MassError(f"lumped masses add up to {lumped:.12e} kg, density times volume to {integrated:.12e} kg")
+        raise MassError(f"lumped masses add up to {lumped:.12e} kg, but density times volume is {integrated:.12e} kg")

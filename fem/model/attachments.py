@@ -1,4 +1,4 @@
-"""What is attached to the elements of a model: lumped masses and elastic supports."""
+"""Lumped masses and elastic supports attached to the elements of a model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,35 +16,40 @@ from reflowshock.fem.problem.fittings import Support
 
 
 def beddings_of(local: LocalMesh, table: FittedTable, supports: Mapping[str, Support]) -> list[BeddedFacets]:
-    """Return the elastic supports on the elements of a rank."""
-    return [BeddedFacets.build(name, local, found, supports[name].stiffness) for name, found in table.bedded.items()]
+    """Return the elastic supports on the elements of this rank."""
+    return [BeddedFacets.build(name, local, facets, supports[name].stiffness) for name, facets in table.bedded.items()]
 
 
-def bedded_steps(pieces: Pieces, bedding: BeddedFacets) -> Pieces:
-    """Return the elements of a rank with the critical steps that they have on their springs."""
+def with_support_stiffness(pieces: Pieces, bedding: BeddedFacets) -> Pieces:
+    """Return the elements with critical steps reduced by the stiffness of an elastic support."""
     elements, cells = pieces.elements, bedding.cells
     mass = elements.density[cells][:, None] * pieces.geometry.nodal_volume[cells]
     corners = pieces.local.points[bedding.facets]
-    faster = np.zeros(len(pieces.steps))
-    np.add.at(faster, cells, spring_rates(elements.cells[cells], bedding.facets, mass, corners, bedding.stiffness))
-    return replace(pieces, steps=2.0 / np.sqrt((2.0 / pieces.steps) ** 2 + faster))
+    added_frequency = np.zeros(len(pieces.steps))  # squared circular frequency [1/s^2]
+    rates = spring_rates(elements.cells[cells], bedding.facets, mass, corners, bedding.stiffness)
+    np.add.at(added_frequency, cells, rates)
+    return replace(pieces, steps=2.0 / np.sqrt((2.0 / pieces.steps) ** 2 + added_frequency))
 
 
-def attached(
-    body: Body, masses: tuple[NDArray[np.integer], NDArray[np.float64]], beddings: Sequence[BeddedFacets]
+def with_attachments(
+    body: Body,
+    nodes: NDArray[np.integer],
+    masses: NDArray[np.float64],
+    beddings: Sequence[BeddedFacets],
 ) -> Body:
     """Return a body with lumped masses and elastic supports; collective.
 
     Args:
-        body: The body.
-        masses: Nodes ``(k,)`` in input numbers and what each bears ``(k,)`` [kg]; of slaves it moves to their masters.
-        beddings: Of this rank.
+        body: Body without attachments.
+        nodes: Nodes with a lumped mass in numbers of the input, shape (k,); the mass of slaves moves to their masters.
+        masses: Lumped mass at each of these nodes, shape (k,) [kg].
+        beddings: Elastic supports on this rank.
     """
     column = np.zeros((len(body.mass), 3))
-    local = body.local.locate(masses[0])
-    here = np.flatnonzero(local >= 0)
-    here = here[body.shared.owned[local[here]]]
-    column[local[here]] = masses[1][here, None]
+    local = body.local.locate(nodes)
+    owned = np.flatnonzero(local >= 0)
+    owned = owned[body.shared.owned[local[owned]]]
+    column[local[owned]] = masses[owned, None]
     body.tie.gather(column)
     body.shared.add(column)
     lumped = float(column[body.shared.owned, 0].sum())

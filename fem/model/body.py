@@ -1,4 +1,4 @@
-"""One model on one rank: elements, masses, force terms, tie. All that a substep needs."""
+"""One model on one rank: elements, masses, force terms and tie, everything that a time step needs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,25 +18,25 @@ from reflowshock.fem.parallel.local_mesh import LocalMesh
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One model on one rank, ready to move.
+    """One model on one rank, ready for time integration.
 
     Attributes:
-        local: The rank's mesh.
-        elements: Its elements with their density, mass scaling included.
-        geometry: Their volumes and mean gradients.
+        local: Mesh of the rank.
+        elements: Elements with their density, mass scaling included.
+        geometry: Volumes and mean gradients of the elements.
         terms: Force terms.
-        paces: In how many steps of the model each of the first terms acts once, by impulses (``path_levels``); the
-            others act in each step.
-        schedule: The paces of the model's terms on all ranks.
-        element_paces: ``(ne,)`` those of the elements; empty where all act in each step.
-        tie: Slaves and masters, local numbers.
-        shared: Nodes that several ranks hold.
-        interface: ``(nc,)`` local number of each interface node, -1 where another rank has it.
-        mass: ``(n,)`` [kg] lumped mass, of slaves moved to their masters.
-        free: ``(n, 3)`` whether a displacement component follows from forces.
-        initial_stress: ``(ne, 6)`` [Pa] mean stress of linear elements at no displacement; None where there is none.
-        lumped: Lumped masses at the nodes that this rank counts [kg].
-        begin: Gives elements with a path, on the nodes of the body, the stress in which it begins.
+        paces: Pace of each of the first terms, which act by impulses once in so many steps (``path_levels``); the other
+            terms act in every step.
+        schedule: Paces of the model's terms on all ranks.
+        element_paces: Pace of each element, shape (ne,); empty if all elements act in every step.
+        tie: Slaves and masters in local numbers.
+        shared: Nodes shared with other ranks.
+        interface: Local number of each interface node, -1 on another rank, shape (nc,).
+        mass: Lumped mass, of slaves moved to their masters, shape (n,) [kg].
+        free: Whether a displacement component follows from forces, shape (n, 3).
+        initial_stress: Mean stress of linear elements at zero displacement, shape (ne, 6) [Pa], or None.
+        lumped: Sum of the attached masses at the nodes that this rank owns [kg].
+        begin: Function that sets the initial stress of path-dependent elements on the nodes of the body, or None.
     """
 
     local: LocalMesh
@@ -57,17 +57,17 @@ class Body:
 
     @property
     def paced(self) -> list[tuple[ForceTerm, int]]:
-        """Return the terms, each with its pace."""
+        """Force terms, each with its pace."""
         return list(zip(self.terms, (*self.paces, *(1,) * (len(self.terms) - len(self.paces))), strict=True))
 
     @property
     def node_paces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the smallest pace of the elements of each slave ``(ns,)`` and of each node ``(n,)``."""
+        """Smallest pace of the elements at each slave, shape (ns,), and at each node, shape (n,)."""
         return paces_of_nodes(self.elements.cells, self.element_paces, self.tie, len(self.mass), max(self.schedule))
 
     @property
     def turns(self) -> bool:
-        """Return whether rotations of elements on this rank are more than small."""
+        """Whether an element on this rank has finite rotations."""
         return any(
             isinstance(term, Corotational) or (isinstance(term, NonlinearElements) and term.finite)
             for term in self.terms
@@ -77,14 +77,14 @@ class Body:
 def paces_of_nodes(
     cells: NDArray[np.integer], paces: NDArray[np.int32], tie: Tie, count: int, largest: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the smallest pace of the elements of each slave ``(ns,)`` and of each of ``count`` nodes.
+    """Return the smallest pace of the elements at each slave, shape (ns,), and at each node, shape (count,).
 
     Args:
-        cells: ``(ne, k)`` nodes.
-        paces: ``(ne,)`` of the elements, or none.
-        tie: Elements of slaves act on their masters, too.
+        cells: Nodes of each element, shape (ne, k).
+        paces: Pace of each element, shape (ne,), or empty.
+        tie: Tie of the model; elements of slaves also act on the masters.
         count: Number of nodes.
-        largest: What nodes without elements have.
+        largest: Pace of nodes without elements.
     """
     node = np.full(count, largest, np.int32)
     if len(paces):

@@ -1,4 +1,4 @@
-"""Direct solution of symmetric positive definite systems: MUMPS Cholesky, factored once."""
+"""Direct solution of symmetric positive definite systems by a MUMPS Cholesky factorisation."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from petsc4py import PETSc
 from reflowshock.fem.errors import AgreedError
 
 PREFIX = "factor_"
-SETTINGS = {14: 50}  # ICNTL of MUMPS: working memory beyond its estimate [%], which ties and many ranks exceed
+SETTINGS = {14: 50}  # ICNTL(14) of MUMPS: extra working memory [%]; ties and many ranks exceed its estimate
 
 
 @dataclass(frozen=True, slots=True)
 class FactorCost:
-    """What a factorisation took: floating point operations, entries of the factor, memory of all ranks [B]."""
+    """Cost of a factorisation: floating-point operations, entries of the factor, memory of all ranks [B]."""
 
     operations: float
     entries: float
@@ -20,10 +20,10 @@ class FactorCost:
 
 
 class Factorisation:
-    """The Cholesky factor of a matrix, ready to solve."""
+    """Cholesky factor of a sparse matrix."""
 
     def __init__(self, matrix: PETSc.Mat) -> None:
-        """Factor; collective.
+        """Factor a matrix; collective.
 
         Raises:
             AgreedError: The matrix is not positive definite, or memory ran out; on every rank.
@@ -37,14 +37,14 @@ class Factorisation:
         status, negative = self._factor.getMumpsInfog(1), self._factor.getMumpsInfog(12)
         if status < 0 or negative > 0:
             raise AgreedError(
-                f"MUMPS cannot factor {matrix.size[0]} equations: INFOG(1) = {status}, INFOG(2) ="
+                f"MUMPS failed to factor {matrix.size[0]} equations: INFOG(1) = {status}, INFOG(2) ="
                 f" {self._factor.getMumpsInfog(2)} (-10: singular; -9, -13, -19: out of memory), {negative} pivots are"
                 " negative"
             )
 
     @property
     def cost(self) -> FactorCost:
-        """Return what the factorisation took."""
+        """Cost of the factorisation."""
         entries = self._factor.getMumpsInfog(29)
         return FactorCost(
             operations=self._factor.getMumpsRinfog(3),
@@ -53,17 +53,17 @@ class Factorisation:
         )
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solve; collective."""
+        """Solve for a right-hand side; collective."""
         self._solver.solve(right, solution)
 
     def free(self) -> None:
-        """Give the factor's memory back, which PETSc keeps as long as anything refers to the factor."""
+        """Free the memory of the factor, which PETSc otherwise keeps as long as a reference exists."""
         self._factor.destroy()
         self._solver.destroy()
 
 
 def make_direct(solver: PETSc.KSP) -> None:
-    """Make a linear solver one MUMPS Cholesky factorisation."""
+    """Configure a linear solver as one MUMPS Cholesky factorisation."""
     for number, value in SETTINGS.items():  # MUMPS 5.5 under PETSc 3.18 takes them as options only
         PETSc.Options()[f"{PREFIX}mat_mumps_icntl_{number}"] = value
     solver.setOptionsPrefix(PREFIX)

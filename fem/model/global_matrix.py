@@ -1,4 +1,4 @@
-"""Stiffness and mass of a model as PETSc matrices over its free displacement components: held ones and ties removed."""
+"""Global stiffness and mass of a model in PETSc, over its free displacement components (supports and ties removed)."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ from reflowshock.fem.model.body import Body
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """One equation per free displacement component; the lowest rank that holds a node has its equations.
+    """Numbering of the free displacement components; the lowest rank that has a node owns its equations.
 
     Attributes:
         comm: Communicator of the model.
-        body: The model on this rank.
-        number: ``(n, 3)`` int32 equation of each component, numbered over all ranks, -1 where it is held or a slave's.
-        own: ``(n, 3)`` whether this rank has the equation.
-        total: Equations of all ranks.
+        body: Model on this rank.
+        number: Global equation of each component, -1 if it is fixed or a slave's, shape (n, 3) int32.
+        own: Whether this rank owns the equation, shape (n, 3).
+        total: Number of equations on all ranks.
     """
 
     comm: MPI.Comm
@@ -33,33 +33,33 @@ class Equations:
 
     @classmethod
     def of(cls, comm: MPI.Comm, body: Body) -> "Equations":
-        """Number the free components of a model; collective.
+        """Assign equation numbers to the free components of a model; collective.
 
         Raises:
             ValueError: No component is free; on every rank.
         """
-        own = body.free & body.shared.owned[:, None]
-        counts = comm.allgather(int(own.sum()))
+        owned = body.free & body.shared.owned[:, None]
+        counts = comm.allgather(int(owned.sum()))
         total, first = sum(counts), sum(counts[: comm.rank])
         if not total:
-            raise ValueError("the supports hold every node: there is no equation to solve")
-        number = np.where(own, first + np.cumsum(own).reshape(own.shape) - 1.0, 0.0)
+            raise ValueError("the supports fix every node, so there is no equation to solve; remove a support")
+        number = np.where(owned, first + np.cumsum(owned).reshape(owned.shape) - 1.0, 0.0)
         body.shared.add(number)
-        return cls(comm, body, np.where(body.free, number, -1.0).astype(np.int32), own, total)
+        return cls(comm, body, np.where(body.free, number, -1.0).astype(np.int32), owned, total)
 
     @property
     def layout(self) -> tuple[int, int]:
-        """Return the number of this rank's equations and of all."""
+        """Number of equations on this rank and on all ranks."""
         return int(self.own.sum()), self.total
 
     def vector(self, values: NDArray[np.float64]) -> PETSc.Vec:
-        """Return a vector of the free components of ``values (n, 3)``."""
+        """Return the PETSc vector of the free components of nodal values, shape (n, 3)."""
         vector = PETSc.Vec().createMPI(self.layout, comm=self.comm)
         vector.array = values[self.own]
         return vector
 
     def spread(self, vector: PETSc.Vec, values: NDArray[np.float64]) -> None:
-        """Write a vector into ``values (n, 3)``: all copies of its nodes, slaves with their masters, held ones zero."""
+        """Write a PETSc vector into nodal values, shape (n, 3), with slaves; fixed components become zero."""
         values.fill(0.0)
         values[self.own] = vector.array
         self.body.shared.add(values)
@@ -74,8 +74,8 @@ class Equations:
         local = tied_stiffness(self.body).tocoo()
         number = self.number.ravel()
         row, column = number[local.row], number[local.col]
-        known = (row >= 0) & (column >= 0)
-        row, column, value = self.to_owners(row[known], column[known], local.data[known])
+        is_free = (row >= 0) & (column >= 0)
+        row, column, value = self.to_owners(row[is_free], column[is_free], local.data[is_free])
         rows, first = self.layout[0], int(self.number[self.own].min(initial=self.total))
         mine = scipy.sparse.csr_matrix((value, (row - first, column)), shape=(rows, self.total))
         matrix = PETSc.Mat().createAIJ(
@@ -87,7 +87,7 @@ class Equations:
     def to_owners(
         self, row: NDArray[np.int32], column: NDArray[np.int32], value: NDArray[np.float64]
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
-        """Send matrix entries to the ranks that have their rows; return those that arrive here, in rank order."""
+        """Send matrix entries to the ranks that own their rows, and return the received ones in rank order."""
         ends = np.cumsum(self.comm.allgather(self.layout[0]))
         owner = np.searchsorted(ends, row, side="right")
         mine = owner == self.comm.rank
@@ -99,7 +99,7 @@ class Equations:
 
 
 def tied_stiffness(body: Body) -> scipy.sparse.csr_matrix:
-    """Return T^T K T of this rank's elements and elastic supports ``(3 n, 3 n)`` [N/m]; zero for slaves."""
+    """Return T^T K T of this rank's elements and elastic supports, shape (3 n, 3 n) [N/m]; zero at slaves."""
     upper = AssembledElements.build(body.elements)
     size = 3 * len(body.mass)
     half = scipy.sparse.bsr_matrix((upper.blocks, upper.columns, upper.pointer), shape=(size, size))

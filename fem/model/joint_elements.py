@@ -1,4 +1,4 @@
-"""What some elements do at a sample: forces at their nodes, stress and flow at their integration points."""
+"""Nodal forces, and stress and plastic flow at the integration points, of selected elements at a sample."""
 
 from dataclasses import replace
 
@@ -16,10 +16,10 @@ from reflowshock.materials.plasticity import NEVER_YIELDS
 
 
 class ElasticHexahedra:
-    """Elastic elements, computed anew from rest as elements with points: the same element in either formulation."""
+    """Elastic elements evaluated as fully integrated hexahedra, from the initial state at every call."""
 
     def __init__(self, body: Body, chosen: NDArray[np.integer], finite: bool = False) -> None:
-        """Take elements ``chosen (k,)`` of a body with the stress in which it begins; ``finite`` ones turn."""
+        """Select elements of a body, shape (k,), with its initial stress; ``finite`` selects finite kinematics."""
         plastic = np.tile(NEVER_YIELDS, (len(body.elements.elasticity), 1))
         elements = replace(body.elements, kind=HEXAHEDRON)
         self._term = NonlinearElements.build(elements, np.asarray(chosen), plastic, Path(finite, np.inf))
@@ -29,72 +29,78 @@ class ElasticHexahedra:
         self._place = self._term.located(np.arange(len(chosen)))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
+        """Subtract the internal force, shape (n, 3) [N], at a displacement, shape (n, 3) [m]."""
         for name, values in self._term.history.items():
             values[...] = self._start[name]
         self._term.add(displacement, force)
 
     def points(self) -> PointValues:
-        """Return the values at the points at the latest displacement."""
+        """Return the values at the integration points at the latest displacement."""
         return self._term.points(*self._place)
 
 
 class TurningElements:
-    """Hexahedra that turn and strain little: their own force; points as elements with finite strains have them."""
+    """Corotational hexahedra: force by their own law, point values by the finite-strain element."""
 
     def __init__(self, body: Body, term: Corotational, chosen: NDArray[np.integer]) -> None:
-        """Take elements ``chosen (k,)`` of a body, some of those of a term."""
-        self._own = term.build(body.elements, np.asarray(chosen))
+        """Select elements of a body, shape (k,), which belong to a corotational term."""
+        self._term = term.build(body.elements, np.asarray(chosen))
         self._points = ElasticHexahedra(body, chosen, finite=True)
         self._displacement = np.zeros_like(body.local.points)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
-        self._own.add(displacement, force)
+        """Subtract the internal force, shape (n, 3) [N], at a displacement, shape (n, 3) [m]."""
+        self._term.add(displacement, force)
         self._displacement[...] = displacement
 
     def points(self) -> PointValues:
-        """Return the values at the points at the latest displacement."""
+        """Return the values at the integration points at the latest displacement."""
         self._points.add(self._displacement, np.zeros_like(self._displacement))
         return self._points.points()
 
 
 class FollowingElements:
-    """Elements with a path, as the body's own term has them; a copy of those in question tells their forces."""
+    """Path-dependent elements: point values of the body's term, forces of a copy with the selected elements."""
 
     def __init__(self, term: NonlinearElements, places: NDArray[np.integer]) -> None:
-        """Take elements at ``places (k,)`` among those of a term."""
-        self._own, self._place, self._frozen = term, term.located(places), term.frozen(places)
+        """Select elements of a term by their positions in it, shape (k,)."""
+        self._term, self._place, self._frozen = term, term.located(places), term.frozen(places)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force ``(n, 3)`` [N] that the term had at its latest displacement, which is given."""
-        self._frozen.take_path(self._own, *self._place)
+        """Subtract the internal force, shape (n, 3) [N], at ``displacement``, the latest displacement of the term."""
+        self._frozen.take_path(self._term, *self._place)
         self._frozen.add(displacement, force)
 
     def points(self) -> PointValues:
-        """Return the values at the points now."""
-        return self._own.points(*self._place)
+        """Return the current values at the integration points."""
+        return self._term.points(*self._place)
 
 
 class JointElements:
-    """Elements of a rank whose forces and points are asked for at samples.
+    """Selected elements of a rank whose nodal forces and point values are sampled.
 
-    Elements in levels feel the mean of their substeps (``SubsteppedElements.means``), so that their forces are those
-    that moved the body over the step.
+    Elements with local time steps use the mean displacement of their substeps (``SubsteppedElements.means``), so that
+    their forces are the ones that moved the body over the step.
     """
 
     def __init__(self, body: Body, chosen: NDArray[np.integer], level: NDArray[np.int32]) -> None:
-        """Take elements ``chosen (k,)`` of a body; ``level (ne,)`` of all its elements."""
+        """Select elements of a body.
+
+        Args:
+            body: Model on this rank.
+            chosen: Numbers of the selected elements, shape (k,).
+            level: Step level of every element of the body, shape (ne,).
+        """
         self._body, self._size = body, len(chosen)
         self._levels = levels_of(body.terms)
-        left = np.ones(len(chosen), dtype=bool)
+        is_linear = np.ones(len(chosen), dtype=bool)
         self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningElements]] = []
         for term in body.terms:
             if not isinstance(term, NonlinearElements | Corotational):
                 continue
             place = positions(term.numbers, chosen)
             rows = np.flatnonzero(place >= 0)
-            left[rows] = False
+            is_linear[rows] = False
             if len(rows) and isinstance(term, NonlinearElements):
                 self._nonlinear.append((rows, FollowingElements(term, place[rows])))
             elif len(rows) and isinstance(term, Corotational):
@@ -102,26 +108,26 @@ class JointElements:
         self._linear = [
             (k, rows, ElasticHexahedra(body, chosen[rows]))
             for k in np.unique(level[chosen])
-            if len(rows := np.flatnonzero(left & (level[chosen] == k)))
+            if len(rows := np.flatnonzero(is_linear & (level[chosen] == k)))
         ]
         plain = replace(body, begin=None)
-        self._damped = None if left.all() else ElasticHexahedra(plain, chosen[~left])
+        self._damped = None if is_linear.all() else ElasticHexahedra(plain, chosen[~is_linear])
 
     def forces(self, displacement: NDArray[np.float64], damping: NDArray[np.float64] | None) -> NDArray[np.float64]:
-        """Return what the elements' nodes are pulled by ``(n, 3)`` [N]; collective where a body has levels.
+        """Return the nodal forces of the elements, shape (n, 3) [N]; collective if the body has local time steps.
 
         Args:
-            displacement: ``(n, 3)`` [m], that of the latest forces of the body.
-            damping: ``(n, 3)`` [m] velocity times beta of stiffness-proportional damping, None without.
+            displacement: Displacement at the latest force evaluation of the body, shape (n, 3) [m].
+            damping: Velocity times beta of stiffness-proportional damping, shape (n, 3) [m], or None.
         """
         force = np.zeros_like(displacement)
-        felt = [displacement if damping is None else displacement + damping]
+        level_means = [displacement if damping is None else displacement + damping]
         for levels in self._levels:
-            felt += list(levels.means(felt[0]))
-        for values in felt[1:]:
+            level_means += list(levels.means(level_means[0]))
+        for values in level_means[1:]:
             self._body.tie.spread(values)
         for level, _, elements in self._linear:
-            elements.add(felt[level], force)
+            elements.add(level_means[level], force)
         for _, nonlinear in self._nonlinear:
             nonlinear.add(displacement, force)
         if damping is not None and self._damped is not None:
@@ -129,21 +135,21 @@ class JointElements:
         return force
 
     def integrals(self, weight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return integrals of von Mises stress [Pa], plastic strain and work density [J/m^3] over parts of elements.
+        """Integrate von Mises stress, plastic strain and plastic work density over parts of the elements.
 
         Args:
-            weight: ``(parts, k, 8)`` [m^3] volume of each part at each Gauss point of a hexahedron.
+            weight: Volume of each part at each Gauss point of a hexahedron, shape (parts, k, 8) [m^3].
 
         Returns:
-            ``(3, parts, k)``, at the displacement of the latest ``forces``.
+            Integrals at the displacement of the latest ``forces``, shape (3, parts, k) [Pa m^3, m^3, J].
         """
         result = np.zeros((3, *weight.shape[:2]))
         for rows, elements in [*((rows, item) for _, rows, item in self._linear), *self._nonlinear]:
-            found, own = elements.points(), weight[:, rows]
-            if found.weight.shape[1] == 1:
-                own = own.sum(axis=2, keepdims=True)
-            mises = found.mises
-            work = np.broadcast_to(found.plastic_work[:, None], mises.shape)
-            for k, values in enumerate((mises, found.plastic_strain, work)):
-                result[k, :, rows] = np.einsum("pkm,km->kp", own, values)
+            points, volumes = elements.points(), weight[:, rows]
+            if points.weight.shape[1] == 1:
+                volumes = volumes.sum(axis=2, keepdims=True)
+            mises = points.mises
+            work = np.broadcast_to(points.plastic_work[:, None], mises.shape)
+            for k, values in enumerate((mises, points.plastic_strain, work)):
+                result[k, :, rows] = np.einsum("pkm,km->kp", volumes, values)
         return result

@@ -1,15 +1,14 @@
-"""The internal force of elements that take several small steps within the step of their model.
+"""Internal force of elements with local time steps, as one force term of the model's large step.
 
-Leapfrog with local time steps (Diaz & Grote, SIAM J. Sci. Comput. 31, 2009, and 37, 2015 for several levels;
-stabilised, see ``levels.chebyshev``) is leapfrog of the large step DT with another symmetric stiffness. At a
-displacement u the nodes inside a level take p substeps from rest at q_0 = u, all other nodes held at u; the force of
-the step is the mean of the forces f(q_k) on the way, on the nodes inside as on those around (the ring). So it is a
-force term like any other:
+Leapfrog with local time steps (Diaz & Grote, SIAM J. Sci. Comput. 31, 2009; several levels: 37, 2015; stabilised, see
+``division.chebyshev``) equals leapfrog with the large step DT and a modified symmetric stiffness. At a displacement u,
+the nodes inside a level take p substeps from rest at q_0 = u while all other nodes are fixed at u. The force of the
+step is the weighted mean of the forces f(q_k), on the nodes inside and on the nodes around them (the ring):
 
     f(u) = sum over k of weight_k f(q_k),        K_eff = -df/du = K_eff^T,        K_eff -> K for DT -> 0.
 
-Being a mean of internal forces it has no resultant; rigid motion gives none at all. Forces of loads are not in it: they
-act once a step. The elements of the next level are a term inside f with the substep for DT, and so on.
+As a mean of internal forces it has no resultant, and it is zero for rigid motion. Loads act once per large step outside
+of it. The elements of the next level are a term inside f, whose large step is the substep, and so on.
 """
 
 from collections.abc import Sequence
@@ -38,13 +37,13 @@ from reflowshock.materials.parameters import Material
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Who takes which steps.
+    """Step level of each element, and the time steps of the levels.
 
     Attributes:
-        level: ``(ne,)`` level of each element of the rank, 0 for those that take the step of the model.
-        ratios: Steps of level k + 1 in one of level k.
-        step: Step of the model DT [s]; inside a level, of the level around it.
-        damping: beta of damping over the step of the model.
+        level: Level of each element of the rank, 0 for elements with the step of the model, shape (ne,).
+        ratios: Number of steps of level k + 1 in one step of level k.
+        step: Step of the model DT [s]; in an inner level, the step of the surrounding level.
+        damping: Coefficient beta of stiffness-proportional damping, divided by the step of the model.
     """
 
     level: NDArray[np.int32]
@@ -55,25 +54,26 @@ class Levels:
 
 @dataclass(frozen=True, slots=True)
 class SubsteppedElements:
-    """One level and all inside it.
+    """Force term of one level and all levels inside it.
 
-    Its nodes are numbered anew: first those that move (free), then the ring. Slaves are eliminated: their masters are
-    the nodes of their elements, and get all force.
+    The nodes of the level are renumbered: first the ones that move (free), then the ring. Slaves are eliminated: their
+    masters take their place in the elements and receive their forces.
 
     Attributes:
-        rows: ``(n,)`` int32, its nodes among those of the level around it.
-        terms: Forces at its nodes: of its own elements, and of the next level.
-        substeps: Their coefficients.
-        shared: Its free nodes that several ranks hold.
-        step: Step of the level around it [s].
-        inverse: ``(nf, 3)`` DT^2 / m of its free nodes [s^2/kg], zero for held components; see ``follow``.
-        foreign: Those of its free nodes whose force another rank gives: the lowest that holds them.
-        change: ``(nf, 3)`` [m] of the latest substep.
-        state: ``(3, n, 3)``: displacement [m], force [N] there, weighted sum of forces [N]; only ``add`` reads it.
-        at_once: Where all substeps can be one call: it and the levels inside it as ``kernels.levels.run_levels`` takes
-            them, with the same arrays; else empty.
-        plain: Terms of its elements without levels, where they have hourglass control: for its share of the energy.
-        history: Empty: the force follows from the displacement.
+        rows: Numbers of the level's nodes in the surrounding level, shape (n,) int32.
+        terms: Force terms at the nodes: elements of this level, and the next level.
+        substeps: Coefficients of the substeps.
+        shared: Free nodes shared with other ranks.
+        step: Step of the surrounding level [s].
+        inverse: DT^2 / m of the free nodes, zero for fixed components, shape (nf, 3) [s^2/kg]; see ``follow``.
+        foreign: Free nodes whose force another rank (the lowest that has them) contributes.
+        change: Displacement change of the latest substep, shape (nf, 3) [m].
+        state: Work arrays of ``add``: displacement [m], force [N], weighted sum of forces [N], shape (3, n, 3).
+        compiled: Arrays of this level and the levels inside it for ``kernels.levels.run_levels``, empty if the substeps
+            cannot run in one compiled call.
+        plain: Force terms of the same elements without local steps, for the hourglass energy; empty without hourglass
+            control.
+        history: Empty, since the force depends only on the displacement.
     """
 
     rows: NDArray[np.int32]
@@ -85,41 +85,41 @@ class SubsteppedElements:
     foreign: NDArray[np.int32]
     change: NDArray[np.float64]
     state: NDArray[np.float64]
-    at_once: tuple[tuple[NDArray, ...], ...] = ()
+    compiled: tuple[tuple[NDArray, ...], ...] = ()
     plain: Sequence[ForceTerm] = ()
     history: dict[str, NDArray] = field(default_factory=dict)
 
     @classmethod
     def build(cls, comm: MPI.Comm, body: Body, levels: Levels) -> "SubsteppedElements":
-        """Build the levels below the step of a model, whose elements of level 0 are not in them; collective.
+        """Build the term of all elements of levels above 0; collective.
 
         Args:
             comm: Communicator of the model.
-            body: The model, whatever its terms. The nodes of its interface are held.
-            levels: Levels of its elements, which must be linear elastic.
+            body: Model on this rank; the nodes of its coupling interface do not move in substeps.
+            levels: Levels of the elements, which must be linear elastic.
         """
         term = build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
         elements = body.elements.subset(levels.level > 0)
         return replace(term, plain=linear_terms(elements)) if elements.kind.hourglass else term
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract K_eff u from the force; collective."""
-        if self.at_once:
-            run_levels(self.at_once, 0, displacement, force)
+        """Subtract K_eff u, shape (n, 3) [N], from the force; collective."""
+        if self.compiled:
+            run_levels(self.compiled, 0, displacement, force)
             return
-        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        steps, local_displacement, local_force = self.substeps, self.state[0], self.state[1]
         begin_substeps(self.rows, displacement, self.state)
         for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
             for term in self.terms:
-                term.add(place, pull)
-            self.shared.add(pull)
+                term.add(local_displacement, local_force)
+            self.shared.add(local_force)
             take_substep(coefficients, self.inverse, self.change, self.state)
         end_substeps(self.rows, self.foreign, self.state, force)
 
     def follow(self, mobility: NDArray[np.float64]) -> None:
-        """Let the nodes of all levels be as free as in a motion: inverse masses ``(m, 3)`` [1/kg] of the level around.
+        """Adopt the inverse masses of a motion at the nodes of the surrounding level, shape (m, 3) [1/kg].
 
-        What a motion prescribes, or gives a large mass, does not move in substeps; else the elements there would be
+        Nodes with prescribed motion or a large mass must not move in substeps; otherwise the elements there would be
         softer by the square of their steps.
         """
         free = len(self.inverse)
@@ -128,52 +128,54 @@ class SubsteppedElements:
             inner.follow(mobility[self.rows])
 
     def carry(self, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the mean internal force ``(m, 3)`` [N] at u = 0 of substeps in which loads act; collective.
+        """Return the mean internal force at u = 0 of substeps in which loads act, shape (m, 3) [N]; collective.
 
-        With it a load bends the elements at its nodes as they are, K_eff u = f + carry(f) for K u = f, where f alone
-        would give the nodes a window's free flight. It has no resultant.
+        With this correction a load deforms the elements at its nodes correctly: K_eff u = f + carry(f) for K u = f.
+        Without it, the loaded nodes would move freely during the step. It has no resultant.
 
         Args:
-            load: ``(m, 3)`` [N] at the nodes of the level around, equal on all copies of a node.
-            fall: ``(3,)`` [m/s^2] acceleration of all but what is held: in a frame that falls, this moves against it.
+            load: Load at the nodes of the surrounding level, equal on all copies of a node, shape (m, 3) [N].
+            fall: Body acceleration of all components that are not fixed, shape (3,) [m/s^2]; in the falling frame, the
+                fixed components move against it.
         """
-        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        steps, local_displacement, local_force = self.substeps, self.state[0], self.state[1]
         free = len(self.inverse)
-        mine, force = load[self.rows], np.zeros_like(load)
-        inside = sum((inner.carry(mine, fall) for inner in levels_of(self.terms)), np.zeros_like(mine))
-        held, speed = np.where(self.inverse == 0.0, fall, 0.0), 0.0
-        place.fill(0.0)
+        local_load, force = load[self.rows], np.zeros_like(load)
+        inner_force = sum((inner.carry(local_load, fall) for inner in levels_of(self.terms)), np.zeros_like(local_load))
+        fixed_fall, speed = np.where(self.inverse == 0.0, fall, 0.0), 0.0
+        local_displacement.fill(0.0)
         for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
             for term in self.terms:
-                term.add(place, pull)
-            pull += inside
-            self.shared.add(pull)
-            pull[:free] += mine[:free]
+                term.add(local_displacement, local_force)
+            local_force += inner_force
+            self.shared.add(local_force)
+            local_force[:free] += local_load[:free]
             take_substep(coefficients, self.inverse, self.change, self.state)
             speed = coefficients[0] * speed + coefficients[1] * self.step**2
-            place[:free] -= speed * held
-        self.state[2, :free] -= mine[:free]  # the weights add up to one
+            local_displacement[:free] -= speed * fixed_fall
+        self.state[2, :free] -= local_load[:free]  # the weights add up to one
         end_substeps(self.rows, self.foreign, self.state, force)
         return force
 
     def means(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what elements of each level feel on average over the step, of linear forces the mean; collective.
+        """Return the weighted mean over the substeps of the displacements of each level; collective.
 
         Args:
-            values: ``(m, 3)`` displacements, or velocities, of the level around.
+            values: Displacement, or velocity, of the surrounding level, shape (m, 3).
 
         Returns:
-            ``(levels, m, 3)``, of this level and those inside it; in each the nodes of its elements count.
+            Means for this level and the levels inside it, shape (levels, m, 3); valid at the nodes of each level's
+            elements.
         """
-        steps, place, pull = self.substeps, self.state[0], self.state[1]
+        steps, local_displacement, local_force = self.substeps, self.state[0], self.state[1]
         begin_substeps(self.rows, values, self.state)
         total = np.zeros(())
         for coefficients in zip(steps.memory, steps.rate, steps.weight, strict=True):
-            inner = [level.means(place) for level in levels_of(self.terms)]
-            total = total + coefficients[2] * np.concatenate([place[None], *inner])
+            inner = [level.means(local_displacement) for level in levels_of(self.terms)]
+            total = total + coefficients[2] * np.concatenate([local_displacement[None], *inner])
             for term in self.terms:
-                term.add(place, pull)
-            self.shared.add(pull)
+                term.add(local_displacement, local_force)
+            self.shared.add(local_force)
             take_substep(coefficients, self.inverse, self.change, self.state)
         self.state[2] = 0.0
         result = np.repeat(values[None], len(total), axis=0)
@@ -181,52 +183,52 @@ class SubsteppedElements:
         return result
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return u . K_eff u / 2, of which hourglass modes have what they have without levels; collective."""
+        """Return u . K_eff u / 2 [J], with the hourglass share of elements without local steps; collective."""
         hourglass = sum(term.energy(displacement).hourglass for term in self.plain)
         return Energy(linear_energy(self, displacement, None).strain - hourglass, hourglass=hourglass)
 
 
 def levels_of(terms: Sequence[InternalForce]) -> list[SubsteppedElements]:
-    """Return those of some force terms that have levels."""
+    """Return the force terms with local time steps."""
     return [term for term in terms if isinstance(term, SubsteppedElements)]
 
 
 def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:
-    """Refuse levels where forces depend on the path: a mean over substeps from rest is no path.
+    """Check that elements with local time steps are linear elastic: substeps from rest have no loading history.
 
     Raises:
-        LevelError: With what is not linear elastic.
+        LevelError: A material yields, or kinematics are not small.
     """
     yielding = [material for material in materials if material.plasticity is not None]
     if yielding or kinematics != "small":
-        cause = f"{len(yielding)} of the materials yield" if yielding else f"kinematics = {kinematics}"
+        cause = f"{len(yielding)} materials yield" if yielding else f"kinematics = {kinematics}"
         raise LevelError(
-            f"local steps (ratios {', '.join(map(str, ratios))}) need linear elastic elements at small strains, but"
-            f" {cause}; scheme = held_velocity or gravouil_combescure is for them"
+            f"local steps (ratios {', '.join(map(str, ratios))}) support only linear elastic elements at small strains,"
+            f" but {cause}; use coupling.scheme = held_velocity or gravouil_combescure"
         )
 
 
 def build_level(
     comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]
 ) -> SubsteppedElements:
-    """Build a level and those inside it; collective.
+    """Build a level and the levels inside it; collective.
 
     Args:
         comm: Communicator of the model.
-        body: The model.
+        body: Model on this rank.
         levels: Levels of its elements.
-        number: Which level.
-        around: ``(m,)`` nodes of the level around it.
+        number: Number of the level.
+        around: Nodes of the surrounding level, shape (m,).
     """
     nodes, free = level_nodes(body, levels.level, number)
-    terms = own_terms(body, levels.level == number, nodes)
+    terms = terms_at_nodes(body, levels.level == number, nodes)
     substeps = Substeps.of(levels.ratios[number - 1], number, levels.damping)
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
         terms.append(build_level(comm, body, inner, number + 1, nodes))
     shared = SharedNodes(comm, body.local.nodes[nodes[:free]], body.shared.clock)
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
-    made = SubsteppedElements(
+    term = SubsteppedElements(
         rows=positions(around, nodes),
         terms=terms,
         substeps=substeps,
@@ -237,26 +239,26 @@ def build_level(
         change=np.zeros((free, 3)),
         state=np.zeros((3, len(nodes), 3)),
     )
-    return replace(made, at_once=arrays_at_once(made))
+    return replace(term, compiled=compiled_arrays(term))
 
 
-def arrays_at_once(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
-    """Return ``SubsteppedElements.at_once`` of a level: Python between substeps costs as much as small levels do."""
+def compiled_arrays(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
+    """Return the arrays with which all substeps of a level run in one compiled call, empty if they cannot."""
     inner = levels_of(level.terms)
-    own = [term for term in level.terms if term not in inner]
-    matrix = own[0] if len(own) == 1 else None
-    if not isinstance(matrix, AssembledElements) or level.shared.exchanged or (inner and not inner[0].at_once):
+    element_terms = [term for term in level.terms if term not in inner]
+    matrix = element_terms[0] if len(element_terms) == 1 else None
+    if not isinstance(matrix, AssembledElements) or level.shared.exchanged or (inner and not inner[0].compiled):
         return ()
     steps = level.substeps
     coefficients = np.column_stack([steps.memory, steps.rate, steps.weight])
     arrays = (level.rows, level.foreign, coefficients, level.inverse, level.change, level.state)
-    return ((*arrays, matrix.pointer, matrix.columns, matrix.blocks), *(inner[0].at_once if inner else ()))
+    return ((*arrays, matrix.pointer, matrix.columns, matrix.blocks), *(inner[0].compiled if inner else ()))
 
 
 def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
-    """Return the local nodes but slaves of a level and those inside it, and how many of them move; collective.
+    """Return the nodes of a level and the levels inside it, without slaves, and the number of moving ones; collective.
 
-    Those that move come first: no element of an outer level has them, on any rank, not even by a slave.
+    The moving nodes come first. They belong to no element of an outer level on any rank, nor to a master of its slaves.
     """
     used, slaves = np.zeros(len(body.mass), dtype=bool), np.zeros(len(body.mass), dtype=bool)
     used[body.elements.cells[level >= number]] = True
@@ -273,10 +275,10 @@ def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDAr
     return nodes.astype(np.int32), int(np.sum(used & moves))
 
 
-def own_terms(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
-    """Return the forces of some elements of a body at some of its nodes, none of them a slave."""
-    here = np.isin(body.tie.slave, body.elements.cells[chosen])
-    tie = Tie(body.tie.slave[here], body.tie.master[here], body.tie.weight[here])
+def terms_at_nodes(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
+    """Return the force terms of selected elements of a body, numbered by ``nodes``, none of which is a slave."""
+    is_used = np.isin(body.tie.slave, body.elements.cells[chosen])
+    tie = Tie(body.tie.slave[is_used], body.tie.master[is_used], body.tie.weight[is_used])
     order = np.concatenate([nodes, tie.slave])
     elements = body.elements.subset(chosen)
     renumbered = replace(elements, points=elements.points[order], cells=positions(order, elements.cells))
@@ -284,9 +286,9 @@ def own_terms(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -
 
 
 def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
-    """Return the force terms of linear elements at all nodes but the slaves, which must be the last ones.
+    """Return the force terms of linear elements with the slaves, which must be the last nodes, eliminated.
 
-    Boxes with a slave share no stiffness with others any more: they are assembled.
+    Boxes with a slave no longer share their stiffness with other boxes, so they are assembled.
     """
     box = in_rows(elements) & ~np.isin(elements.cells, tie.slave).any(axis=1)
     terms: list[InternalForce] = []
@@ -298,7 +300,7 @@ def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
 
 
 def without_slaves(assembled: AssembledElements, tie: Tie) -> AssembledElements:
-    """Return T^T K T of an assembled stiffness at all nodes but the slaves, T the tie."""
+    """Return the assembled stiffness T^T K T without the slaves, T the tie."""
     if not len(tie.slave):
         return assembled
     count = len(assembled.pointer) - 1
@@ -314,11 +316,11 @@ def without_slaves(assembled: AssembledElements, tie: Tie) -> AssembledElements:
 
 
 def upper_blocks(matrix: scipy.sparse.bsr_matrix, count: int) -> AssembledElements:
-    """Return the first ``count`` block rows of a symmetric matrix: upper blocks, diagonal ones halved."""
+    """Return the upper blocks, with halved diagonal, of the first ``count`` block rows of a symmetric matrix."""
     row = np.repeat(np.arange(matrix.shape[0] // 3), np.diff(matrix.indptr))
-    kept = (row <= matrix.indices) & (row < count)
-    columns = matrix.indices[kept].astype(np.int32)
-    blocks: NDArray[np.float64] = matrix.data[kept]
-    blocks[columns == row[kept]] *= 0.5
-    pointer = np.concatenate([[0], np.cumsum(np.bincount(row[kept], minlength=count))]).astype(np.int32)
+    is_upper = (row <= matrix.indices) & (row < count)
+    columns = matrix.indices[is_upper].astype(np.int32)
+    blocks: NDArray[np.float64] = matrix.data[is_upper]
+    blocks[columns == row[is_upper]] *= 0.5
+    pointer = np.concatenate([[0], np.cumsum(np.bincount(row[is_upper], minlength=count))]).astype(np.int32)
     return AssembledElements(pointer, columns, blocks)

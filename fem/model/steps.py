@@ -1,8 +1,8 @@
-"""Time steps of a run, and how they follow from the critical steps of its elements.
+"""Time steps of a run, from the critical steps of its elements.
 
-The critical step is the smallest of all elements, or Lanczos' estimate on the assembled, tied model
-(``power_iteration``). All steps are those of the undeformed body: with finite kinematics, elements that are pressed to
-a fraction of their thickness need about that fraction of the step (``step_fraction``).
+The critical step is the smallest of all elements, or a Lanczos estimate for the assembled, tied model
+(``power_iteration``). All steps hold for the undeformed body: with finite kinematics, elements compressed to a fraction
+of their thickness need about that fraction of the step (``step_fraction``).
 """
 
 import math
@@ -27,24 +27,24 @@ from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.problem.structure import Dynamics
 from reflowshock.materials.roles import Materials
 
-LONGEST_WINDOW = 250  # steps: after each window a run can be judged, stopped and continued
-STEP_LIMIT = 0.99  # of the critical step
+LONGEST_WINDOW = 250  # [steps]; a run can be checked, stopped and restarted only at the end of a window
+STEP_LIMIT = 0.99  # recommended largest fraction of the critical step
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Time steps of a run and how they came about.
+    """Time steps of a run, with the critical steps and masses behind them.
 
     Attributes:
-        plan: Window, substeps.
-        critical: Role -> smallest element critical step before mass scaling [s].
-        smallest: Smallest critical step that the substeps follow, mass scaling and damping included [s].
+        plan: Windows and substeps.
+        critical: Smallest element critical step before mass scaling by material role [s].
         macro_critical: Smallest element critical step in the macro model and at the interface [s].
-        added_mass: Mass that scaling adds [kg].
-        model_mass: Mass without scaling [kg].
-        meso_step: Step of the meso model's motion [s], the window where its own steps are inside its force.
-        mass_factors: Of a structure, the density factor ``(ne,)`` of this rank's elements.
+        smallest: Critical step that limits the substeps, mass scaling and damping included [s].
+        added_mass: Mass added by mass scaling [kg].
+        model_mass: Mass without mass scaling [kg].
+        meso_step: Step of the meso model's motion [s]; the window, if the small steps are inside its force term.
+        mass_factors: Density factor of this rank's elements, shape (ne,), for a structure; otherwise empty.
     """
 
     plan: WindowPlan
@@ -58,7 +58,7 @@ class Steps:
 
     @property
     def moved_mass(self) -> float:
-        """Return the mass of all models, scaling included [kg]."""
+        """Mass of all models, mass scaling included [kg]."""
         return self.model_mass + self.added_mass
 
     def step_of(self, role: Role) -> float:
@@ -75,7 +75,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     return Steps(
         plan=division.plan,
         critical={role: float(survey.plain_step[survey.role == role].min()) for role in roles},
-        macro_critical=float(critical[slow if slow.any() else ...].min()),  # of all where no macro model is left
+        macro_critical=float(critical[slow if slow.any() else ...].min()),  # all elements if no macro model is left
         smallest=float(critical.min()),
         added_mass=float(survey.added_mass[counted].sum()),
         model_mass=float(survey.mass[counted].sum()),
@@ -84,7 +84,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
 
 
 def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
-    """Return the steps of one model in the windows of a divided one, its substeps from another critical step [s]."""
+    """Return the steps of an undivided model with the same windows and its own critical step [s]."""
     smallest = damped_critical_step(critical, rules.stiffness)
     substeps = math.ceil(steps.plan.window / (rules.fraction * smallest))
     return replace(steps, plan=replace(steps.plan, substeps=substeps), smallest=smallest)
@@ -92,42 +92,50 @@ def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
 
 def assembled_step(
     comm: MPI.Comm,
-    model: tuple[Pieces, Tables],
+    pieces: Pieces,
+    tables: Tables,
     mass_factor: NDArray[np.float64],
     beddings: Sequence[BeddedFacets] = (),
 ) -> float:
-    """Return the critical step [s] of a whole model from its highest frequency, elastic at small strains; collective.
+    """Estimate the critical step [s] of an undivided model from its highest frequency; collective.
 
-    With the certainty of ``power_iteration`` it is not above the true one. It is not for the models of a window, whose
-    stability rests on the steps of elements: at the assembled step of a meso model of one joint a window grew by 13 %.
-    ``beddings`` are its elastic supports on this rank.
+    The estimate holds for linear elastic materials at small strains, with the confidence of ``power_iteration``. It
+    must not be used for the models of a coupled run, whose stability depends on the critical steps of single elements:
+    with the assembled step, the motion of a meso model of one joint grew by 13 % in a window.
+
+    Args:
+        comm: Communicator of the model.
+        pieces: Elements of the rank.
+        tables: Tables of the model.
+        mass_factor: Factor on the density of each element, shape (ne,).
+        beddings: Elastic supports on this rank.
     """
-    body = make_body(comm, *model, mass_factor, None)
-    found = highest_frequency(comm, body, [*body.terms, *beddings], body.mass)
+    body = make_body(comm, pieces, tables, mass_factor, None)
+    highest = highest_frequency(comm, body, [*body.terms, *beddings], body.mass)
     body.shared.free()
-    return found.critical_step
+    return highest.critical_step
 
 
 def agreed_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
-    """Return the smallest of all values of all ranks, infinity where there is none; collective."""
-    return float(world.allreduce(min(float(some.min(initial=np.inf)) for some in values), MPI.MIN))
+    """Return the smallest of all values on all ranks, infinity if there are none; collective."""
+    return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 
 
 def mass_factor(pieces: Pieces, scaled: Sequence[str], target: float) -> NDArray[np.float64]:
-    """Return the density factor ``(ne,)`` that raises the critical steps of some roles to ``target`` [s]."""
+    """Return the density factor, shape (ne,), that raises the critical steps of the scaled roles to ``target`` [s]."""
     return np.where(np.isin(pieces.roles, scaled), np.maximum(1.0, (target / pieces.steps) ** 2), 1.0)
 
 
 def critical_by_role(
     world: MPI.Comm, models: Sequence[Pieces], roles: Iterable[str] = tuple(Materials.model_fields)
 ) -> dict[str, float]:
-    """Return the smallest element critical step [s] of each material role over all ranks."""
-    found = {role: agreed_minimum(world, [pieces.steps[pieces.roles == role] for pieces in models]) for role in roles}
-    return {role: step for role, step in found.items() if np.isfinite(step)}
+    """Return the smallest element critical step [s] of each material role over all ranks; collective."""
+    smallest = {role: agreed_minimum(world, [own.steps[own.roles == role] for own in models]) for role in roles}
+    return {role: step for role, step in smallest.items() if np.isfinite(step)}
 
 
 def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
-    """Choose the steps of central differences from the elements' critical steps; collective.
+    """Choose the steps of central differences from the critical steps of the elements; collective.
 
     Mass scaling raises them, stiffness-proportional damping lowers them.
     """
@@ -135,49 +143,47 @@ def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
     target = agreed_minimum(comm, [pieces.steps[~np.isin(pieces.roles, scaled)]])
     factor = mass_factor(pieces, scaled, target)
     critical = agreed_minimum(comm, [pieces.steps * np.sqrt(factor)])
-    return make_steps(comm, pieces, factor, explicit_plan(dynamics, critical))
+    return make_steps(comm, pieces, factor, *explicit_plan(dynamics, critical))
 
 
 def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
-    """Return windows and the critical step [s] with damping, from that without."""
+    """Return the windows and the damped critical step [s], from the undamped critical step [s]."""
     critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
-    given = dynamics.numerics.explicit_step
-    return window_plan(dynamics, given or dynamics.numerics.step_fraction * critical), critical
+    step = dynamics.numerics.explicit_step or dynamics.numerics.step_fraction * critical
+    return window_plan(dynamics, step), critical
 
 
 def check_step(dynamics: Dynamics, critical: float) -> None:
-    """Refuse a given explicit step above the critical step [s].
+    """Check that an explicit step of the input is at most the critical step [s].
 
     Raises:
-        StepError: With both.
+        StepError: The step is larger.
     """
-    given, estimate = dynamics.numerics.explicit_step, dynamics.numerics.critical_step
-    if given is not None and given > critical:
+    step, estimate = dynamics.numerics.explicit_step, dynamics.numerics.critical_step
+    if step is not None and step > critical:
         hint = "" if estimate == "power_iteration" else "; critical_step = power_iteration may allow more"
         raise StepError(
-            f"dynamics.numerics.explicit_step = {given:.4g} s is above the critical step {critical:.4g} s ({estimate}),"
-            f" beyond which every motion grows; at most {STEP_LIMIT * critical:.4g} s is advised{hint}"
+            f"dynamics.numerics.explicit_step = {step:.4g} s is above the critical step {critical:.4g} s ({estimate})"
+            f" and unstable; use at most {STEP_LIMIT * critical:.4g} s{hint}"
         )
 
 
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
-    """Return explicit steps with another critical step without damping [s]."""
+    """Return explicit steps for another undamped critical step [s]."""
     plan, critical = explicit_plan(dynamics, undamped)
     return replace(steps, plan=plan, macro_critical=critical, smallest=critical)
 
 
 def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
-    """Choose the steps of the implicit solver: as given, or so many in the shortest of some pulses [s]; collective."""
-    critical = agreed_minimum(comm, [pieces.steps])
-    return make_steps(
-        comm, pieces, np.ones(len(pieces.steps)), (window_plan(dynamics, implicit_step(dynamics, pulses)), critical)
-    )
+    """Choose the steps of the implicit solver, from the input or the shortest pulse duration [s]; collective."""
+    critical, plan = agreed_minimum(comm, [pieces.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
+    return make_steps(comm, pieces, np.ones(len(pieces.steps)), plan, critical)
 
 
 def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
-    """Return windows that end at the samples, fewer where the steps are; no step is above ``largest`` [s].
+    """Return windows that end at the samples, with no step above ``largest`` [s].
 
-    Runs of one problem by different solvers so have their samples at the same times, unless one has fewer steps.
+    Different solvers then sample a problem at the same times, unless a run has fewer steps than samples.
     """
     samples = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
     stride = at_least(dynamics.duration / samples / largest / LONGEST_WINDOW)
@@ -186,20 +192,22 @@ def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
 
 
 def at_least(count: float) -> int:
-    """Return the next whole number, whatever the rounding of a ratio that should be one."""
+    """Return ``count`` rounded up to an integer of at least 1, tolerant of round-off in the ratio."""
     return max(1, math.ceil(count * (1.0 - ROUNDING)))
 
 
-def make_steps(comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], chosen: tuple[WindowPlan, float]) -> Steps:
-    """Return the steps with the masses; collective.
+def make_steps(
+    comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], plan: WindowPlan, critical: float
+) -> Steps:
+    """Return the steps of a single model with its masses; collective.
 
     Args:
-        comm: All ranks.
-        pieces: The rank's elements.
-        factor: ``(ne,)`` on the density of each element.
-        chosen: Windows, and the critical step of explicit steps [s].
+        comm: Communicator of the model.
+        pieces: Elements of the rank.
+        factor: Factor on the density of each element, shape (ne,).
+        plan: Windows and substeps.
+        critical: Critical step of explicit integration [s].
     """
-    plan, critical = chosen
     mass = pieces.elements.density * pieces.geometry.volume
     return Steps(
         plan=plan,

@@ -1,4 +1,4 @@
-"""Mean stress, strain and plastic flow of elements: from the displacement, or from what a path has left."""
+"""Mean stress, strain and plastic strain of elements, from the displacement or from the stored loading history."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,14 @@ from reflowshock.fem.parallel.local_mesh import positions
 
 
 class StressRecovery:
-    """Averages over some elements of a rank.
+    """Element averages for selected elements of a rank.
 
-    Linear elements follow their elastic law, beside the stress that they begin with. Where strains and rotations are
-    finite, stress is the Cauchy stress, turned by the rotation R of the element's mean deformation R U, and strain is
-    U - 1.
+    Linear elements follow their elastic law plus their initial stress. With finite kinematics, stress is the Cauchy
+    stress, rotated by R of the mean deformation gradient F = R U of the element, and strain is U - 1.
     """
 
     def __init__(self, body: Body, chosen: NDArray[np.integer]) -> None:
-        """Take the elements ``chosen (k,)`` of a body."""
+        """Select elements of a body by their numbers, shape (k,)."""
         elements = body.elements.subset(chosen)
         self._cells, self._gradient = elements.cells, body.geometry.gradient[chosen]
         self._elasticity = elements.elasticity[elements.material]
@@ -37,32 +36,32 @@ class StressRecovery:
         self._finite |= self._turning
 
     def stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the stresses ``(k, 6)`` [Pa] at a displacement ``(n, 3)`` [m]."""
-        result, finite = self._unturned(displacement), self._finite
+        """Return the mean stresses, shape (k, 6) [Pa], at a displacement, shape (n, 3) [m]."""
+        result, finite = self._unrotated_stress(displacement), self._finite
         if finite.any():
             deformation = np.eye(3) + self._displacement_gradient(displacement, finite)
             rotation, stretch = polar(deformation)
             result[self._turning] = self._corotational_stress(stretch[self._turning[finite]])
-            turned = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
-            result[finite] = voigt(turned / np.linalg.det(deformation)[:, None, None])
+            rotated = rotation @ symmetric(result[finite]) @ rotation.transpose(0, 2, 1)
+            result[finite] = voigt(rotated / np.linalg.det(deformation)[:, None, None])
         return result
 
     def mises(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the von Mises stresses ``(k,)`` [Pa] at a displacement ``(n, 3)`` [m]: no rotation changes them."""
-        result, finite = von_mises(self._unturned(displacement)), self._finite
+        """Return the von Mises stresses, shape (k,) [Pa], at a displacement, shape (n, 3) [m]."""
+        result, finite = von_mises(self._unrotated_stress(displacement)), self._finite
         if finite.any():
             result[finite] /= np.linalg.det(np.eye(3) + self._displacement_gradient(displacement, finite))
         return result
 
-    def _unturned(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the stresses ``(k, 6)`` [Pa], of elements that turn the Kirchhoff stresses in their own frames."""
+    def _unrotated_stress(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the stresses, for finite kinematics Kirchhoff stresses in element frames, shape (k, 6) [Pa]."""
         result = element_stress(self._gradient, self._elasticity, displacement[self._cells]) + self._initial
         for term, rows, places in self._stored:
             result[rows] = term.means(places).stress
         return result
 
     def strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the strains ``(k, 6)`` at a displacement ``(n, 3)`` [m], shear as engineering strain."""
+        """Return the strains with engineering shear, shape (k, 6), at a displacement, shape (n, 3) [m]."""
         local = displacement[self._cells]
         result = mean_strain(self._gradient, local)
         finite = self._finite
@@ -73,11 +72,11 @@ class StressRecovery:
         return result
 
     def neglected_strain(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest strain ``(k,)`` that small kinematics leaves out, zero where kinematics are finite.
+        """Return the largest strain that small kinematics neglects, shape (k,), zero with finite kinematics.
 
-        It is the greatest eigenvalue of h^T h / 2, the part of Green's strain that is quadratic in the displacement
-        gradient h: what a rotation would stretch a body whose ends are held. Of corotational boxes, whose stress is
-        linear in the stretch U - 1, it is half the largest square of that.
+        It is the largest eigenvalue of h^T h / 2, the part of the Green strain that is quadratic in the displacement
+        gradient h: the stretch of a rotating body with fixed ends. For corotational boxes, whose stress is linear in
+        U - 1, it is half the largest squared principal value of U - 1.
         """
         result = np.zeros(len(self._cells))
         small, turning = ~self._finite, self._turning
@@ -90,24 +89,24 @@ class StressRecovery:
         return result
 
     def _corotational_stress(self, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the stresses ``(r, 6)`` [Pa] of corotational boxes with stretches ``(r, 3, 3)``, before they turn."""
+        """Return the unrotated stresses, shape (r, 6) [Pa], of corotational boxes with stretches, shape (r, 3, 3)."""
         strain = voigt(stretch - np.eye(3)) * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
         elastic = np.einsum("kij,kj->ki", self._elasticity[self._turning], strain)
         return np.asarray(elastic + np.broadcast_to(self._initial, (len(self._cells), 6))[self._turning])
 
     def _displacement_gradient(self, displacement: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the mean displacement gradients ``(r, 3, 3)`` of some elements."""
+        """Return the mean displacement gradients of selected elements, shape (r, 3, 3)."""
         return np.einsum("kai,kaj->kij", displacement[self._cells[rows]], self._gradient[rows])
 
     def plastic_strain(self) -> NDArray[np.float64]:
-        """Return the equivalent plastic strains ``(k,)``, zero where a material does not yield."""
+        """Return the equivalent plastic strains, zero for elastic materials, shape (k,)."""
         result = np.zeros(len(self._cells))
         for term, rows, places in self._stored:
             result[rows] = term.means(places).plastic_strain
         return result
 
     def plastic_work(self) -> NDArray[np.float64]:
-        """Return the plastic work densities ``(k,)`` [J/m^3], zero where a material does not yield."""
+        """Return the plastic work densities, zero for elastic materials, shape (k,) [J/m^3]."""
         result = np.zeros(len(self._cells))
         for term, rows, places in self._stored:
             result[rows] = term.means(places).plastic_work
@@ -115,6 +114,6 @@ class StressRecovery:
 
 
 def polar(deformation: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return rotation and stretch ``(k, 3, 3)`` of deformations F = R U with positive determinants."""
+    """Return rotation R and stretch U, shape (k, 3, 3), of deformation gradients F = R U with positive determinants."""
     left, values, right = np.linalg.svd(deformation)
     return left @ right, right.transpose(0, 2, 1) @ (values[:, :, None] * right)

@@ -1,1 +1,1 @@
-"""Fields, histories, watch points, results and their comparison."""
+"""Fields, watch points, results and comparisons of runs; start with `result.py`."""

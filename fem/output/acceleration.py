@@ -1,8 +1,8 @@
-"""Accelerations of watch points from their histories, filtered, and their peaks. Plain NumPy and SciPy.
+"""Filtered accelerations of watch points from displacement histories, and their peaks.
 
-A second difference of the displacements at three samples is the mean of the acceleration between them, weighted with a
-triangle: it folds nothing of what is faster than the samples into them. What is slower than a tenth of their rate loses
-less than 4 %.
+The second difference of the displacements at three samples is the triangle-weighted mean of the acceleration between
+them, so frequencies above the sampling rate cause no aliasing. Frequencies below a tenth of the sampling rate lose less
+than 4 % of their amplitude.
 """
 
 import math
@@ -16,20 +16,21 @@ from numpy.typing import NDArray
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Pulse
 from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.fittings import WatchPoint
-from reflowshock.fem.problem.structure import InputG, StructureProblem
+from reflowshock.fem.problem.load_kinds import InputG
+from reflowshock.fem.problem.structure import StructureProblem
 
-TABLE = (0.0, 0.0, -1.0)  # direction in which the table of a drop is accelerated: the package faces down
-RATE = 10.0  # samples in a period of the filter's corner that are needed
+TABLE = (0.0, 0.0, -1.0)  # direction of the drop table's acceleration, with the package facing down
+RATE = 10.0  # required samples per period of the filter's corner frequency
 
 
 @dataclass(frozen=True, slots=True)
 class Acceleration:
-    """What an accelerometer at a point would read.
+    """Acceleration history at a point along one direction, as an accelerometer would measure it.
 
     Attributes:
-        time: ``(n,)`` [s].
-        raw: ``(n,)`` [m/s^2].
-        filtered: ``(n,)`` [m/s^2].
+        time: Sample times, shape (n,) [s].
+        raw: Unfiltered acceleration, shape (n,) [m/s^2].
+        filtered: Filtered acceleration, shape (n,) [m/s^2].
     """
 
     time: NDArray[np.float64]
@@ -38,13 +39,13 @@ class Acceleration:
 
     @property
     def peaks(self) -> tuple[int, int]:
-        """Return the places of the largest value, and of the largest of opposite sign after it."""
+        """Samples of the largest magnitude, and of the largest later value of opposite sign."""
         first = int(np.argmax(np.abs(self.filtered)))
         opposite = -np.sign(self.filtered[first]) * self.filtered[first:]
         return first, first + int(np.argmax(opposite))
 
     def peaks_in_g(self, name: str) -> dict[str, float]:
-        """Return the magnitudes of both peaks [G] as metrics; the second is zero where the sign never changes."""
+        """Return the magnitudes of both peaks [G] as metrics; the second is zero if the sign does not change."""
         first, second = self.peaks
         largest, opposite = abs(self.filtered[first]), -np.sign(self.filtered[first]) * self.filtered[second]
         return {
@@ -54,100 +55,103 @@ class Acceleration:
 
 
 def low_passed(values: NDArray[np.float64], step: float, low_pass: LowPass) -> NDArray[np.float64]:
-    """Filter samples ``(n,)`` at equal steps [s] forwards and backwards.
+    """Return samples, shape (n,), at equal steps [s], filtered forwards and backwards.
 
-    Beyond its ends the record goes on as its mirror image at the end points, over two periods of the corner.
+    The record is extended at both ends by its mirror image at the end point, over two periods of the corner frequency.
 
     Raises:
-        ValueError: There are fewer than two samples in a period of the filter's corner.
+        ValueError: The step is above half a period of the corner frequency.
     """
     from scipy.signal import butter, sosfiltfilt
 
     order, corner = low_pass.passes
     if 2.0 * corner * step >= 1.0:
-        raise ValueError(f"{1.0 / step:.4g} samples a second are too few for a filter with {low_pass.label}")
+        raise ValueError(f"{1.0 / step:.4g} samples per second are too few for a filter with {low_pass.label}")
     sections = butter(order, corner, fs=1.0 / step, output="sos")
     return sosfiltfilt(sections, values, padlen=min(len(values) - 1, math.ceil(2.0 / (corner * step))))
 
 
 def is_sampled(time: NDArray[np.float64], low_pass: LowPass) -> bool:
-    """Return whether samples at times ``(n,)`` [s] are close enough, and last long enough, for a filter."""
+    """Return whether sample times, shape (n,) [s], are dense enough and long enough for a filter."""
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     return len(time) > RATE and step * RATE * low_pass.frequency <= 1.0 + 1e-9
 
 
 def acceleration(time: NDArray[np.float64], displacement: NDArray[np.float64], low_pass: LowPass) -> Acceleration:
-    """Return the acceleration of absolute displacements ``(n,)`` [m] at equal steps ``time (n,)`` [s], from rest."""
+    """Return the acceleration from absolute displacements, shape (n,) [m], at equally spaced times, shape (n,) [s]."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
     raw = np.diff(displacement, n=2) / step**2
     return Acceleration(time[1:-1], raw, low_passed(raw, step, low_pass))
 
 
-def peaks_of(found: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:
-    """Return the peaks [G] of some accelerations as metrics, with their filter; nothing of none."""
+def peaks_of(accelerations: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:
+    """Return the peaks of named accelerations [G] and their filter as metrics; empty without accelerations."""
     peaks = {
         metric: {"value": value, "unit": "G"}
-        for name, course in found.items()
-        for metric, value in course.peaks_in_g(name).items()
+        for name, history in accelerations.items()
+        for metric, value in history.peaks_in_g(name).items()
     }
-    return peaks | {"acceleration_filter": {"value": low_pass.label, "unit": ""}} if found else {}
+    return peaks | {"acceleration_filter": {"value": low_pass.label, "unit": ""}} if accelerations else {}
 
 
 def base_displacement(
     time: NDArray[np.float64], problem: StructureProblem, pulses: Mapping[str, Pulse]
 ) -> NDArray[np.float64]:
-    """Return where the supports are ``(n, 3)`` [m] at some times ``(n,)`` [s]."""
+    """Return the displacement of the supports, shape (n, 3) [m], at times, shape (n,) [s]."""
     moved = np.zeros((len(time), 3))
     for name, load in problem.loads.items():
         if isinstance(load, InputG):
             along = np.array(load.direction) / np.linalg.norm(load.direction)
-            moved += np.outer([pulses[name].double_integral(one) for one in time], along)
+            moved += np.outer([pulses[name].double_integral(instant) for instant in time], along)
     return moved
 
 
 def watch_accelerations(
     arrays: Mapping[str, NDArray], problem: StructureProblem, pulses: Mapping[str, Pulse]
 ) -> dict[str, Acceleration]:
-    """Return the acceleration of each watch point in space, none where samples are too far apart for the filter.
+    """Return the absolute acceleration of each watch point of a structure; empty if samples are too sparse.
 
     Args:
-        arrays: Of a history.
-        problem: The structure.
-        pulses: Of its loads.
+        arrays: Arrays of the history by name.
+        problem: Input of the structure.
+        pulses: Pulse of each load.
     """
     time, low_pass = arrays["time"], problem.dynamics.filter
     if not is_sampled(time, low_pass):
         return {}
     base = base_displacement(time, problem, pulses)
     shaken = [np.array(load.direction) for load in problem.loads.values() if isinstance(load, InputG)]
-    found = {}
+    accelerations = {}
     for name, point in problem.watch.items():
-        place = base + arrays[f"displacement@{name}"]
-        given = np.array(point.direction) if point.direction else shaken[0] if shaken else None
-        along = np.eye(3)[np.ptp(place, axis=0).argmax()] if given is None else given / np.linalg.norm(given)
-        found[name] = acceleration(time, place @ along, low_pass)
-    return found
+        absolute = base + arrays[f"displacement@{name}"]
+        direction = np.array(point.direction) if point.direction else shaken[0] if shaken else None
+        if direction is None:
+            along = np.eye(3)[np.ptp(absolute, axis=0).argmax()]
+        else:
+            along = direction / np.linalg.norm(direction)
+        accelerations[name] = acceleration(time, absolute @ along, low_pass)
+    return accelerations
 
 
 def drop_accelerations(
     arrays: Mapping[str, NDArray], pulse: Pulse, low_pass: LowPass, watch: Mapping[str, WatchPoint]
 ) -> dict[str, Acceleration]:
-    """Return that of the package's centre and of each watch point in space, none where samples are too far apart.
+    """Return the absolute accelerations of package centre and watch points in a drop; empty if samples are too sparse.
 
     Args:
-        arrays: Of the history of a drop: displacements relative to the table, along z against its acceleration.
-        pulse: Acceleration of the table [m/s^2].
-        low_pass: The filter.
-        watch: Points whose accelerometer may have a direction, else that of the table's motion.
+        arrays: Arrays of the history by name; displacements are relative to the drop table.
+        pulse: Acceleration of the drop table [m/s^2].
+        low_pass: Filter of the accelerations.
+        watch: Watch points; a point without a direction uses the direction of the table's motion.
     """
     time = arrays["time"]
     if not is_sampled(time, low_pass):
         return {}
-    table = np.outer([pulse.double_integral(one) for one in time], TABLE)
-    places = {"package": arrays["die_centre"]} if arrays["die_centre"].any() else {}
-    places |= {name: arrays[f"displacement@{name}"] for name in watch}
-    found = {}
-    for name, place in places.items():
+    table = np.outer([pulse.double_integral(instant) for instant in time], TABLE)
+    displacements = {"package": arrays["die_centre"]} if arrays["die_centre"].any() else {}
+    displacements |= {name: arrays[f"displacement@{name}"] for name in watch}
+    accelerations = {}
+    for name, displacement in displacements.items():
         along = np.array((watch[name].direction if name in watch else None) or TABLE)
-        found[name] = acceleration(time, (table + place) @ along / np.linalg.norm(along), low_pass)
-    return found
+        accelerations[name] = acceleration(time, (table + displacement) @ along / np.linalg.norm(along), low_pass)
+    return accelerations

@@ -1,4 +1,4 @@
-"""Compare the histories of a two-scale run with those of a DNS. Plain NumPy."""
+"""Comparison of the histories of a two-scale run with a DNS."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -12,29 +12,28 @@ COMPARED = {"die_displacement": "die_centre", "board_displacement": "board_centr
 
 
 def relative_error(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
-    """Return the relative L2 norm over time and components, |values - reference| / |reference|."""
+    """Return the relative L2 error over time and components, |values - reference| / |reference|."""
     scale = float(np.linalg.norm(reference))
     return float(np.linalg.norm(values - reference)) / scale if scale > 0.0 else float(np.linalg.norm(values))
 
 
 def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None = None) -> dict[str, float | str]:
-    """Compare two ``history.npz``.
+    """Compare the ``history.npz`` files of a two-scale run and a DNS.
+
+    If the DNS ends early, only its duration is compared, and the two-scale run determines the critical joint.
 
     Args:
-        two_scale: Of the two-scale run.
-        dns: Of the reference.
-        fine: Joints that the two-scale run has fine; None if all.
+        two_scale: History file of the two-scale run.
+        dns: History file of the reference.
+        fine: Fine joints of the two-scale run, None if all are fine.
 
     Returns:
-        ``critical_joint`` (of the DNS, see ``ranking``); relative L2 errors: ``critical_joint_stress_error`` (von Mises
-        of the layers at its board and package side), ``worst_joint_stress_error`` (of the fine ones),
-        ``critical_joint_peel_error``, with flow ``critical_joint_work_error``,
-        ``die_displacement_error`` and ``board_displacement_error`` (their centres), ``board_strain_error``; with
-        ``fine`` also ``critical_joint_coarse``: 1 if the critical joint is not among them; of a DNS that ends early
-        ``compared_duration`` [s] and ``compared_stress``, the critical joint's peak until then over that of the run.
-
-    A reference that ends early is compared with over the time that it has; the critical joint is then that of the
-    two-scale run.
+        ``critical_joint`` of the DNS (see ``ranking``) and relative L2 errors: ``critical_joint_stress_error`` (von
+        Mises stress of its layers at board and package), ``worst_joint_stress_error`` (over the fine joints),
+        ``critical_joint_peel_error``, ``critical_joint_work_error`` (only with plasticity), ``die_displacement_error``
+        and ``board_displacement_error`` (at the centres), ``board_strain_error``. With ``fine`` also
+        ``critical_joint_coarse``, 1 if the critical joint is not fine. For a DNS that ends early also
+        ``compared_duration`` [s] and ``compared_stress``, the critical joint's peak until then over its overall peak.
 
     Raises:
         ValueError: The files have different sample times or joints, or the reference lasts longer.
@@ -58,12 +57,12 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
 def joint_errors(
     ours: dict[str, NDArray], reference: dict[str, NDArray], fine: Collection[str] | None
 ) -> dict[str, float | str]:
-    """Return the errors of the joints' histories, both ends together."""
+    """Return the errors of the joint histories, with board and package side combined."""
     count = len(reference["time"])
     whole = count == len(ours["time"])
     critical = critical_joint(reference if whole else ours)
     stress = VON_MISES.worse(ours)[:, critical]
-    seen = {} if whole or not stress.any() else {"compared_stress": float(stress[:count].max() / stress.max())}
+    partial = {} if whole or not stress.any() else {"compared_stress": float(stress[:count].max() / stress.max())}
 
     def error(measure: Measure, joint: int) -> float:
         names = [f"{measure.history}_{end}" for end in ENDS]
@@ -81,6 +80,6 @@ def joint_errors(
         ),
         "critical_joint_peel_error": error(PEEL, critical),
         **flow,
-        **seen,
+        **partial,
         **({} if fine is None else {"critical_joint_coarse": float(names[critical] not in fine)}),
     }

@@ -1,4 +1,4 @@
-"""Compare the histories of two solvers on one structure. Plain NumPy and SciPy."""
+"""Comparison of the histories of two solvers on one structure."""
 
 from collections.abc import Mapping
 
@@ -14,16 +14,16 @@ Arrays = Mapping[str, NDArray]
 
 
 def solver_differences(ours: Arrays, reference: Arrays) -> dict[str, float]:
-    """Compare two histories at the sample times of the one that has fewer.
+    """Compare two histories at the sample times of the one with fewer samples.
 
     Args:
-        ours: Arrays of a ``history.npz``.
-        reference: The same of the other solver.
+        ours: Arrays of a ``history.npz`` file.
+        reference: Arrays of the other solver's ``history.npz`` file.
 
     Returns:
         Relative L2 norms of the difference over time and components: ``displacement_difference@<point>`` and
-        ``strain_difference@<point>``; without a point, over all points together, where one that hardly moves or strains
-        counts for little.
+        ``strain_difference@<point>`` for each point; the same names without a point for all points combined, where
+        points with small values have little weight.
 
     Raises:
         ValueError: The histories have different watch points or end at different times.
@@ -48,8 +48,10 @@ def solver_differences(ours: Arrays, reference: Arrays) -> dict[str, float]:
     return result
 
 
-def at_times(times: NDArray[np.float64], own: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values ``(len(own), k)`` at other times: as they are where the times agree, else by cubic splines."""
-    if len(times) == len(own) and np.allclose(times, own, rtol=1e-9):
+def at_times(
+    times: NDArray[np.float64], sampled: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Interpolate values, shape (len(sampled), k), to other times by cubic splines, unless the times agree."""
+    if len(times) == len(sampled) and np.allclose(times, sampled, rtol=1e-9):
         return values
-    return CubicSpline(own, values)(times)
+    return CubicSpline(sampled, values)(times)

@@ -1,4 +1,4 @@
-"""What a run of cooling leaves: the state for the shock, its fields for ParaView, metrics and health."""
+"""Results of the cooling stage: initial state of the shock, fields for ParaView, metrics and health checks."""
 
 import json
 from dataclasses import dataclass
@@ -19,46 +19,63 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.output.result import checked, quantity
 from reflowshock.fem.output.watch_joints import STRESSES, JointWatch
 from reflowshock.fem.problem.inputs import CoolingInput
+from reflowshock.fem.setup.models import Model
 from reflowshock.fem.statics.equilibrium import CONVERGED
 from reflowshock.fem.statics.initial_state import Cooling
 
-UNBALANCED_LIMIT = 1e-8  # of the shock's own force terms, over the forces that hold expansion back
+UNBALANCED_LIMIT = 1e-8  # unbalanced force at the start of the shock, relative to the force that suppresses expansion
 
 
 @dataclass(frozen=True, slots=True)
-class Unbalanced:
-    """How well forces balance: after each iteration, by the shock's own terms; products, memory [B], seconds."""
+class Convergence:
+    """Convergence and cost of the cooling run.
+
+    Attributes:
+        residuals: Relative residual force after each iteration.
+        shock_residual: Relative unbalanced force of the force terms of the shock.
+        products: Number of products with the tangent.
+        memory: Memory of the factor on all ranks [B].
+        seconds: Run time [s].
+    """
 
     residuals: tuple[float, ...]
-    of_shock: float
+    shock_residual: float
     products: int
     memory: float
     seconds: float
 
 
+@dataclass(frozen=True, slots=True)
+class CooledPackage:
+    """Joined mesh of a package on its board, and its displacement by cooling."""
+
+    whole: Whole
+    cooling: Cooling
+
+
 def write_cooling(
     world: MPI.Comm,
     request: CoolingInput,
-    cooled: tuple[Whole | None, Cooling | None],
-    model: tuple[Body, JointTables],
-    unbalanced: Unbalanced,
+    cooled: CooledPackage | None,
+    model: Model[JointTables],
+    convergence: Convergence,
 ) -> None:
     """Write ``cooling.npz``, ``residual.vtu`` and ``result.json`` on rank 0; collective.
 
     Args:
-        world: All ranks.
-        request: The input.
-        cooled: Whole mesh and what was found, on rank 0.
-        model: Body of this rank in the state of the shock's beginning, and its tables.
-        unbalanced: How well forces balance.
+        world: Communicator of all ranks.
+        request: Input of the run.
+        cooled: Joined mesh and displacement on rank 0, None elsewhere.
+        model: Model on this rank in the initial state of the shock.
+        convergence: Convergence and cost of the run.
     """
-    body, tables = model
+    body, tables = model.body, model.tables
     yields = request.materials.solder.plasticity is not None
     joints = joint_row(world, body, tables, yields)
     cells = world.gather((body.local.cell_numbers, cell_fields(body, yields)))
-    whole, cooling = cooled
-    if whole is None or cooling is None or cells is None:
+    if cooled is None or cells is None:
         return
+    whole, cooling = cooled.whole, cooled.cooling
     cooling.write(request.output / "cooling.npz")
     fields = {name: np.empty(len(whole.mesh.cells)) for name in cells[0][1]}
     for numbers, values in cells:
@@ -66,35 +83,35 @@ def write_cooling(
             field[numbers] = values[name]
     write_fields(whole.mesh, cooling, fields, request)
     record = {
-        "metrics": metrics(whole.mesh, cooling, joints, unbalanced),
+        "metrics": metrics(whole.mesh, cooling, joints, convergence),
         "health": checked(
             {
-                "cooling_force_residual": (unbalanced.residuals[-1], CONVERGED),
-                "cooling_unbalanced_force": (unbalanced.of_shock, UNBALANCED_LIMIT),
+                "cooling_force_residual": (convergence.residuals[-1], CONVERGED),
+                "cooling_unbalanced_force": (convergence.shock_residual, UNBALANCED_LIMIT),
             }
         ),
-        "residuals": unbalanced.residuals,
+        "residuals": convergence.residuals,
         "joints": {name: joints[name].tolist() for name in joints},
-        "timings": {"cooling": unbalanced.seconds},
+        "timings": {"cooling": convergence.seconds},
     }
     (request.output / "result.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
 
 
 def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:
-    """Return names of joints, and the stresses [Pa] and plastic strain of each; collective."""
+    """Return names, stresses [Pa] and plastic strain of the joints; collective."""
     watch = JointWatch(tables, body, yields)
     sums, maxima = watch.sample(explicit_motion(body, [], 1.0))
     total, most = np.empty_like(sums), np.empty_like(maxima)
     world.Allreduce(sums, total)
     world.Allreduce(maxima, most, MPI.MAX)
     row = watch.row(total, most)
-    kept = (*STRESSES, "von_mises_max", *(("plastic_strain_max",) if yields else ()))
+    columns = (*STRESSES, "von_mises_max", *(("plastic_strain_max",) if yields else ()))
     labels = {name: watch.labels[name] for name in ("joints", "joint_layer")}
-    return labels | {name: np.asarray(row[name]) for name in kept}
+    return labels | {name: np.asarray(row[name]) for name in columns}
 
 
 def cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:
-    """Return the residual stress of this rank's elements."""
+    """Return residual von Mises stress [Pa] and plastic strain of this rank's elements."""
     recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
     rest = np.zeros((len(body.mass), 3))
     fields = {"von_mises": von_mises(recovery.stress(rest))}
@@ -104,7 +121,7 @@ def cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:
 def write_fields(
     mesh: MeshData, cooling: Cooling, fields: dict[str, NDArray[np.float64]], request: CoolingInput
 ) -> None:
-    """Write ``residual.vtu``: displacement since solidification, and per cell stress [Pa], plastic strain, part."""
+    """Write ``residual.vtu`` with the displacement since solidification [m] and the fields of the cells."""
     import meshio
 
     cells = [("hexahedron", mesh.cells[:, np.argsort(TENSOR_ORDER)])]
@@ -112,33 +129,33 @@ def write_fields(
     meshio.Mesh(mesh.points, cells, {"displacement": cooling.displacement}, data).write(request.output / "residual.vtu")
 
 
-def metrics(mesh: MeshData, cooling: Cooling, joints: dict[str, NDArray], unbalanced: Unbalanced) -> dict[str, Any]:
-    """Return what cooling did, and what it took."""
+def metrics(mesh: MeshData, cooling: Cooling, joints: dict[str, NDArray], convergence: Convergence) -> dict[str, Any]:
+    """Return the metrics of cooling: warpage, convergence, cost and residual stress."""
     stress = np.maximum(*(joints[name] for name in STRESSES))
     worst = int(np.argmax(stress)) if len(stress) else 0
     lift = corner_lift(mesh, mesh.points[:, 2])
-    found = {
+    values = {
         "solidified_warpage": quantity(lift, "m"),
         "room_temperature_warpage": quantity(lift + corner_lift(mesh, cooling.displacement[:, 2]), "m"),
-        "cooling_iterations": quantity(len(unbalanced.residuals)),
-        "cooling_products": quantity(unbalanced.products),
-        "cooling_force_residual": quantity(unbalanced.residuals[-1]),
-        "cooling_unbalanced_force": quantity(unbalanced.of_shock),
-        "cooling_memory": quantity(unbalanced.memory, "B"),
-        "cooling_seconds": quantity(unbalanced.seconds, "s"),
+        "cooling_iterations": quantity(len(convergence.residuals)),
+        "cooling_products": quantity(convergence.products),
+        "cooling_force_residual": quantity(convergence.residuals[-1]),
+        "cooling_unbalanced_force": quantity(convergence.shock_residual),
+        "cooling_memory": quantity(convergence.memory, "B"),
+        "cooling_seconds": quantity(convergence.seconds, "s"),
     }
     if not len(stress):
-        return found
-    found |= {
+        return values
+    values |= {
         "residual_stress_largest": quantity(float(stress[worst]), "Pa"),
         "residual_stress_joint": quantity(str(joints["joints"][worst])),
     }
     plastic = joints.get("plastic_strain_max")
-    return found if plastic is None else found | {"residual_plastic_strain": quantity(float(plastic.max()))}
+    return values if plastic is None else values | {"residual_plastic_strain": quantity(float(plastic.max()))}
 
 
 def corner_lift(mesh: MeshData, height: NDArray[np.float64]) -> float:
-    """Return the mean height [m] of the corners of the package's underside over its centre; ``height (n,)``."""
+    """Return the mean height of the package corners above its centre [m], from nodal heights, shape (n,)."""
     nodes = mesh.facet_nodes("package_side")
     if not len(nodes):
         return 0.0

@@ -1,4 +1,4 @@
-"""Fields for ParaView: displacement, and per cell von Mises stress [Pa], neglected and plastic strain, and part."""
+"""Field files for ParaView: nodal displacement, and cell values of von Mises stress, strains and part."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from reflowshock.fem import dolfinx_api
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
-from reflowshock.fem.parallel.portable import Rows, Same, State
+from reflowshock.fem.parallel.checkpoint_state import Rows, Same, State
 
 
 @dataclass(frozen=True, slots=True)
 class FieldSample:
-    """The fields of one rank at a time.
+    """Fields of one rank at one time.
 
     Attributes:
-        time: [s].
-        displacement: ``(n, 3)`` [m].
-        cells: Cell field -> values ``(ne,)``.
+        time: Time [s].
+        displacement: Nodal displacement, shape (n, 3) [m].
+        cells: Values of each cell field, shape (ne,).
     """
 
     time: float
@@ -32,21 +32,21 @@ class FieldSample:
 
 
 class Fields:
-    """A time series of one model's fields.
+    """Field file of one model, a time series.
 
     Attributes:
-        peaks: Cell field -> part -> largest value in a local element at the times written so far.
+        peaks: Largest local value of each cell field in each part over the times written so far.
     """
 
     def __init__(self, comm: MPI.Comm, body: Body, part: NDArray[np.integer], path: Path, yields: bool = False) -> None:
-        """Open a file for the model on ``comm``; collective.
+        """Open the file of a model; collective.
 
         Args:
             comm: Communicator of the model.
-            body: The model.
-            part: ``(ne,)`` part of each local cell.
-            path: ``.pvd`` file.
-            yields: Whether to write the plastic strain; the same on all ranks.
+            body: Model on this rank.
+            part: Part number of each local cell, shape (ne,).
+            path: Path of the ``.pvd`` file.
+            yields: Whether to write the plastic strain, the same on all ranks.
         """
         mesh = body.local.mesh
         space, cells = dolfinx_api.vector_space(mesh), dolfinx_api.cell_space(mesh)
@@ -56,7 +56,7 @@ class Fields:
         self._part = dolfinx.fem.Function(cells, name="part")
         self._cell_dofs = dolfinx_api.cell_dofs(cells)[:, 0]
         self._part.x.array[self._cell_dofs] = part
-        # Vertices of a cell have the same order in geometry and dofmap, whatever their numbers.
+        # Geometry and dofmap list the vertices of a cell in the same order.
         self._dofs, first = np.unique(dolfinx_api.cell_dofs(space), return_index=True)
         self._nodes = body.local.cells.ravel()[first]
         self._recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
@@ -65,7 +65,7 @@ class Fields:
         self.peaks = {name: dict.fromkeys(np.unique(part).tolist(), 0.0) for name in names}
 
     def sample(self, displacement: NDArray[np.float64], time: float) -> FieldSample:
-        """Return the fields at a displacement ``(n, 3)`` [m] and a time [s]."""
+        """Return the fields at a displacement, shape (n, 3) [m], and a time [s]."""
         cells = {
             "von_mises": von_mises(self._recovery.stress(displacement)),
             "neglected_strain": self._recovery.neglected_strain(displacement),
@@ -75,7 +75,7 @@ class Fields:
         return FieldSample(time, displacement.copy(), cells)
 
     def state(self, sample: FieldSample) -> State:
-        """Return a sample for a checkpoint."""
+        """Return a sample as checkpoint state."""
         cells = {name: Rows(self._local.cell_numbers, value) for name, value in sample.cells.items()}
         return {"time": Same(sample.time), "displacement": Rows(self._local.nodes, sample.displacement), "cells": cells}
 
@@ -96,11 +96,11 @@ class Fields:
 
 def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return the largest value of each cell field in each part, over all models and field samples; collective."""
-    found = [file.peaks for file in files]
+    all_peaks = [file.peaks for file in files]
     return {
         field: {
-            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in found), MPI.MAX)
+            name: world.allreduce(max(peaks[field].get(part, 0.0) for peaks in all_peaks), MPI.MAX)
             for part, name in enumerate(parts)
         }
-        for field in found[0]
+        for field in all_peaks[0]
     }

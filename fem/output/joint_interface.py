@@ -1,4 +1,4 @@
-"""Stress at the upper interface of all joints at chosen times: ``interface.npz`` (H Fig 16)."""
+"""Von Mises stress at the upper interface of all joints at chosen times (``interface.npz``)."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,60 +15,60 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.mesh.joint_interface import JointInterfaceTable
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
+from reflowshock.fem.parallel.checkpoint_state import Log, State
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.portable import Log, State
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
-    """Return the windows at whose ends it is closest to some times [s]; times after the last window have none."""
+    """Return the windows whose ends are closest to some times [s]; times after the last window are skipped."""
     windows = (round(time / plan.window) for time in times)
     return frozenset(window for window in windows if window <= plan.windows)
 
 
 class JointInterfaceStress:
-    """Von Mises stress of the solder elements at the package's pads; a ``time_loop.Pictures``.
+    """Snapshots of the von Mises stress of the solder elements at the package pads; implements ``Pictures``.
 
     Attributes:
-        windows: At whose ends it is taken.
+        windows: Windows at whose ends a snapshot is taken.
     """
 
     def __init__(
         self, world: MPI.Comm, tables: Mapping[Role, tuple[JointInterfaceTable, Body]], windows: frozenset[int]
     ) -> None:
-        """Find this rank's elements in the tables of its models."""
+        """Select this rank's elements from the interface tables of its models."""
         self.windows, self._world = windows, world
         self._table = next(iter(tables.values()))[0]
         self._shares: dict[Role, tuple[NDArray[np.intp], StressRecovery]] = {}
         for role, (table, body) in tables.items():
             cells = body.local.locate_cells(table.cells)
-            here = np.flatnonzero(cells >= 0)
-            self._shares[role] = here, StressRecovery(body, cells[here])
+            is_local = np.flatnonzero(cells >= 0)
+            self._shares[role] = is_local, StressRecovery(body, cells[is_local])
         self._rows: list[dict[str, Any]] = []
 
     def sample(self, participants: Mapping[Role, Participant]) -> None:
-        """Take the stress as it is now; collective over all models."""
+        """Take a snapshot of the stress; collective over all models."""
         stress = np.zeros(len(self._table.cells))
         for role, participant in participants.items():
             motion, (rows, recovery) = participant.motion, self._shares[role]
             stress[rows] = von_mises(recovery.stress(motion.displacement - motion.base_displacement()))
             time = motion.time
-        HERE.wait_for("the stress at the interface of joints, with all ranks")
+        ACTIVITY.wait_for("the stress at the interface of joints, with all ranks")
         self._world.Allreduce(MPI.IN_PLACE, stress)
-        HERE.go_on()
+        ACTIVITY.go_on()
         if self._world.rank == 0:
             self._rows.append({"time": time, "stress": stress})
 
     def state(self) -> State:
-        """Return what was taken so far, for a checkpoint."""
+        """Return the snapshots so far, for a checkpoint."""
         return {"rows": Log(columns(self._rows))}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""
         self._rows = rows(state["rows"])
 
     def write(self, directory: Path) -> None:
-        """Write ``times (k,)`` [s], the joints' ``surfaces`` and ``von_mises@<joint> (k, m)`` [Pa], on rank 0."""
+        """Write times (k,) [s], joint surfaces and ``von_mises@<joint>``, shape (k, m) [Pa], on rank 0."""
         if self._world.rank:
             return
         table, count = self._table, len(self._rows)

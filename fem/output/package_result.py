@@ -1,4 +1,4 @@
-"""What ``result.json`` tells of a package on a board."""
+"""Content of ``result.json`` for a package on a board."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History
-from reflowshock.fem.estimates.drop_effects import DropRun, told
+from reflowshock.fem.estimates.drop_effect import DropRun
+from reflowshock.fem.estimates.drop_effects import reported_effects
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.output.acceleration import drop_accelerations, peaks_of
@@ -36,13 +37,13 @@ from reflowshock.fem.problem.shock import Shock
 FORCE_RESIDUAL_LIMIT = 1e-10
 NO_FORCE = 1e-6  # [N], a quarter of a small joint's weight
 SECTION_RESIDUAL_LIMIT = 1e-6
-SAMPLES = 4000  # of an input, for its spectrum
+SAMPLES = 4000  # samples of the input for its response spectrum
 METHODS = {"direct": "direct acceleration input", "large_mass": "large mass at the mounting holes"}
 
 
 @dataclass(frozen=True, slots=True)
 class PackageReport:
-    """The result of a package on a board; a ``result.Report``."""
+    """Report of a package on a board; implements ``Report``."""
 
     request: RunInput
 
@@ -67,7 +68,7 @@ class PackageReport:
         summary: dict[str, Any],
         timings: Timings,
     ) -> dict[str, Any]:
-        """Return metrics, health, effects and the coupling."""
+        """Return metrics, health checks, effects and coupling."""
         coupling = coupling_of(self.request, outcome.coupling)
         checks = {
             "interface_force_residual": (outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT),
@@ -90,20 +91,20 @@ class PackageReport:
 
 
 def coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:
-    """Return what a run tells of its coupling: of a DNS only which joints are fine."""
+    """Return the coupling record of a run; for a DNS only its fine joints."""
     fine = {"fine_joints": request.shock.coupling.fine_joints}
     coupling = coupling | {"direction": request.shock.coupling.direction}
     return fine | coupling if request.mode == "two_scale" else fine
 
 
 def updates_a_window(summary: dict[str, Any], coupling: dict[str, Any]) -> int:
-    """Return how many elements are updated in a window, each as often as its level is."""
+    """Return the number of element updates in a window, with each element counted once per step of its level."""
     levels = coupling.get("levels", [{"elements": sum(summary["elements"].values()), "step": summary["step"]}])
     return sum(level["elements"] * round(summary["window"] / level["step"]) for level in levels)
 
 
 def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dict[str, Any]:
-    """Return the speed of a run with so many updates of elements in a window."""
+    """Return the metrics of speed and memory, from the number of element updates in a window."""
     windows, substeps = summary["windows"] - timings.first, summary["substeps"]
     return {
         "steps_per_second": quantity(windows * substeps / timings.windows, "1/s"),
@@ -117,7 +118,7 @@ def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dic
 
 
 def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return the residuals; the energy fraction is by how much both models' works across the interface differ."""
+    """Return residuals, and the difference of both models' interface work over the largest energy."""
     interface = float(np.abs(arrays["interface"]).max())
     return {
         "energy_balance_error": quantity(history.balance.balance_error),
@@ -127,7 +128,7 @@ def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str,
 
 
 def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return peaks of the histories."""
+    """Return the peaks of the histories as metrics."""
     metrics = {
         "simulated_time": quantity(float(arrays["time"][-1]), "s"),
         "peak_board_strain": quantity(float(arrays["board_strain"].max())),
@@ -137,12 +138,12 @@ def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 
 
 def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return peaks over time: of the critical joint's worse pad, of any joint, and mesh-dependent ones last."""
+    """Return peaks over time of the critical joint's worse pad and of all joints, mesh-dependent ones last."""
     critical = critical_joint(arrays)
     sections = np.stack([arrays[f"section_{end}"][:, critical] for end in ENDS])
     layer = VON_MISES.worse(arrays)
     start = float(layer[0, critical])
-    found = {
+    values = {
         "critical_joint": quantity(str(arrays["joints"][critical])),
         "critical_end": quantity(ranking_measure(arrays).worse_end(arrays, critical)),
         "peel_stress": quantity(float(PEEL.peaks(arrays)[critical]), "Pa"),
@@ -159,27 +160,27 @@ def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         **({"residual_stress_critical_joint": quantity(start, "Pa")} if start > 0.0 else {}),
         "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
     }
-    return found | flow_metrics(arrays)
+    return values | flow_metrics(arrays)
 
 
 def flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
-    """Return the measures of flow in the layer by the names of their metrics, where solder yields."""
+    """Return the measures of plastic flow in the layer by metric name; empty if solder does not yield."""
     return {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK} if has_flow(arrays) else {}
 
 
 def has_flow(arrays: Mapping[str, NDArray]) -> bool:
-    """Return whether solder may yield in a run."""
+    """Return whether the solder of a run may yield."""
     return "plastic_strain_max" in arrays
 
 
 def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
-    """Return the peaks of the accelerations of package and watch points after the filter."""
+    """Return the peak filtered accelerations of package and watch points."""
     pulse, low_pass = shock_pulse(request.shock).pulse, request.shock.filter
     return peaks_of(drop_accelerations(arrays, pulse, low_pass, request.watch), low_pass)
 
 
 def response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[str, Any]:
-    """Return the response spectrum of the input, up to the end of the run [s], at the first frequency of the board."""
+    """Return the shock response of the input, up to the end of the run [s], at the board's first frequency."""
     if modes is None:
         return {}
     pulse, times = shock_pulse(shock).pulse, np.linspace(0.0, end, SAMPLES + 1)
@@ -189,7 +190,7 @@ def response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[
 
 
 def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return how far the solder of any joint has flowed, where it yields."""
+    """Return the largest plastic work density and plastic strain of all joints; empty if solder does not yield."""
     if not has_flow(arrays):
         return {}
     return {
@@ -199,9 +200,9 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 
 
 def section_residual(arrays: Mapping[str, NDArray]) -> float:
-    """Return by how much both sections of a joint miss its inertia at most, over the largest section force.
+    """Return the largest imbalance of a joint's section forces and inertia, relative to the largest section force.
 
-    Forces below ``NO_FORCE`` count as that: before the first wave has come there is rounding alone.
+    The reference is at least ``NO_FORCE``, since only round-off exists before the first wave arrives.
     """
     if not len(arrays["joints"]):
         return 0.0
@@ -210,16 +211,18 @@ def section_residual(arrays: Mapping[str, NDArray]) -> float:
 
 
 def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
-    """Return which effects the run simulated, and why."""
+    """Return the simulated effects with the reason for each."""
     tied, ratio = summary["tied_nodes"], f"step ratio m = {summary['substeps']}"
     shock, pulse = request.shock, shock_pulse(request.shock)
     return {
         "two_scale": {"on": request.mode == "two_scale", "why": f"mode {request.mode}; {ratio}"},
-        "tie": {"on": tied > 0, "why": f"{tied} joint nodes lie on facets that do not match them"},
+        "tie": {"on": tied > 0, "why": f"{tied} joint nodes lie on facets of a non-matching mesh"},
         "input_g": {
             "on": True,
-            "why": f"{pulse.source}, {METHODS[shock.method]}; package facing down: the board is pushed along +z"
+            "why": f"{pulse.source}, {METHODS[shock.method]}; the package faces down, so the board is pushed along +z"
             " of the table's frame",
         },
-        **told(DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)),
+        **reported_effects(
+            DropRun(shock, request.materials.by_role, pulse.gravity, summary["added_mass"], neglected_strain)
+        ),
     }

@@ -15,7 +15,7 @@ from reflowshock.fem.problem.filters import LowPass
 
 
 def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return peaks at watch points and supports: ``<metric>@<name>``."""
+    """Return the peaks at watch points and supports as metrics ``<metric>@<name>``."""
     metrics: dict[str, Any] = {}
     for name in arrays["watch"]:
         displacement, stress = arrays[f"displacement@{name}"], arrays[f"stress@{name}"]
@@ -39,13 +39,13 @@ def gauge_lengths(table: PointTable) -> dict[str, float]:
 
 
 def strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pass: LowPass) -> NDArray[np.float64]:
-    """Return the rate ``(n,)`` [1/s] of a strain at equal steps ``time (n,)`` [s], after a filter."""
+    """Return the rate of a filtered strain, shape (n,) [1/s], at equally spaced times, shape (n,) [s]."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
     return np.gradient(low_passed(strain, step, low_pass), step)
 
 
 def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str, Any]:
-    """Return the peak of each gauge's strain and, where samples are close enough for the filter, of its rate."""
+    """Return the peak strain of each gauge and, if samples are dense enough, its peak strain rate."""
     metrics: dict[str, Any] = {}
     sampled = is_sampled(arrays["time"], low_pass)
     for name in arrays["gauges"]:
@@ -58,7 +58,7 @@ def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str,
 
 
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
-    """Return the first four natural frequencies, or as many as were found."""
-    found = [] if modes is None else modes.frequency.tolist()
+    """Return up to four natural frequencies as metrics."""
+    frequencies = [] if modes is None else modes.frequency.tolist()
     names = ("first", "second", "third", "fourth")
-    return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, found, strict=False)}
+    return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, frequencies, strict=False)}

@@ -1,7 +1,7 @@
-"""Which joint is critical, from the histories of a shock: by measures that converge with the mesh. Plain NumPy.
+"""Ranking of joints from the histories of a shock, by measures that converge with the mesh.
 
-Solder that yields carries little more stress however much it flows: there joints rank by the plastic work density of
-the layer at a pad, else by peel stress, which ranks measured impact lives (Tee, Ng & Lim).
+The stress of yielding solder hardly grows with its plastic strain, so joints are then ranked by the plastic work
+density of the layer at a pad; otherwise by peel stress, which ranks measured impact lives (Tee, Ng & Lim).
 """
 
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ Arrays = Mapping[str, NDArray]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A measure of what the worse pad of a joint bears.
+    """Measure of the load on the worse pad of a joint.
 
     Attributes:
-        history: Its histories are ``<history>_board`` and ``<history>_package``.
-        name: For people.
-        unit: SI.
+        history: Prefix of the histories ``<history>_board`` and ``<history>_package``.
+        name: Name in reports.
+        unit: SI unit.
     """
 
     history: str
@@ -29,15 +29,15 @@ class Measure:
     unit: str
 
     def worse(self, arrays: Arrays) -> NDArray[np.float64]:
-        """Return the larger of both ends ``(times, joints)``."""
+        """Return the larger value of both ends, shape (times, joints)."""
         return np.maximum(*(arrays[f"{self.history}_{end}"] for end in ENDS))
 
     def peaks(self, arrays: Arrays) -> NDArray[np.float64]:
-        """Return its peak over time and ends ``(joints,)``."""
+        """Return the peak over time and ends, shape (joints,)."""
         return np.asarray(self.worse(arrays).max(axis=0))
 
     def worse_end(self, arrays: Arrays, joint: int) -> str:
-        """Return the end of a joint, by its number, at which it peaks."""
+        """Return the end at which the measure peaks, for the joint of a given number."""
         return max(ENDS, key=lambda end: float(arrays[f"{self.history}_{end}"][:, joint].max()))
 
 
@@ -49,13 +49,13 @@ OUTER_FIBRE = Measure("outer_fibre", "outer-fibre stress", "Pa")
 
 
 def ranking_measure(arrays: Arrays) -> Measure:
-    """Return the measure by which joints rank: plastic work where any solder has yielded, else peel stress."""
+    """Return the ranking measure: plastic work density if any solder has yielded, otherwise peel stress."""
     yielded = "plastic_work_board" in arrays and bool(PLASTIC_WORK.peaks(arrays).max(initial=0.0) > 0.0)
     return PLASTIC_WORK if yielded else PEEL
 
 
 def ranked(arrays: Arrays) -> NDArray[np.intp]:
-    """Return the numbers of the joints ``(joints,)``, the critical one first; equal ones by peel stress."""
+    """Return the joint numbers, critical joint first and ties by peel stress, shape (joints,)."""
     return np.lexsort((-PEEL.peaks(arrays), -ranking_measure(arrays).peaks(arrays)))
 
 

@@ -1,4 +1,4 @@
-"""``history.npz`` and ``result.json``: what a run leaves besides its fields."""
+"""Result files of a run: ``history.npz`` and ``result.json``."""
 
 import json
 import resource
@@ -20,21 +20,21 @@ from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.setup.models import Model
 
-# Above it hourglass stiffness carries a part of the load, or incompatible modes are out of balance; 10 % is the usual
-# bound (Belytschko, Liu, Moran & Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
+# Above this fraction hourglass stiffness carries part of the load; 10 % is the usual bound (Belytschko, Liu, Moran &
+# Elkhodary, Nonlinear Finite Elements, 2nd ed., 8.7).
 HOURGLASS_LIMIT = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Timings:
-    """Wall seconds of the parts of a run on rank 0.
+    """Wall-clock times of a run on rank 0.
 
     Attributes:
-        setup: Until the first window.
-        windows: Windows and samples.
-        fields: Field files.
-        balance: Placement, predicted and measured, see ``planner.summary`` and ``Stopwatch.summary``.
-        first: Window from which the run continued, or zero.
+        setup: Time before the first window [s].
+        windows: Time of windows and samples [s].
+        fields: Time of writing field files [s].
+        balance: Predicted and measured load balance, see ``planner.summary`` and ``Stopwatch.summary``.
+        first: Window from which the run was restarted, or zero.
     """
 
     setup: float
@@ -45,22 +45,22 @@ class Timings:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Return the wall seconds by name."""
+        """Wall-clock times by name [s]."""
         return {"setup": self.setup, "windows": self.windows, "fields": self.fields}
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome(Generic[TablesT_co]):
-    """What a run has found.
+    """Results of a run before they are written.
 
     Attributes:
-        models: The models of this rank.
-        steps: Steps and masses.
+        models: Models of this rank.
+        steps: Time steps and masses.
         history: Samples and energy balance.
-        peaks: Cell field -> part -> largest value of an element at the times of the fields.
-        coupling: How two models are coupled; empty where there is one.
-        modes: Natural modes, if this run was asked for them.
-        factor: What the factorisation of an implicit solver took.
+        peaks: Largest element value of each cell field in each part over the field samples.
+        coupling: Coupling record of two models; empty for a single model.
+        modes: Natural modes, None if they were not requested.
+        factor: Factorisation cost of an implicit solver, None for an explicit one.
     """
 
     models: Mapping[Role, Model[TablesT_co]]
@@ -73,21 +73,21 @@ class Outcome(Generic[TablesT_co]):
 
     @property
     def neglected_strain(self) -> float:
-        """Largest strain that small kinematics have left out."""
+        """Largest strain that small kinematics neglected."""
         return max(self.peaks["neglected_strain"].values())
 
     @property
     def tables(self) -> Tables:
-        """Return the tables of one of the models of this rank."""
+        """Tables of a model of this rank."""
         return next(iter(self.models.values())).tables
 
 
 class Report(Protocol):
-    """What one kind of problem tells in its result besides what all runs do."""
+    """Interface of the problem-specific part of ``result.json``."""
 
     @property
     def request(self) -> RunInput | StructureInput:
-        """Return the input."""
+        """Input of the run."""
 
     def summary(self, comms: Communicators, outcome: Outcome[Any]) -> dict[str, Any]:
         """Return sizes, steps and masses; collective, complete on all ranks."""
@@ -95,11 +95,11 @@ class Report(Protocol):
     def sections(
         self, outcome: Outcome[Any], arrays: Mapping[str, NDArray], summary: dict[str, Any], timings: Timings
     ) -> dict[str, Any]:
-        """Return metrics, health, effects and more, from the arrays of the history and ``summary``; on rank 0."""
+        """Return the sections of the result, such as metrics and health checks, from history arrays and summary."""
 
 
 def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], timings: Timings) -> None:
-    """Write both files on rank 0; collective."""
+    """Write ``history.npz`` and ``result.json`` on rank 0; collective."""
     summary, output = report.summary(comms, outcome), report.request.output
     if comms.world.rank == 0:
         outcome.history.write(output)
@@ -113,12 +113,12 @@ def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], ti
 
 
 def quantity(value: Any, unit: str = "") -> dict[str, Any]:
-    """Return a metric as the report reads it."""
+    """Return a metric as value and unit."""
     return {"value": value, "unit": unit}
 
 
 def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, Any]:
-    """Return ranks, steps and masses of a run."""
+    """Return mode, ranks, time steps and masses of a run."""
     plan = steps.plan
     return {
         "mode": mode,
@@ -136,21 +136,21 @@ def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, An
 
 def sizes(comms: Communicators, models: Mapping[Role, Model[Any]]) -> tuple[dict[Role, int], dict[Role, int]]:
     """Return the numbers of elements and of nodes of every model; collective, complete on all ranks."""
-    mine = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
-    everyone = comms.world.allgather(mine)
-    elements = {role: sum(rank[role][0] for rank in everyone if role in rank) for role in comms.first}
-    return elements, {role: next(rank[role][1] for rank in everyone if role in rank) for role in comms.first}
+    counts = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
+    by_rank = comms.world.allgather(counts)
+    elements = {role: sum(rank[role][0] for rank in by_rank if role in rank) for role in comms.first}
+    return elements, {role: next(rank[role][1] for rank in by_rank if role in rank) for role in comms.first}
 
 
 def peak_memory() -> int:
-    """Return the largest memory [B] that this process has had so far."""
+    """Return the peak memory of this process so far [B]."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def health(
     request: RunInput | StructureInput, outcome: Outcome[Any], more: Mapping[str, tuple[float, float]] = {}
 ) -> dict[str, Any]:
-    """Return the checks of a finished run; ``more`` are value and limit of others, by name."""
+    """Return the health checks of a finished run; ``more`` adds checks as value and limit by name."""
     balance, steps = outcome.history.balance, outcome.steps
     checks = {
         "energy_balance_error": (balance.balance_error, request.numerics.energy_balance_limit),
@@ -161,9 +161,9 @@ def health(
 
 
 def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float, float]]:
-    """Return the largest hourglass energy over the largest energy, and its limit; nothing where there is none.
+    """Return the hourglass energy relative to the largest energy, and its limit; empty without hourglass energy.
 
-    That of one point is the bending of layers, too, and is not judged.
+    One-point elements are not checked, because their hourglass energy includes the bending of layers.
     """
     if formulation != HEXAHEDRON.name:
         return {}
@@ -172,5 +172,5 @@ def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float
 
 
 def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Return checks as the report reads them: name -> value and limit, which it must not exceed."""
+    """Return named checks with value, limit and whether the value is at most the limit."""
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}

@@ -1,6 +1,6 @@
-"""When a shock is over: its joints' largest stress has passed, and half a swing of the board brought no larger one.
+"""End criterion of a shock: the largest joint stress has passed, and half a board oscillation brought no larger one.
 
-Solder that has yielded hardens with every swing, and its von Mises stress with it: only peel stress is looked at then.
+The von Mises stress of yielded solder grows with every oscillation by hardening, so only peel stress is used then.
 """
 
 import numpy as np
@@ -9,40 +9,40 @@ from numpy.typing import NDArray
 from reflowshock.fem.output.ranking import ENDS, PEEL, PLASTIC_WORK, VON_MISES, Arrays, Measure, ranking_measure
 
 HISTORIES = tuple(f"{measure.history}_{end}" for measure in (PEEL, VON_MISES, PLASTIC_WORK) for end in ENDS)
-WATCHED = ("time", "board_centre", *HISTORIES)  # plastic work only where solder may yield
-SAME = 0.99  # of the largest stress: what reaches it later is not a higher peak
-SMALL = 0.1  # of the largest deflection: a return to zero from less is no swing
+WATCHED = ("time", "board_centre", *HISTORIES)  # plastic work exists only if solder may yield
+SAME = 0.99  # fraction of the largest stress that counts as having reached the peak
+SMALL = 0.1  # fraction of the largest deflection below which a zero crossing does not count
 
 
 def is_settled(history: Arrays) -> bool:
-    """Whether the largest stress of all joints is older than half a swing of the board.
+    """Return whether the largest stress of all joints occurred more than half an oscillation of the board ago.
 
-    Half a swing is the time from the start until the board's centre first returns through its place: at least half of
-    the first mode's period, since the pulse takes its time.
+    Half an oscillation is the time from the start to the first zero crossing of the board centre. It is at least half
+    the period of the first mode, since it includes the pulse.
 
     Args:
-        history: ``WATCHED``: ``time (k,)`` [s], ``board_centre (k, 3)`` [m], stresses ``(k, joints)`` [Pa].
+        history: Arrays named in ``WATCHED``: times (k,) [s], board centre (k, 3) [m], stresses (k, joints) [Pa].
     """
-    time, half = history["time"], half_swing(history["time"], history["board_centre"][:, 2])
+    time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None or not PEEL.worse(history).size:
         return False
-    latest = max(float(time[_first_largest(measure.worse(history))]) for measure in judged(history))
+    latest = max(float(time[_peak_sample(measure.worse(history))]) for measure in settling_measures(history))
     return bool(time[-1] - latest >= half)
 
 
-def judged(history: Arrays) -> tuple[Measure, ...]:
-    """Return the measures whose peaks are to pass."""
+def settling_measures(history: Arrays) -> tuple[Measure, ...]:
+    """Return the measures whose peaks must have passed."""
     return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 
 
-def half_swing(time: NDArray[np.float64], deflection: NDArray[np.float64]) -> float | None:
-    """Return when a deflection ``(k,)`` first changes its sign, None where it has not yet."""
+def half_oscillation(time: NDArray[np.float64], deflection: NDArray[np.float64]) -> float | None:
+    """Return the time of the first sign change of a deflection, shape (k,), None before it."""
     reached = np.maximum.accumulate(np.abs(deflection))
-    swung = (deflection[:-1] * deflection[1:] < 0.0) & (reached[:-1] >= SMALL * reached[-1])
-    return float(time[1:][swung][0]) if swung.any() else None
+    crossings = (deflection[:-1] * deflection[1:] < 0.0) & (reached[:-1] >= SMALL * reached[-1])
+    return float(time[1:][crossings][0]) if crossings.any() else None
 
 
-def _first_largest(stress: NDArray[np.float64]) -> int:
-    """Return the sample at which the largest stress of all joints first reaches its peak, but for a hundredth."""
+def _peak_sample(stress: NDArray[np.float64]) -> int:
+    """Return the first sample at which the largest stress of all joints reaches ``SAME`` times its peak."""
     largest = stress.max(axis=1)
     return int(np.argmax(largest >= SAME * largest.max()))

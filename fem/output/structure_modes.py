@@ -1,4 +1,4 @@
-"""Natural modes of a structure as products: frequencies in ``modes.json``, shapes for ParaView."""
+"""Output of natural modes: frequencies in ``modes.json``, mode shapes for ParaView."""
 
 import json
 from dataclasses import dataclass, replace
@@ -17,19 +17,19 @@ from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.inputs import StructureInput
-from reflowshock.fem.problem.structure import PrescribedMotion
+from reflowshock.fem.problem.load_kinds import PrescribedMotion
 from reflowshock.fem.setup.structure_models import StructureModel
 
-SHOWN = 0.05  # largest displacement of a shape in a field file, in lengths of the structure
+SCALE = 0.05  # largest displacement of a mode shape in a field file, relative to the length of the structure
 
 
 @dataclass(frozen=True, slots=True)
 class ModeTable:
-    """Natural modes without their shapes.
+    """Natural frequencies and mass fractions.
 
     Attributes:
-        frequency: ``(k,)`` [Hz], ascending.
-        mass_fraction: ``(k, 3)`` of the mass that moves with each mode when the supports are shaken along x, y, z.
+        frequency: Natural frequencies in ascending order, shape (k,) [Hz].
+        mass_fraction: Effective modal mass over total mass for base excitation along x, y, z, shape (k, 3).
     """
 
     frequency: NDArray[np.float64]
@@ -37,16 +37,16 @@ class ModeTable:
 
 
 def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: StructureInput) -> ModeTable:
-    """Find and write the natural modes of a structure; collective.
+    """Compute and write the natural modes of a structure; collective.
 
     Args:
-        comm: All ranks of the run.
-        model: The structure.
-        mass: Its mass [kg].
-        request: The input.
+        comm: Communicator of all ranks.
+        model: Model of the structure.
+        mass: Mass of the structure [kg].
+        request: Input of the run.
 
     Raises:
-        AgreedError: More modes are wanted than there are; on every rank.
+        AgreedError: More modes are requested than there are equations; on every rank.
     """
     body = at_rest_supports(model, request)
     try:
@@ -61,7 +61,7 @@ def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: Stru
 
 
 def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
-    """Return the body with all held that a large mass or a prescribed motion moves."""
+    """Return the body with all nodes fixed that a large mass or a prescribed motion moves."""
     moved = [(request.supports[name].on, slice(None)) for name in shaken_supports(request)]
     loads = [load for load in request.loads.values() if isinstance(load, PrescribedMotion)]
     free = model.body.free.copy()
@@ -77,7 +77,7 @@ def write_modes(folder: Path, table: ModeTable) -> None:
 
 
 def mode_rows(table: ModeTable) -> list[dict[str, Any]]:
-    """Return the modes as records, each with the direction along which it takes up most mass."""
+    """Return the modes as records of number, frequency [Hz] and mass fraction along x, y, z."""
     return [
         {
             "mode": number,
@@ -89,10 +89,10 @@ def mode_rows(table: ModeTable) -> list[dict[str, Any]]:
 
 
 def write_shapes(comm: MPI.Comm, model: StructureModel, request: StructureInput, modes: Modes) -> None:
-    """Write ``modes.pvd``: the shape of mode k, at a size that can be seen, at "time" k; collective."""
+    """Write ``modes.pvd`` with the scaled shape of mode k at "time" k; collective."""
     part = model.tables.part[model.body.local.cell_numbers]
     fields = Fields(comm, model.body, part, request.output / "modes.pvd")
     for number, shape in enumerate(modes.shape, start=1):
         largest = comm.allreduce(float(np.abs(shape).max(initial=0.0)), MPI.MAX)
-        fields.write(fields.sample(shape * (SHOWN * request.structure.length / largest), float(number)))
+        fields.write(fields.sample(shape * (SCALE * request.structure.length / largest), float(number)))
     fields.close()

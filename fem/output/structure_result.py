@@ -1,4 +1,4 @@
-"""What ``result.json`` tells of a structure."""
+"""Content of ``result.json`` for a structure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ from reflowshock.fem.problem.inputs import StructureInput
 
 @dataclass(frozen=True, slots=True)
 class StructureReport:
-    """The result of a structure; a ``result.Report``."""
+    """Report of a structure; implements ``Report``."""
 
     request: StructureInput
 
     def summary(self, comms: Communicators, outcome: Outcome[StructureTables]) -> dict[str, Any]:
-        """Return sizes, steps, masses and where the watch points are; collective, complete on all ranks."""
+        """Return sizes, steps, masses and watch point positions; collective, complete on all ranks."""
         structure, steps = self.request.structure, outcome.steps
         tables = next(iter(outcome.models.values())).tables
         watch = tables.fitted.points
@@ -55,7 +55,7 @@ class StructureReport:
         summary: dict[str, Any],
         timings: Timings,
     ) -> dict[str, Any]:
-        """Return metrics, health, effects, the time of windows, and the coupling of two models."""
+        """Return metrics, health checks, effects, load balance, and the coupling of two models."""
         tables = next(iter(outcome.models.values())).tables
         coupling = {"coupling": outcome.coupling | {"placement": timings.balance}} if outcome.coupling else {}
         return {
@@ -77,7 +77,7 @@ class StructureReport:
 
 
 def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
-    """Return steps, speed and masses; a critical step and updates of elements are those of explicit steps only."""
+    """Return steps, speed and masses; critical step and element updates only for explicit solvers."""
     rate = summary["steps"] * (1.0 - timings.first / summary["windows"]) / timings.windows
     metrics = {
         "step": quantity(summary["step"], "s"),
@@ -95,34 +95,34 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
 
 
 def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:
-    """Return the size of a factored matrix, if there is one."""
+    """Return size and memory of the factored matrix; empty for explicit solvers."""
     if cost is None:
         return {}
     return {"factor_entries": quantity(cost.entries), "factor_memory": quantity(cost.memory / 1e6, "MB")}
 
 
 def strain_effect(watch: PointTable) -> dict[str, Any]:
-    """Return whether strain and stress of all watch points are those of the points themselves."""
-    away = watch.displaced
-    places = [f"{name} at z = {watch.strain_points[watch.names.index(name), 2]:.4g} m" for name in away]
-    why = f"one layer of elements, which gives the value of its middle: {', '.join(places)}"
-    return {"strain_at_surface": {"on": not away, "why": why if away else "a linear fit to the means of elements"}}
+    """Return whether strain and stress of all watch points are evaluated at the points themselves."""
+    displaced = watch.displaced
+    heights = [f"{name} at z = {watch.strain_points[watch.names.index(name), 2]:.4g} m" for name in displaced]
+    why = f"a single layer of elements gives values at its middle: {', '.join(heights)}"
+    return {"strain_at_surface": {"on": not displaced, "why": why if displaced else "linear fit to element means"}}
 
 
 def energy_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return the largest value of each energy that the energy balance keeps and that is not zero throughout."""
+    """Return the peak of each energy of the energy balance that is not always zero [J]."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
     peaks = {name: float(np.abs(arrays[name]).max()) for name in names if name in arrays}
     return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
 
 
 def acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
-    """Return the peaks of the accelerations of watch points after the filter."""
+    """Return the peak filtered accelerations of watch points."""
     return peaks_of(watch_accelerations(arrays, request, pulses_of(request.loads)), request.dynamics.filter)
 
 
 def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return the largest element values of each layer at the times of the fields."""
+    """Return the largest element values of each layer over the field samples."""
     names = {
         "von_mises": ("peak_element_stress", "Pa"),
         "neglected_strain": ("peak_neglected_strain", ""),

@@ -1,4 +1,4 @@
-"""What is watched of a package on a board: centres, joints, board strain, watch points and gauges."""
+"""History values of a package on a board: centres, joints, board strain, watch points and gauges."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,29 +12,31 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.output.joint_sections import JointSections, section_values
 from reflowshock.fem.output.watch_points import PointWatch
 from reflowshock.fem.parallel.local_mesh import positions
+from reflowshock.fem.problem.shock import Damping
 
+NO_DAMPING = Damping()
 STRESSES = ("von_mises_board", "von_mises_package")
 FLOWS = ("plastic_strain_board", "plastic_strain_package", "plastic_work_board", "plastic_work_package")
 
 
 class JointWatch:
-    """Centres of board and die, joints, board strain and what is fitted to it, on one rank; a ``watch.Watch``."""
+    """Watch points of a package on one rank: centres, joints, board strain and gauges; implements ``history.Watch``."""
 
     def __init__(
         self,
         tables: JointTables,
         body: Body,
         yields: bool,
-        damping: tuple[float, float] = (0.0, 0.0),
+        damping: Damping = NO_DAMPING,
         turning: bool = False,
     ) -> None:
-        """Find this rank's share of the tables.
+        """Select this rank's share of the tables.
 
         Args:
-            tables: Of the model.
-            body: The model.
-            yields: Whether solder flows, in all models of a run alike.
-            damping: alpha [1/s] and beta [s] of Rayleigh damping.
+            tables: Tables of the model.
+            body: Model on this rank.
+            yields: Whether the solder of the run may yield.
+            damping: Rayleigh damping.
             turning: Whether rotations are finite.
         """
         self._yields, self._table = yields, tables.watch
@@ -52,25 +54,25 @@ class JointWatch:
         self._joint, solder = table.solder_joint[solder >= 0], solder[solder >= 0]
         self._recovery = StressRecovery(body, solder)
         layer, bearing = local.locate_cells(table.layer.cells), local.locate_cells(table.faces.cells)
-        here = layer >= 0
-        chosen = np.unique(np.concatenate([layer[here], bearing[bearing >= 0]]))
+        in_layer = layer >= 0
+        chosen = np.unique(np.concatenate([layer[in_layer], bearing[bearing >= 0]]))
         self._elements = JointElements(body, chosen, tables.level[local.cell_numbers])
-        self._sections = JointSections(tables, body, self._elements, damping)
-        end, joint = np.divmod(table.layer.slot[here], max(len(table.joints), 1))
-        row = positions(chosen, layer[here])
+        self._sections = JointSections(tables, body, self._elements, *damping.coefficients)
+        end, joint = np.divmod(table.layer.slot[in_layer], max(len(table.joints), 1))
+        row = positions(chosen, layer[in_layer])
         self._weight, self._layer_joint = np.zeros((2, len(chosen), 8)), np.zeros(len(chosen), np.int64)
-        self._weight[end, row], self._layer_joint[row] = table.layer.weight[here], joint
+        self._weight[end, row], self._layer_joint[row] = table.layer.weight[in_layer], joint
         facets = table.strain_facets[local.locate_cells(table.strain_cells) >= 0]
         self._facets = local.locate(facets.ravel()).reshape(-1, 4)
         self._corners = local.points[self._facets][:, :, :2]
 
     def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return this rank's parts; collective where a body has levels.
+        """Return this rank's contributions to sums and maxima; collective if the body has local time steps.
 
         Returns:
-            Sums: centres (6) [m], those of ``PointWatch`` and ``JointSections``, then integrals over the layers of von
-            Mises stress [N m], plastic strain [m^3], plastic work [J] per end and joint. Maxima: von Mises [Pa],
-            plastic strain per joint, largest and minus smallest strain of the board.
+            Sums: centres (6) [m], the sums of ``PointWatch`` and ``JointSections``, then integrals over the layers of
+            von Mises stress [N m], plastic strain [m^3] and plastic work [J] for each end and joint. Maxima: von Mises
+            stress [Pa] and plastic strain of each joint, largest and negative smallest strain of the board.
         """
         displacement = motion.displacement - motion.base_displacement()
         centres = np.zeros((2, 3))
@@ -83,7 +85,7 @@ class JointWatch:
         return np.concatenate([centres.ravel(), points, sections, *joints]), self._maxima(displacement)
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
-        """Name the parts that all ranks have combined."""
+        """Return the values of a sample by name, from the reduced sums and maxima."""
         layers = STRESSES + FLOWS if self._yields else STRESSES
         largest = ("von_mises_max", "plastic_strain_max") if self._yields else ("von_mises_max",)
         ends = [6, 6 + self._points.size, len(sums) - len(layers) * len(self.joints)]

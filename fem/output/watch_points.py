@@ -1,4 +1,4 @@
-"""Watch points: displacement, velocity, strain, stress at a node; strain gauges; reactions of supports."""
+"""History values at watch points, strain gauges and supports."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,10 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 
 
 class PointWatch:
-    """The watch points, gauges and supports of one rank; a ``watch.Watch``."""
+    """Watch points, gauges and supports on one rank; implements ``history.Watch``."""
 
     def __init__(self, table: PointTable, body: Body, turning: bool) -> None:
-        """Find this rank's share of the table; ``turning`` is whether rotations are finite."""
+        """Select this rank's share of the table; ``turning`` tells whether rotations are finite."""
         self._table, self._tie, self._turning = table, body.tie, turning
         self.labels: dict[str, NDArray] = {
             "watch": np.array(table.names, dtype=str),
@@ -24,11 +24,11 @@ class PointWatch:
             "gauges": np.array(table.gauges.names, dtype=str),
         }
         ends = body.local.locate(table.gauges.nodes)
-        self._held_ends = np.flatnonzero((ends >= 0) & body.shared.owned[ends])
-        self._ends = ends[self._held_ends]
+        self._owned_ends = np.flatnonzero((ends >= 0) & body.shared.owned[ends])
+        self._ends = ends[self._owned_ends]
         local = body.local.locate(table.nodes)
-        here = (local >= 0) & body.shared.owned[local]
-        self._slots, self._nodes = np.flatnonzero(here), local[here]
+        owned = (local >= 0) & body.shared.owned[local]
+        self._slots, self._nodes = np.flatnonzero(owned), local[owned]
         cells = body.local.locate_cells(table.cells)
         self._owner, self._weight = table.owner[cells >= 0], table.weight[cells >= 0]
         cells = cells[cells >= 0]
@@ -39,30 +39,30 @@ class PointWatch:
         self._beddings = [[term for term in beddings if term.name == name] for name in table.supports]
 
     def sample(self, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return this rank's parts of the sums: values of all points by quantity, gauges, then reactions [N]."""
+        """Return this rank's contributions to the sums (points by quantity, gauges, reactions [N]), and no maxima."""
         parts = [self._value(quantity, motion).ravel() for quantity in self._table.quantities]
         return np.concatenate([*parts, self._stretches(motion).ravel(), *self._reactions(motion)]), np.empty(0)
 
     @property
     def size(self) -> int:
-        """Return the number of the sums."""
+        """Number of sums."""
         table = self._table
         values = len(table.names) * sum(COMPONENTS[quantity] for quantity in table.quantities)
         return values + 3 * (len(table.gauges.names) + len(table.supports))
 
     def _stretches(self, motion: Motion) -> NDArray[np.float64]:
-        """Return this rank's part of the stretches ``(g, 3)`` of all gauges."""
+        """Return this rank's contribution to the relative displacements of all gauges, shape (g, 3) [m]."""
         gauges = self._table.gauges
         result = np.zeros((len(gauges.names), 3))
-        moved = gauges.weight[self._held_ends] * motion.displacement[self._ends]
-        np.add.at(result, gauges.gauge[self._held_ends], moved)
+        moved = gauges.weight[self._owned_ends] * motion.displacement[self._ends]
+        np.add.at(result, gauges.gauge[self._owned_ends], moved)
         return result
 
     def _reactions(self, motion: Motion) -> list[NDArray[np.float64]]:
-        """Return this rank's part of the reaction ``(3,)`` [N] of each support."""
+        """Return this rank's contribution to the reaction of each support, shape (3,) [N]."""
         if not self._supports:
             return []
-        reaction = motion.reaction()  # of all supports: their nodes are shared where facet sets meet
+        reaction = motion.reaction()  # sum over all supports; supports share nodes where facet sets meet
         sums = [held * reaction[nodes].sum(axis=0) for nodes, held in self._supports]
         for total, beddings in zip(sums, self._beddings, strict=True):
             for bedding in beddings:
@@ -70,7 +70,7 @@ class PointWatch:
         return sums
 
     def _value(self, quantity: str, motion: Motion) -> NDArray[np.float64]:
-        """Return this rank's part of a quantity at all points."""
+        """Return this rank's contribution to a quantity at all points."""
         result = np.zeros((len(self._table.names), COMPONENTS[quantity]))
         if quantity == "displacement":
             result[self._slots] = motion.displacement[self._nodes] - motion.base_displacement()
@@ -83,7 +83,7 @@ class PointWatch:
         return result
 
     def _mean(self, quantity: str, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a quantity's means over this rank's elements around the points."""
+        """Return the mean of a quantity in each of this rank's elements around the points."""
         if quantity == "strain":
             return self._recovery.strain(displacement)
         if quantity == "stress":
@@ -91,7 +91,7 @@ class PointWatch:
         return self._recovery.plastic_strain()[:, None]
 
     def row(self, sums: NDArray[np.float64], maxima: NDArray[np.float64]) -> dict[str, NDArray[np.float64] | float]:
-        """Name the parts that all ranks have combined: ``<quantity>@<point>``, ``gauge@..``, ``reaction@<support>``."""
+        """Return ``<quantity>@<point>``, ``gauge@<gauge>`` and ``reaction@<support>`` from the reduced sums."""
         del maxima
         count, start = len(self._table.names), 0
         result: dict[str, NDArray[np.float64] | float] = {}

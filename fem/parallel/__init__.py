@@ -1,1 +1,1 @@
-"""Ranks: who has what, messages, checkpoints, and what happens when one fails."""
+"""MPI ranks: partitioning, messages, checkpoints and failures; start with `communicators.py`."""

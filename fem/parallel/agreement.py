@@ -1,4 +1,4 @@
-"""Errors across ranks: a rank that fails tells the others, so that none waits for it."""
+"""Collective error handling: an error on one rank is raised on all ranks, so that no rank waits for it."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -11,15 +11,15 @@ Result = TypeVar("Result")
 
 
 def agreed(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
-    """Do work that is local to each rank; fail on all ranks if it fails on one. Collective.
+    """Run a function on each rank, and raise on all ranks if it fails on any; collective.
 
     Raises:
-        AgreedError: On every rank, with the messages of the ranks that failed.
+        AgreedError: The function failed on some ranks; on every rank, with their messages.
     """
     result, error, failure = None, None, None
     try:
         result = work()
-    except Exception as caught:  # whatever it is, the other ranks must hear of it; it is raised again below
+    except Exception as caught:  # any error must reach the other ranks; it is raised again below
         error = caught
         failure = f"{type(caught).__name__}: {caught}"
     failures = dict.fromkeys(message for message in comm.allgather(failure) if message)

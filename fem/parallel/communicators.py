@@ -1,4 +1,4 @@
-"""Communicators of the models: one class that splits, owns and frees them."""
+"""Communicators of the models of a run, split, owned and freed by one class."""
 
 from types import TracebackType
 from typing import Self
@@ -6,16 +6,16 @@ from typing import Self
 from mpi4py import MPI
 
 from reflowshock.fem.estimates.placement import Placement, Role
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 
 class Communicators:
-    """The communicators of the models on this rank, and the one that joins all models.
+    """Communicators of the models on this rank, and of all models together.
 
     Attributes:
-        world: All ranks of the run.
-        placement: Which ranks carry which model.
-        models: The ranks of each model that this rank carries, in the order of the window.
+        world: Communicator of all ranks of the run.
+        placement: Assignment of models to ranks.
+        models: Communicator of each model on this rank, in the order of the window.
         first: Lowest rank of ``world`` that carries each model.
     """
 
@@ -28,7 +28,7 @@ class Communicators:
             for role, ranks in placement.ranks.items()
         }
         self.models: dict[Role, MPI.Comm] = {role: comm for role, comm in split.items() if comm != MPI.COMM_NULL}
-        HERE.carry(self.models)
+        ACTIVITY.carry(self.models)
 
     def __enter__(self) -> Self:
         """Return self."""
@@ -37,7 +37,7 @@ class Communicators:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free all communicators, unless an error may have left other ranks inside a call on them."""
+        """Free all communicators, unless an error may have left other ranks inside a call to one of them."""
         if error is None:
             for model in self.models.values():
                 model.Free()

@@ -1,7 +1,7 @@
-"""Messages between ranks: sums over nodes that several ranks hold, and the channel across the interface.
+"""Messages between ranks: sums over shared nodes, and channels across the coupling interface.
 
-Sums are taken in the order of the ranks, so that copies of a shared node stay equal to the last bit. Results on
-different numbers of ranks differ by rounding only.
+Sums are taken in rank order, so the copies of a shared node stay bit-identical. Results on different numbers of ranks
+differ only by round-off.
 """
 
 import time
@@ -13,35 +13,35 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.motion import pack, sum_in_rank_order, unpack
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
 
 
 @dataclass(slots=True)
 class MessageClock:
-    """Seconds that a rank spent on messages: ``packing`` and unpacking, ``waiting`` for them."""
+    """Time that a rank spends on messages: packing and unpacking [s], waiting for them [s]."""
 
     packing: float = 0.0
     waiting: float = 0.0
 
     def count(self, begin: float, packed: float, arrived: float) -> None:
-        """Count a message that was begun, packed and complete at given times, and unpacked now [s]."""
+        """Add a message from its start, packing and arrival times [s]; it is unpacked now."""
         self.packing += packed - begin + time.perf_counter() - arrived
         self.waiting += arrived - packed
 
 
 def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
-    """Find which nodes this rank shares with which other rank.
+    """Determine the nodes that this rank shares with each other rank; collective.
 
-    Each node number has a home rank (number modulo size) where its holders meet: no rank ever sees all nodes.
+    Each node number has a home rank (number modulo size) that collects its holders, so no rank ever sees all nodes.
 
     Args:
         comm: Communicator of the model.
-        nodes: ``(n,)`` node numbers of this rank, each once.
+        nodes: Unique node numbers of this rank, shape (n,).
 
     Returns:
-        Per rank the shared node numbers, ascending; empty for this rank itself.
+        Shared node numbers in ascending order for each rank; empty for this rank itself.
     """
     nodes = np.sort(np.asarray(nodes, np.int64))
     arrived = comm.alltoall([nodes[nodes % comm.size == home] for home in range(comm.size)])
@@ -60,15 +60,15 @@ def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64
 
 
 class SharedNodes:
-    """Sums over the copies of nodes that several ranks hold: one message per neighbour, buffers kept.
+    """Sums over the copies of shared nodes, with one persistent message per neighbouring rank.
 
     Attributes:
-        owned: ``(n,)``: whether this rank is the lowest that holds the node.
-        clock: Time spent on its messages.
+        owned: Whether this rank is the lowest that has the node, shape (n,).
+        clock: Time spent on messages.
     """
 
     def __init__(self, comm: MPI.Comm, nodes: NDArray[np.integer], clock: MessageClock | None = None) -> None:
-        """Find the copies of the nodes ``(n,)`` of this rank, and prepare the messages; a clock may serve several."""
+        """Determine the copies of this rank's nodes, shape (n,), and prepare the messages; collective."""
         self.clock = clock or MessageClock()
         shared = holders(comm, nodes)
         order = np.argsort(nodes)
@@ -87,27 +87,27 @@ class SharedNodes:
                 self._requests.append(comm.Recv_init(self._received[part], other, SHARED_TAG))
                 self._requests.append(comm.Send_init(self._sent[part], other, SHARED_TAG))
         neighbours = [other for other, rows in enumerate(local) if len(rows)]
-        self._mark = f"the sum over shared nodes with {HERE.names(comm, neighbours)}"
+        self._mark = f"the sum over shared nodes with {ACTIVITY.names(comm, neighbours)}"
         ranks = np.repeat(np.arange(comm.size), [len(rows) for rows in local])
         self._nodes, self._pointer, self._source = rank_order(self._rows, ranks, comm.rank)
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Replace shared rows of ``values (n, 3)`` by the sum over all ranks that hold them."""
+        """Replace the rows of shared nodes, of shape (n, 3) values, by their sums over ranks; collective."""
         if self._requests:
             begin = time.perf_counter()
             pack(values, self._rows, self._sent)
             packed = time.perf_counter()
-            HERE.wait_for(self._mark)
+            ACTIVITY.wait_for(self._mark)
             MPI.Prequest.Startall(self._requests)
             MPI.Prequest.Waitall(self._requests)
-            HERE.go_on()
+            ACTIVITY.go_on()
             arrived = time.perf_counter()
             sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
             self.clock.count(begin, packed, arrived)
 
     @property
     def exchanged(self) -> bool:
-        """Return whether another rank holds any of the nodes."""
+        """Whether another rank has any of the nodes."""
         return bool(self._requests)
 
     def free(self) -> None:
@@ -120,15 +120,15 @@ class SharedNodes:
 def rank_order(
     rows: NDArray[np.int32], ranks: NDArray[np.int64], own: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Order the received parts of each shared node by rank, this rank's own part among them.
+    """Return the order in which the contributions to each shared node are summed, by rank.
 
     Args:
-        rows: ``(k,)`` local node of each received row.
-        ranks: ``(k,)`` rank that sends it.
+        rows: Local node of each received row, shape (k,).
+        ranks: Sending rank of each received row, shape (k,).
         own: This rank.
 
     Returns:
-        Nodes ``(m,)``, pointer ``(m + 1,)`` and sources of ``kernels.motion.sum_in_rank_order``.
+        Nodes (m,), pointer (m + 1,) and sources (-1 for this rank) of ``kernels.motion.sum_in_rank_order``.
     """
     nodes = np.unique(rows)
     node = np.concatenate([rows, nodes])
@@ -140,42 +140,42 @@ def rank_order(
 
 
 class Messages(Protocol):
-    """What a participant asks of a channel."""
+    """Interface of a channel for interface values."""
 
     @property
     def clock(self) -> MessageClock:
-        """Return the time spent on its messages."""
+        """Time spent on messages."""
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Send the interface rows of ``values (n, 3)``."""
+        """Send the interface rows of values, shape (n, 3)."""
 
     def receive(self, values: NDArray[np.float64]) -> None:
-        """Receive the interface rows of ``values (n, 3)``."""
+        """Receive the interface rows of values, shape (n, 3)."""
 
     def free(self) -> None:
-        """Give back what it needs."""
+        """Free the resources of the channel."""
 
 
 class Channel:
-    """Messages of interface values ``(., 3)`` from the ranks of one model to those of another.
+    """Messages of interface values from the ranks of one model to the ranks of another.
 
-    A rank may carry one model or both; what it can copy from itself is no message. Else the lowest rank that holds a
-    interface node of the source sends it to every rank that holds it of the target.
+    A rank with both models copies its values without a message. Otherwise the lowest rank that has an interface node of
+    the source sends it to every rank that has this node of the target.
 
     Attributes:
-        clock: Time spent on its messages.
+        clock: Time spent on messages.
     """
 
     def __init__(
         self, comm: MPI.Comm, source: NDArray[np.int32], target: NDArray[np.int32], receiver_waits: bool
     ) -> None:
-        """Agree on who sends what; collective over all models.
+        """Determine senders and receivers; collective over all models.
 
         Args:
             comm: Communicator of all models.
-            source: ``(nc,)`` local node of each interface node in the sending model, -1 where this rank has none.
-            target: The same in the receiving model.
-            receiver_waits: Whether receivers are already waiting when this rank sends: it carries one model only.
+            source: Local node of each interface node in the sending model, -1 on other ranks, shape (nc,).
+            target: Local node of each interface node in the receiving model, -1 on other ranks, shape (nc,).
+            receiver_waits: Whether receivers already wait when this rank sends, because ranks carry a single model.
         """
         self.clock = MessageClock()
         self._receiver_waits = receiver_waits
@@ -187,40 +187,40 @@ class Channel:
         self._out_rows, self._in_rows = source[np.concatenate(out)], target[np.concatenate(into)]
         self._sent, self._received = np.empty((len(self._out_rows), 3)), np.empty((len(self._in_rows), 3))
         sent, received = split_rows(self._sent, out), split_rows(self._received, into)
-        self._own = sent[comm.rank], received[comm.rank]
+        self._copied = sent[comm.rank], received[comm.rank]
         others = [other for other in range(comm.size) if other != comm.rank]
         self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
         self._receives = [comm.Recv_init(received[k], k, CHANNEL_TAG) for k in others if len(received[k])]
-        takers, givers = ([k for k in others if len(rows[k])] for rows in (sent, received))
-        self._taken = f"values of the interface to be taken by {HERE.names(comm, takers)}"
-        self._given = f"values of the interface from {HERE.names(comm, givers)}"
+        receivers, senders = ([k for k in others if len(rows[k])] for rows in (sent, received))
+        self._sending = f"the receipt of interface values by {ACTIVITY.names(comm, receivers)}"
+        self._receiving = f"interface values from {ACTIVITY.names(comm, senders)}"
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Send the interface rows of ``values (n, 3)``.
+        """Send the interface rows of values, shape (n, 3).
 
-        A large message makes no progress while its sender computes, so this waits until it is taken, where receivers
-        are waiting for it. Ranks that carry both models receive at a later turn: waiting for them would never end.
+        A large message makes no progress while its sender computes, so the sender waits for the receipt if receivers
+        are already waiting. Ranks with both models receive later in the window; waiting for them would deadlock.
         """
         begin = time.perf_counter()
         pack(values, self._out_rows, self._sent)
         packed = time.perf_counter()
         MPI.Prequest.Startall(self._sends)
         if self._receiver_waits:
-            HERE.wait_for(self._taken)
+            ACTIVITY.wait_for(self._sending)
             MPI.Prequest.Waitall(self._sends)
-            HERE.go_on()
+            ACTIVITY.go_on()
         self.clock.count(begin, packed, time.perf_counter())
 
     def receive(self, values: NDArray[np.float64]) -> None:
-        """Receive the interface rows of ``values (n, 3)``."""
+        """Receive the interface rows of values, shape (n, 3)."""
         begin = time.perf_counter()
         MPI.Prequest.Startall(self._receives)
-        self._own[1][:] = self._own[0]
+        self._copied[1][:] = self._copied[0]
         packed = time.perf_counter()
-        HERE.wait_for(self._given)
+        ACTIVITY.wait_for(self._receiving)
         MPI.Prequest.Waitall(self._receives)
         MPI.Prequest.Waitall(self._sends)
-        HERE.go_on()
+        ACTIVITY.go_on()
         arrived = time.perf_counter()
         unpack(self._received, self._in_rows, values)
         self.clock.count(begin, packed, arrived)
@@ -233,14 +233,14 @@ class Channel:
 
 
 def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> list[NDArray[np.float64]]:
-    """Return the consecutive rows of a buffer that belong to each part, as views."""
+    """Split a buffer into views of consecutive rows, one for each part."""
     ends = np.cumsum([len(part) for part in parts])
     return [buffer[end - len(part) : end] for part, end in zip(parts, ends, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
 class InterfaceChannels:
-    """The two channels of a window: velocities to the meso model, forces to the macro model."""
+    """The two channels of the interface: velocities to the meso model, forces to the macro model."""
 
     velocities: Messages
     forces: Messages
@@ -249,22 +249,22 @@ class InterfaceChannels:
     def open(
         cls, comm: MPI.Comm, macro: NDArray[np.int32], meso: NDArray[np.int32], receiver_waits: bool
     ) -> "InterfaceChannels":
-        """Open both; collective over all models.
+        """Open both channels; collective over all models.
 
         Args:
             comm: Communicator of all models.
-            macro: ``(nc,)`` local node of each interface node in this rank's macro model, -1 where it has none.
-            meso: The same in its meso model.
+            macro: Local node of each interface node in this rank's macro model, -1 on other ranks, shape (nc,).
+            meso: Local node of each interface node in this rank's meso model, -1 on other ranks, shape (nc,).
             receiver_waits: See ``Channel``.
         """
         return cls(Channel(comm, macro, meso, receiver_waits), Channel(comm, meso, macro, receiver_waits))
 
     @property
     def clocks(self) -> list[MessageClock]:
-        """Return the clocks of both."""
+        """Clocks of both channels."""
         return [self.velocities.clock, self.forces.clock]
 
     def free(self) -> None:
-        """Free both."""
+        """Free both channels."""
         self.velocities.free()
         self.forces.free()

@@ -1,4 +1,4 @@
-"""A rank's share of a mesh: DOLFINx partitions it, input numbers lead back to parts, facets and tables."""
+"""Local part of a mesh distributed by DOLFINx, with the input numbers of its nodes and cells."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ from reflowshock.fem.mesh.mesh import MeshData
 
 @dataclass(frozen=True, slots=True)
 class LocalMesh:
-    """The cells of one rank and all nodes that it computes with.
+    """Cells of one rank and all nodes that it uses.
 
     Attributes:
-        mesh: The distributed mesh; its cells are those here, its nodes may have other numbers.
-        nodes: ``(n,)`` input node numbers.
-        points: ``(n, 3)`` [m].
-        cells: ``(ne, k)`` int32 local nodes, order as in ``MeshData``.
-        cell_numbers: ``(ne,)`` input cell numbers.
+        mesh: Distributed DOLFINx mesh with the same cells; its nodes may be numbered differently.
+        nodes: Input number of each node, shape (n,).
+        points: Nodes, shape (n, 3) [m].
+        cells: Local nodes of each cell in the order of ``MeshData``, shape (ne, k) int32.
+        cell_numbers: Input number of each cell, shape (ne,).
     """
 
     mesh: dolfinx.mesh.Mesh
@@ -30,15 +30,15 @@ class LocalMesh:
     cell_numbers: NDArray[np.int64]
 
     def locate(self, nodes: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Return the local numbers of input nodes ``(k,)``, -1 for those of other ranks."""
+        """Return the local numbers of input nodes, shape (k,), -1 for nodes of other ranks."""
         return positions(self.nodes, nodes)
 
     def locate_cells(self, cells: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Return the local numbers of input cells ``(k,)``, -1 for those of other ranks."""
+        """Return the local numbers of input cells, shape (k,), -1 for cells of other ranks."""
         return positions(self.cell_numbers, cells)
 
     def with_nodes(self, nodes: NDArray[np.integer], points: NDArray[np.float64]) -> "LocalMesh":
-        """Append the input nodes among ``nodes (k,)`` that this rank has no cell of (masters of its slaves)."""
+        """Return the mesh with additional input nodes, shape (k,), such as masters of this rank's slaves."""
         nodes, first = np.unique(nodes, return_index=True)
         new = self.locate(nodes) < 0
         return LocalMesh(
@@ -50,28 +50,28 @@ class LocalMesh:
         )
 
     def reordered(self, order: NDArray[np.integer]) -> "LocalMesh":
-        """Return the same mesh with its nodes in another ``order (n,)``."""
-        place = np.empty(len(order), np.int32)
-        place[order] = np.arange(len(order))
-        return LocalMesh(self.mesh, self.nodes[order], self.points[order], place[self.cells], self.cell_numbers)
+        """Return the mesh with its nodes reordered by a permutation, shape (n,)."""
+        new_number = np.empty(len(order), np.int32)
+        new_number[order] = np.arange(len(order))
+        return LocalMesh(self.mesh, self.nodes[order], self.points[order], new_number[self.cells], self.cell_numbers)
 
 
 def positions(haystack: NDArray[np.integer], needles: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Return the position of each needle in the haystack (unique numbers), -1 where it is not there."""
+    """Return the position of each needle in the haystack of unique numbers, -1 if it is missing."""
     if not len(haystack):
         return np.full(np.shape(needles), -1, np.int32)
     order = np.argsort(haystack)
-    found = order[np.minimum(np.searchsorted(haystack, needles, sorter=order), len(haystack) - 1)]
-    return np.where(haystack[found] == needles, found, -1).astype(np.int32)
+    nearest = order[np.minimum(np.searchsorted(haystack, needles, sorter=order), len(haystack) - 1)]
+    return np.where(haystack[nearest] == needles, nearest, -1).astype(np.int32)
 
 
 def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None = None) -> LocalMesh:
-    """Partition a mesh that rank 0 of ``comm`` holds; collective.
+    """Distribute a mesh from rank 0 of ``comm``; collective.
 
     Args:
         comm: Communicator of the model.
-        data: The mesh on rank 0.
-        ranks: ``(ne,)`` rank of each cell, on rank 0; without it DOLFINx chooses.
+        data: Mesh on rank 0, None on other ranks.
+        ranks: Rank of each cell on rank 0, shape (ne,); None lets DOLFINx partition the mesh.
     """
     nodes = comm.bcast(data.shape.nodes if data else None)
     points = data.points if data else np.empty((0, 3))
@@ -87,6 +87,6 @@ def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] |
 
 
 def destinations(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None) -> NDArray[np.int32] | None:
-    """Return the rank of each cell that this rank holds before the mesh is distributed; None if none has a say."""
+    """Return the prescribed rank of each cell that this rank has before distribution, None without a prescription."""
     chosen = comm.bcast(ranks is not None)
     return (ranks if data else np.empty(0, np.int32)) if chosen else None

@@ -1,4 +1,4 @@
-"""Which rank has which cell: recursive bisection that balances the work of every step level at once."""
+"""Partition of cells into ranks by recursive coordinate bisection that balances the work of every step level."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 from reflowshock.fem.mesh.mesh import MeshData
 
 ANGLES = 12  # directions of a cut in the plane of the two largest extents
-TILT = 1e-3  # of a direction, so that cells at equal distance are taken row by row
-NODE_COST = 0.5  # of the work on a node, what it costs more where several ranks have it
+TILT = 1e-3  # tilt of a direction, so that cells at equal distance are sorted row by row
+NODE_COST = 0.5  # extra cost of a shared node, as a fraction of its work
 
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """What a bisection knows of cells.
+    """Positions, nodes and work of the cells to be bisected.
 
     Attributes:
-        centres: ``(ne, 3)`` [m].
-        nodes: ``(ne, k)`` their nodes.
-        work: ``(ne, levels)`` seconds of a window at each step level, whose ranks wait for each other.
-        node_work: ``(n,)`` seconds of a window on each node.
+        centres: Centres of the cells, shape (ne, 3) [m].
+        nodes: Nodes of the cells, shape (ne, k).
+        work: Time per window at each step level, at which ranks synchronise, shape (ne, levels) [s].
+        node_work: Time per window on each node, shape (n,) [s].
     """
 
     centres: NDArray[np.float64]
@@ -29,22 +29,22 @@ class Cells:
     node_work: NDArray[np.float64]
 
     def subset(self, chosen: NDArray[np.bool_]) -> "Cells":
-        """Return some of the cells."""
+        """Return the selected cells."""
         return Cells(self.centres[chosen], self.nodes[chosen], self.work[chosen], self.node_work)
 
 
 def partition(mesh: MeshData, work: NDArray[np.float64], speeds: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the rank ``(ne,)`` of each cell.
+    """Return the rank of each cell, shape (ne,).
 
-    Ranks are halved again and again, and the cells with them, each time by a plane. Of planes in many directions, each
-    of which gives both sides work as their speeds, the one is taken whose slower side is the fastest, all levels added
-    up: two measures can always be halved by one line, more of them nearly. Cuts through the thickness of a flat body
-    have so many nodes that whole joints stay together.
+    Ranks and cells are halved recursively by planes. Each candidate plane divides the total work in the ratio of the
+    speeds of both sides; the chosen direction minimises the time of the slower side, summed over the levels, plus the
+    cost of shared nodes. A line can always halve two measures (ham sandwich theorem) and nearly halves more. Cuts
+    parallel to a flat body have so many nodes that whole joints stay together.
 
     Args:
-        mesh: The mesh.
-        work: ``(ne, levels)`` seconds of a window at each step level.
-        speeds: ``(ranks,)``.
+        mesh: Mesh to be partitioned.
+        work: Time per window of each cell at each step level, shape (ne, levels) [s].
+        speeds: Relative speed of each rank, shape (ranks,).
     """
     corners = mesh.cells.shape[1]
     shares = np.repeat(work.sum(axis=1) / corners, corners)
@@ -56,29 +56,29 @@ def partition(mesh: MeshData, work: NDArray[np.float64], speeds: NDArray[np.floa
 
 
 def assign(cells: Cells, speeds: NDArray[np.float64], first: int, rank: NDArray[np.int32]) -> None:
-    """Write the ranks ``(ne,)`` of cells of the ranks ``first``, ``first + 1``, … with given speeds."""
+    """Write the rank of each cell, shape (ne,), for consecutive ranks from ``first`` on with given speeds."""
     if len(speeds) == 1 or len(rank) < len(speeds):
         rank[:] = first + np.arange(len(rank)) % len(speeds)
         return
     middle = len(speeds) // 2
     left = bisect(cells, float(speeds[:middle].sum()), float(speeds[middle:].sum()))
-    for side, some, start in ((left, speeds[:middle], first), (~left, speeds[middle:], first + middle)):
+    for side, side_speeds, start in ((left, speeds[:middle], first), (~left, speeds[middle:], first + middle)):
         part = np.empty(int(side.sum()), np.int32)
-        assign(cells.subset(side), some, start, part)
+        assign(cells.subset(side), side_speeds, start, part)
         rank[side] = part
 
 
 def bisect(cells: Cells, left: float, right: float) -> NDArray[np.bool_]:
-    """Return which cells ``(ne,)`` the left side has, for two sides with given speeds."""
-    found = [sweep(cells, direction, left, right) for direction in directions(cells.centres)]
-    return min(found, key=lambda item: item[1])[0]
+    """Return which cells are on the left side, shape (ne,), for the speeds of both sides."""
+    cuts = [sweep(cells, direction, left, right) for direction in directions(cells.centres)]
+    return min(cuts, key=lambda cut: cut[1])[0]
 
 
 def sweep(cells: Cells, direction: NDArray[np.float64], left: float, right: float) -> tuple[NDArray[np.bool_], float]:
-    """Cut across a direction ``(3,)`` so that all work is shared; return the left side and the window [s]."""
+    """Cut normal to a direction, shape (3,), in the ratio of the speeds; return left side and window time [s]."""
     order = np.argsort(cells.centres @ direction, kind="stable")
-    done = np.cumsum(cells.work[order].sum(axis=1))
-    count = int(np.searchsorted(done, done[-1] * left / (left + right))) + 1
+    cumulative = np.cumsum(cells.work[order].sum(axis=1))
+    count = int(np.searchsorted(cumulative, cumulative[-1] * left / (left + right))) + 1
     side = np.zeros(len(order), dtype=bool)
     side[order[: min(max(count, 1), len(order) - 1)]] = True
     levels = np.maximum(cells.work[side].sum(axis=0) / left, cells.work[~side].sum(axis=0) / right)
@@ -87,9 +87,9 @@ def sweep(cells: Cells, direction: NDArray[np.float64], left: float, right: floa
 
 
 def directions(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return directions ``(k, 3)`` of cuts: around in the plane of the two largest extents, and across it."""
+    """Return cut directions, shape (k, 3): several in the plane of the two largest extents, and its normal."""
     axes = np.eye(3)[np.argsort(-np.ptp(points, axis=0))]
     angles = np.pi / ANGLES * np.arange(ANGLES)[:, None]
     around = np.cos(angles) * axes[0] + np.sin(angles) * axes[1]
-    beside = np.cos(angles) * axes[1] - np.sin(angles) * axes[0]
-    return np.vstack([around + TILT * beside + TILT**2 * axes[2], axes[2] + TILT * axes[0] + TILT**2 * axes[1]])
+    normal = np.cos(angles) * axes[1] - np.sin(angles) * axes[0]
+    return np.vstack([around + TILT * normal + TILT**2 * axes[2], axes[2] + TILT * axes[0] + TILT**2 * axes[1]])

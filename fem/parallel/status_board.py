@@ -1,4 +1,4 @@
-"""What the ranks of a run do, shared through a file: one line of fixed length for each of them."""
+"""Status of all ranks of a run in a shared file, with one line of fixed length for each rank."""
 
 import json
 import os
@@ -9,21 +9,23 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 LINE = 512  # bytes; longer texts are cut
-ERROR = "error.txt"  # in the folder of a run: why it ended, as on standard error
+ERROR = "error.txt"  # copy of the final error message in the folder of a run
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What one rank did when it was heard of last.
+    """Last known status of one rank.
 
     Attributes:
-        rank: Its number.
-        process: Its process id, on ``host``.
-        seen: When it was heard of [s].
-        models: The models that it carries.
-        window: The window that it is in, -1 before the first.
-        waiting: What it waits for, and ``waited`` how long by now [s].
-        slow: What it does that may take any time.
+        rank: Number of the rank.
+        process: Process id on ``host``.
+        host: Name of the machine.
+        seen: Time of the status, in seconds since the epoch.
+        models: Models that the rank carries.
+        window: Current window, -1 before the first.
+        waiting: Description of the message or rank that it waits for; empty if it does not wait.
+        waited: Duration of the wait so far [s].
+        slow: Description of an operation of unlimited duration; empty if there is none.
     """
 
     rank: int
@@ -38,27 +40,27 @@ class Status:
 
     @property
     def name(self) -> str:
-        """Return in words who it is."""
+        """Rank number and models as text."""
         return f"rank {self.rank}{f' ({self.models})' if self.models else ''}"
 
     @property
-    def place(self) -> str:
-        """Return in words where in the run it is."""
+    def position(self) -> str:
+        """Current window as text."""
         return f"in window {self.window}" if self.window >= 0 else "before the first window"
 
     @property
     def has_died(self) -> bool:
-        """Return whether its process is gone; False where that cannot be known, as on another machine."""
-        return self._state in ("gone", "Z", "X")  # the last two: it has ended, its parent has not looked yet
+        """Whether the process has ended; False for processes on another machine."""
+        return self._state in ("gone", "Z", "X")  # Z and X: ended, but not yet reaped by its parent
 
     @property
     def is_stopped(self) -> bool:
-        """Return whether its process is stopped (SIGSTOP); False where that cannot be known, as on another machine."""
+        """Whether the process is stopped (SIGSTOP); False for processes on another machine."""
         return self._state == "T"
 
     @property
     def _state(self) -> str:
-        """Return the letter by which the system says what the process does; nothing where that cannot be known."""
+        """Process state letter of the operating system, ``gone``, or empty for another machine."""
         if self.host != socket.gethostname():
             return ""
         try:
@@ -68,11 +70,11 @@ class Status:
         return stat.rpartition(")")[2].split()[0]
 
     def describe(self, silence: float) -> str:
-        """Return in words what it does; a rank not heard of for ``silence`` seconds may be stopped."""
+        """Return the activity of the rank as text, or its silence if that exceeds ``silence`` [s]."""
         silent = time.time() - self.seen
         if silent > silence:
-            return f"{self.name}: no sign of life for {silent:.0f} s; last seen {self.place}, it {self._doing}"
-        return f"{self.name}: {self.place} it {self._doing}"
+            return f"{self.name}: no status for {silent:.0f} s; last seen {self.position}, it {self._doing}"
+        return f"{self.name}: {self.position} it {self._doing}"
 
     @property
     def _doing(self) -> str:
@@ -82,29 +84,29 @@ class Status:
 
 
 class StatusBoard:
-    """The file; ranks need a file system that all of them see."""
+    """Shared status file; all ranks need access to its file system."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file, whoever comes first makes it."""
+        """Open the file; the first rank creates it."""
         self.path = path
         self._claimed = path.with_name(path.name + ".claimed")
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
 
     def write(self, status: Status) -> None:
-        """Say what a rank does."""
+        """Write the status of a rank."""
         text = json.dumps(asdict(status)).encode()
         if len(text) >= LINE:
             text = json.dumps(asdict(status) | {"waiting": status.waiting[:40], "models": "", "slow": ""}).encode()
         os.pwrite(self._file, text.ljust(LINE - 1) + b"\n", status.rank * LINE)
 
     def read(self) -> list[Status]:
-        """Return what all ranks said last."""
+        """Return the last status of all ranks."""
         lines = os.pread(self._file, os.fstat(self._file).st_size, 0).decode(errors="replace").splitlines()
-        found = []
+        statuses = []
         for line in lines:
-            with suppress(ValueError, TypeError):  # of a rank that has said nothing yet, or is just writing
-                found.append(Status(**json.loads(line)))
-        return found
+            with suppress(ValueError, TypeError):  # the rank has no status yet, or is writing it
+                statuses.append(Status(**json.loads(line)))
+        return statuses
 
     def claim(self) -> bool:
         """Return whether this rank is the first to report the end of the run."""
@@ -115,7 +117,7 @@ class StatusBoard:
         return True
 
     def close(self, remove: bool) -> None:
-        """Close the file, and remove it for all."""
+        """Close the file, and optionally remove it for all ranks."""
         os.close(self._file)
         if remove:
             for path in (self.path, self._claimed):

@@ -1,10 +1,10 @@
-"""A thread on each rank that ends a run in which nothing goes on, and says who waits for whom.
+"""Watchdog thread of each rank, which ends a deadlocked run and reports which rank waits for which.
 
-MPI's waits let other threads of Python run, so the thread sees how long its own rank has been in one wait
-(``whereabouts``). What the others do it reads from a file in which each of them says so (``status_board``). It also
-hears the signal by which the launcher ends the ranks that are left when one has died, and says which one that was.
+MPI waits release Python's interpreter lock, so the thread can measure the duration of its rank's current wait
+(``rank_activity``). It reads the status of the other ranks from a shared file (``status_board``). It also receives the
+signal with which the launcher ends the remaining ranks after one has died, and reports the dead rank.
 
-It cannot see inside PETSc's solves, nor anything before the first window is done.
+It does not monitor PETSc solves or anything before the end of the first window.
 """
 
 import os
@@ -18,114 +18,115 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.parallel.status_board import ERROR, Status, StatusBoard
-from reflowshock.fem.parallel.whereabouts import HERE
 
-TICK = 1.0  # [s] between two looks, at most
-TICKS = 10  # looks in the time that a wait may last, at least
+TICK = 1.0  # largest interval between two checks [s]
+TICKS = 10  # smallest number of checks within the longest allowed wait
 
 
 class Watchdog:
-    """The thread of one rank."""
+    """Watchdog thread of one rank."""
 
     def __init__(self, world: MPI.Comm, folder: Path, limit: float) -> None:
-        """Start to watch; collective.
+        """Start the thread; collective.
 
         Args:
-            world: All ranks of the run.
-            folder: Which all ranks see.
-            limit: How long a wait may last [s].
+            world: Communicator of all ranks of the run.
+            folder: Folder that is accessible to all ranks.
+            limit: Longest allowed wait [s].
         """
-        HERE.begin(world)
-        self._told = folder / ERROR
-        if world.rank == 0:  # before any rank can go on and speak
-            self._told.unlink(missing_ok=True)
+        ACTIVITY.begin(world)
+        self._error_file = folder / ERROR
+        if world.rank == 0:  # before any rank can report an error
+            self._error_file.unlink(missing_ok=True)
         name = world.bcast(f".watchdog-{os.getpid()}")
         self._rank, self._limit, self._tick = world.rank, limit, min(TICK, limit / TICKS)
         self._board = StatusBoard(folder / name)
         self._board.write(self._status(0.0))
-        HERE.tell = lambda: self._board.write(self._status(0.0))
-        self._heard, wakeup = os.pipe()
+        ACTIVITY.publish = lambda: self._board.write(self._status(0.0))
+        self._signals, wakeup = os.pipe()
         os.set_blocking(wakeup, False)
         self._wakeup = wakeup
-        # The byte is written at once, even while MPI waits; the handler itself would only run after that.
+        # The byte is written immediately, even during an MPI wait; the handler itself would run only after the wait.
         signal.set_wakeup_fd(wakeup)
         self._handler = signal.signal(signal.SIGTERM, lambda number, frame: None)
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop watching: the run is at its end."""
+        """Stop the thread at the end of the run."""
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGTERM, self._handler)
         os.write(self._wakeup, b"\0")
         self._thread.join()
         self._board.close(self._rank == 0)
-        HERE.world, HERE.tell = None, None
+        ACTIVITY.world, ACTIVITY.publish = None, None
 
     def speak(self, text: str, details: str = "") -> None:
-        """Say why the run ends, and from where it could continue, unless another rank has.
+        """Report why the run ends and its last checkpoint, unless another rank has already reported.
 
-        In a file, too: Open MPI 5 loses what ranks write to standard error once one of them has died.
+        The message is also written to a file, since Open MPI 5 loses standard error after a rank has died.
         """
         if self._board.claim():
-            words = f"error: {text}{HERE.last_checkpoint}{details}\n"
-            self._told.write_text(words, encoding="utf-8")
-            sys.stderr.write(words)
+            message = f"error: {text}{ACTIVITY.last_checkpoint}{details}\n"
+            self._error_file.write_text(message, encoding="utf-8")
+            sys.stderr.write(message)
             sys.stderr.flush()
 
     def _watch(self) -> None:
-        """Look at each tick until stopped."""
-        waited, stopped, latest, before = 0.0, 0.0, -1, time.monotonic()
-        while not (heard := self._pause()):
-            passed, before = time.monotonic() - before, time.monotonic()
-            same = bool(HERE.waiting) and HERE.waits == latest
-            latest = HERE.waits
-            # A job that was stopped as a whole must not take the time of its rest for a wait.
+        """Check the ranks at each tick until stopped."""
+        waited, stopped, latest, last_check = 0.0, 0.0, -1, time.monotonic()
+        while not (received := self._pause()):
+            passed, last_check = time.monotonic() - last_check, time.monotonic()
+            same = bool(ACTIVITY.waiting) and ACTIVITY.waits == latest
+            latest = ACTIVITY.waits
+            # If the whole job was stopped, the pause does not count as a wait.
             passed = min(passed, 2.0 * self._tick)
             waited = waited + passed if same else 0.0
             stopped = stopped + passed if self._stopped() else 0.0
             self._board.write(self._status(waited))
             if waited > self._limit and not self._excuses():
-                text = f"a rank has waited longer than {self._limit:g} s (watchdog_seconds), all are ended"
-                self._end(text, self._who_waits())
-            if stopped > self._limit + 3.0 * self._tick:  # a rank that waits for it has had the time to say so
+                text = f"a rank has waited longer than {self._limit:g} s (watchdog_seconds); all ranks are ended"
+                self._end(text, self._all_statuses())
+            if stopped > self._limit + 3.0 * self._tick:  # ranks that wait for it report first
                 names = " and ".join(self._stopped())
-                self._end(f"stopped (SIGSTOP) for {self._limit:g} s (watchdog_seconds): {names}; all are ended")
-        if heard[0] == signal.SIGTERM:
-            self._end(self._who_died())
+                self._end(f"stopped (SIGSTOP) for {self._limit:g} s (watchdog_seconds): {names}; all ranks are ended")
+        if received[0] == signal.SIGTERM:
+            self._end(self._dead_ranks())
 
     def _pause(self) -> bytes:
-        """Wait for the next tick; return what was heard meanwhile: a signal, or zero to stop."""
-        ready, _, _ = select.select([self._heard], [], [], self._tick)
-        return os.read(self._heard, 1) if ready else b""
+        """Wait for the next tick; return a signal number received meanwhile, zero to stop, or nothing."""
+        ready, _, _ = select.select([self._signals], [], [], self._tick)
+        return os.read(self._signals, 1) if ready else b""
 
     def _status(self, waited: float) -> Status:
-        """Return what this rank does."""
-        who = self._rank, os.getpid(), socket.gethostname(), time.time()
-        return Status(*who, HERE.models, HERE.window, HERE.waiting, waited, HERE.slow)
+        """Return the status of this rank."""
+        identity = self._rank, os.getpid(), socket.gethostname(), time.time()
+        return Status(*identity, ACTIVITY.models, ACTIVITY.window, ACTIVITY.waiting, waited, ACTIVITY.slow)
 
     def _excuses(self) -> bool:
-        """Return whether a rank that is alive does something that may take any time."""
+        """Return whether a rank that is alive runs an operation of unlimited duration."""
         return any(status.slow and time.time() - status.seen < self._limit for status in self._board.read())
 
     def _stopped(self) -> list[str]:
-        """Return the names of ranks of this machine that are stopped: whatever the others do, they will wait."""
+        """Return the names of stopped ranks on this machine, for which all others will wait."""
         return [status.name for status in self._board.read() if status.is_stopped]
 
-    def _who_waits(self) -> str:
-        """Return in words what all ranks do, a line each."""
+    def _all_statuses(self) -> str:
+        """Return the status of all ranks as text, one line each."""
         lines = [status.describe(2.0 * self._tick + 0.1 * self._limit) for status in self._board.read()]
         return "".join(f"\n  {line}" for line in lines)
 
-    def _who_died(self) -> str:
-        """Return in words which ranks are gone."""
-        place, died = self._status(0.0).place, [status.name for status in self._board.read() if status.has_died]
+    def _dead_ranks(self) -> str:
+        """Return a sentence with the ranks that have died."""
+        position = self._status(0.0).position
+        died = [status.name for status in self._board.read() if status.has_died]
         if not died:
-            return f"ended by a signal (SIGTERM) {place}"
-        return f"{', '.join(died)} {'have' if len(died) > 1 else 'has'} died, all ranks are ended {place}"
+            return f"ended by a signal (SIGTERM) {position}"
+        return f"{', '.join(died)} {'have' if len(died) > 1 else 'has'} died, all ranks are ended {position}"
 
     def _end(self, text: str, details: str = "") -> None:
-        """Speak, and end this process at once, whatever it waits for; the launcher then ends the others."""
+        """Report, and end this process immediately; the launcher then ends the others."""
         self.speak(text, details)
         os._exit(1)

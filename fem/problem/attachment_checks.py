@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 
 from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.fittings import AXES, Fittings, PointMass, StrainGauge, Support
-from reflowshock.fem.problem.structure import InputG, Structure, StructureProblem
+from reflowshock.fem.problem.structure import Structure, StructureProblem
 from reflowshock.problem import Problem, unknown_name
 
 SAMPLES = 10  # in a period of the filter's corner
@@ -82,7 +82,7 @@ def _elastic(problem: StructureProblem) -> Iterator[Problem]:
     """Yield what does not go with elastic supports and lumped masses."""
     key = next((f"supports.{name}.bedding" for name, support in problem.supports.items() if support.bedding), None)
     for name, load in problem.loads.items():
-        if key and isinstance(load, InputG) and load.method == "large_mass":
+        if key and load.is_large_mass:
             message = f"moves only supports that hold x, y and z, not those of {key}"
             yield Problem(f"loads.{name}.method", message, "large_mass", "direct")
     attached = key or next((f"masses.{name}" for name in problem.masses), None)

@@ -1,12 +1,12 @@
-"""Parameters of a structure: a box of layers, its supports and loads, and how its motion is computed.
+"""Parameters of a structure: a box of layers, its supports and loads, and the computation of its motion.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them, that of a tuple each of its items.
-Tables of named members are dictionaries, so that one value of one member can be set.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use, for a tuple that of each item.
+Named tables are dictionaries, so that a single value of a single table can be overridden.
 """
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,7 +14,6 @@ from reflowshock.fem.problem.filters import LowPass
 from reflowshock.fem.problem.fittings import (
     AXES,
     Axis,
-    Direction,
     Fittings,
     PointMass,
     StrainGauge,
@@ -22,23 +21,24 @@ from reflowshock.fem.problem.fittings import (
     WatchPoint,
 )
 from reflowshock.fem.problem.kinematics import Kinematics
-from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping, ServiceCondition
+from reflowshock.fem.problem.load_kinds import StructureLoad
+from reflowshock.fem.problem.shock import MOST_RANKS, Coupling, Damping
 from reflowshock.materials.library import LIBRARY
 from reflowshock.materials.parameters import Material
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
-ROUNDING = 1e-9  # of the box: closer than that is the same place
-SMALLER = 0.5  # of the longest step of a layer: below it a layer is fine, unless the user names those that are
+ROUNDING = 1e-9  # distance over the size of the box below which two points coincide
+FINE_STEP = 0.5  # critical step over the longest one of a layer below which a layer is fine by default
 SolverName = Literal["explicit", "implicit", "dns"]
 Cells = Annotated[int, Field(ge=1, le=2000)]
 
 
 class Layer(Parameters):
-    """One layer: its material by name, and how many elements lie one above the other in it.
+    """Layer of a structure: material name, thickness and number of elements over the thickness.
 
-    ``in_plane`` are its elements along x and y where they are not the ``cells`` of the structure; layers that differ
-    are tied.
+    ``in_plane`` overrides the numbers of elements along x and y, ``cells`` of the structure. Layers whose numbers
+    differ are tied.
     """
 
     material: str
@@ -48,24 +48,24 @@ class Layer(Parameters):
 
 
 class Holes(Parameters):
-    """Four mounting holes at (+-spacing/2), through all layers; their walls are the facet set ``mounting_holes``."""
+    """Four mounting holes through all layers at (+-spacing/2); their walls are the facet set ``mounting_holes``."""
 
     spacing: Annotated[tuple[float, float], Quantity("mm")]
     diameter: Annotated[float, Quantity("mm")] = Field(gt=0)
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
-        """Their axes [m]."""
+        """Coordinates x, y of the four axes [m]."""
         x, y = (0.5 * spacing for spacing in self.spacing)
         return (-x, -y), (-x, y), (x, -y), (x, y)
 
 
 class Structure(Parameters):
-    """A box of layers, z = 0 at its bottom, centred on x = y = 0.
+    """Box of layers, centred on x = y = 0, with z = 0 at its bottom.
 
-    With a plane of symmetry in x only x >= 0 is meshed: ``x_min`` is then that plane, and what crosses it is held.
-    ``length`` and ``width`` are those of the whole body. ``cells`` are counted over the meshed part. ``refine``
-    multiplies all numbers of elements, along and across the layers, each rounded and at least one.
+    With a plane of symmetry in x only x >= 0 is meshed; ``x_min`` is then that plane, and the displacement normal to it
+    is zero. ``length`` and ``width`` are those of the whole body, ``cells`` those of the meshed part. ``refine``
+    multiplies all numbers of elements, along and across the layers; products are rounded and at least one.
     """
 
     length: Annotated[float, Quantity("mm")] = Field(gt=0)
@@ -80,7 +80,7 @@ class Structure(Parameters):
 
     @property
     def refined(self) -> "Structure":
-        """Return the same structure with all numbers of elements multiplied by ``refine``."""
+        """Same structure with all numbers of elements multiplied by ``refine``."""
         layers = {
             name: layer.model_copy(
                 update={
@@ -94,29 +94,29 @@ class Structure(Parameters):
 
     @property
     def thickness(self) -> float:
-        """Return the thickness of all layers [m]."""
+        """Total thickness of the layers [m]."""
         return sum(layer.thickness for layer in self.layers.values())
 
     @property
     def corners(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return the lowest and the highest corner of the meshed box [m]."""
+        """Lowest and highest corner of the meshed box [m]."""
         x, y = 0.5 * self.length, 0.5 * self.width
         low = (0.0 if "x" in self.symmetry else -x, 0.0 if "y" in self.symmetry else -y, 0.0)
         return low, (x, y, self.thickness)
 
     @property
     def facet_sets(self) -> tuple[str, ...]:
-        """Return the names that supports and loads may refer to."""
+        """Names of the facet sets for supports and loads."""
         sides = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
         return sides if self.holes is None else (*sides, "mounting_holes")
 
     @property
     def margin(self) -> float:
-        """Return the distance [m] below which two places are the same."""
+        """Distance below which two points coincide [m]."""
         return ROUNDING * max(self.length, self.width, self.thickness)
 
     def planes_at(self, place: tuple[float, float, float]) -> tuple[Axis, ...]:
-        """Return the planes of symmetry on which a place [m] lies."""
+        """Return the axes of the planes of symmetry that contain a point [m]."""
         return tuple(axis for axis in dict.fromkeys(self.symmetry) if abs(place[AXES.index(axis)]) <= self.margin)
 
 
@@ -125,126 +125,16 @@ def _each(factor: float, counts: tuple[int, int]) -> tuple[int, int]:
 
 
 def _times(factor: float, count: int) -> int:
-    """Multiply a number of elements; halves go up, so that meshes of like proportions stay so."""
+    """Multiply a number of elements and round half up, so that proportional meshes stay proportional."""
     return max(1, math.floor(factor * count + 0.5))
 
 
-class Pulsed(Parameters):
-    """A load whose value is its peak times a pulse of unit height, or the values of a table.
-
-    ``half_sine`` and ``haversine``, its square, act for ``duration``; ``constant`` from the start, for ``duration`` or
-    to the end. ``table`` is a CSV file of times and values and stands instead of peak and pulse; ``table_column``
-    is the title of the values where it has several columns. A record that begins at a negative time is moved to zero.
-
-    Attributes:
-        effect: Its name among the effects of a run.
-        quantity: What its values are, a key of ``fem.loads.pulse_table.QUANTITIES``.
-    """
-
-    effect: ClassVar[str]
-    quantity: ClassVar[str]
-    pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
-    duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
-    table: str | None = None
-    table_column: str | None = None
-
-
-class OnBody(Pulsed):
-    """A load of the whole body, along ``direction``."""
-
-    direction: Direction
-
-
-class OnNodes(Pulsed):
-    """A load of the nodes of a facet set."""
-
-    on: str
-
-
-class OnAreas(Pulsed):
-    """A load per area of a facet set."""
-
-    on: str
-
-
-class AtPoint(Pulsed):
-    """A load at a point, along ``direction``."""
-
-    at: Annotated[tuple[float, float, float], Quantity("mm")]
-    direction: Direction
-
-
-class InputG(OnBody):
-    """Acceleration of all supports along ``direction``; displacements are relative to them with ``direct``.
-
-    Given by a JEDEC service condition, by peak and duration, or by a table.
-    """
-
-    effect: ClassVar = "input_g"
-    quantity: ClassVar = "acceleration"
-    kind: Literal["input_g"] = "input_g"
-    service_condition: ServiceCondition | None = None
-    peak: Annotated[float | None, Quantity("G")] = Field(None, gt=0)
-    direction: Direction = (0.0, 0.0, 1.0)
-    method: Literal["direct", "large_mass"] = "direct"
-
-
-class Pressure(OnAreas):
-    """Pressure on a facet set, positive where it pushes into the body.
-
-    It follows the surface unless kinematics are small.
-    """
-
-    effect: ClassVar = "pressure"
-    quantity: ClassVar = "pressure"
-    kind: Literal["pressure"] = "pressure"
-    peak: Annotated[float | None, Quantity("MPa")] = None
-
-
-class PrescribedMotion(OnNodes):
-    """Velocity of one component of a facet set."""
-
-    effect: ClassVar = "prescribed_motion"
-    quantity: ClassVar = "velocity"
-    kind: Literal["motion"] = "motion"
-    component: Axis
-    peak: Annotated[float | None, Quantity("m/s")] = None
-
-
-class Gravity(OnBody):
-    """Weight, constant unless a pulse or a table says otherwise."""
-
-    effect: ClassVar = "gravity"
-    quantity: ClassVar = "acceleration"
-    kind: Literal["gravity"] = "gravity"
-    pulse: Literal["half_sine", "haversine", "constant"] = "constant"
-    peak: Annotated[float, Quantity("m/s^2")] = Field(9.80665, gt=0)
-    direction: Direction = (0.0, 0.0, -1.0)
-
-
-class PointForce(AtPoint):
-    """Force at a point, shared by the nodes of the element there; its direction stays also where the body turns.
-
-    It is the force on the whole body: with a plane of symmetry its mirror image acts as well, and of a force on that
-    plane each half bears half. Strains within an element of the point depend on the mesh.
-    """
-
-    effect: ClassVar = "point_force"
-    quantity: ClassVar = "force"
-    kind: Literal["point_force"] = "point_force"
-    peak: Annotated[float | None, Quantity("N")] = Field(None, gt=0)
-
-
-AnyLoad = InputG | Gravity | Pressure | PrescribedMotion | PointForce
-StructureLoad = Annotated[AnyLoad, Field(discriminator="kind")]
-KINDS: tuple[type[Pulsed], ...] = get_args(AnyLoad)
-
-
 class LayerCoupling(Coupling):
-    """Two models of a structure: fine layers, each at its own steps, and the others at the window's.
+    """Coupling of two models of a structure: fine layers at small steps, the other layers at the window.
 
-    ``fine`` are layers by name; without them those whose steps are less than half of the longest. ``compare`` also runs
-    one model at the smallest step (DNS). ``macro_ranks`` are those of the other layers with ``disjoint``.
+    ``fine`` names the fine layers; the default is all layers whose critical step is less than half of the longest.
+    ``compare`` also runs a single model at the smallest step (DNS). ``macro_ranks`` is the number of ranks of the other
+    layers with ``placement = disjoint``.
     """
 
     fine: tuple[str, ...] = ()
@@ -254,12 +144,15 @@ class LayerCoupling(Coupling):
 
 
 def fine_layers(coupling: LayerCoupling, steps: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the fine layers of a structure, from the critical steps [s] of all its layers."""
-    return coupling.fine or tuple(name for name, step in steps.items() if step < SMALLER * max(steps.values()))
+    """Return the names of the fine layers, from the critical steps of all layers [s]."""
+    return coupling.fine or tuple(name for name, step in steps.items() if step < FINE_STEP * max(steps.values()))
 
 
 class DynamicsNumerics(Parameters):
-    """How the motion is computed; ``mass_scaled`` names layers, ``explicit_step`` goes before ``step_fraction``."""
+    """Numerical parameters of a motion.
+
+    ``mass_scaled`` names the layers with mass scaling; ``explicit_step`` takes precedence over ``step_fraction``.
+    """
 
     step_fraction: float = Field(0.9, gt=0, le=0.99)
     critical_step: Literal["element", "power_iteration"] = "element"
@@ -275,10 +168,10 @@ class DynamicsNumerics(Parameters):
 
 
 class Dynamics(Parameters):
-    """What of the motion is wanted; ``modes`` is how many natural frequencies, the lowest ones.
+    """Duration, solver and outputs of a motion.
 
-    ``filter`` is that of the accelerations at watch points.
-    ``dns`` is, where there is a coupling, one model at the smallest step instead of two.
+    ``modes`` is the number of natural frequencies, from the lowest. ``filter`` is applied to accelerations at watch
+    points. With a coupling, ``solver = dns`` computes a single model at the smallest step instead of two models.
     """
 
     duration: Annotated[float, Quantity("ms")] = Field(gt=0)
@@ -294,14 +187,14 @@ class Dynamics(Parameters):
 
     @property
     def solvers(self) -> tuple[SolverName, ...]:
-        """Return the solvers to run, each on its own; the explicit one is the coupled one where there is a coupling."""
+        """Solvers to run, each separately; with a coupling, the explicit solver is the coupled one."""
         chosen: tuple[SolverName, ...] = ("explicit", "implicit") if self.solver == "both" else (self.solver,)
         compared = self.coupling is not None and self.coupling.compare and self.solver != "dns"
         return (*chosen, "dns") if compared else chosen
 
 
 class StructureProblem(Parameters):
-    """All that describes a structure and its motion; ``structure_checks.problems`` says what does not fit together."""
+    """Structure, supports, loads and motion; ``structure_checks.problems`` checks their consistency."""
 
     structure: Structure
     materials: dict[str, Material] = Field(default_factory=dict)
@@ -314,16 +207,16 @@ class StructureProblem(Parameters):
 
     @property
     def fittings(self) -> Fittings:
-        """Return supports, masses, watch points and gauges."""
+        """Supports, masses, watch points and gauges."""
         return Fittings(**{name: getattr(self, name) for name in Fittings.model_fields})
 
     @property
     def known_materials(self) -> dict[str, Material]:
-        """Return the materials that layers may name: those of the problem, then those of the library."""
+        """Materials by name: those of the problem, then those of the library."""
         return self.materials | {name: material for name, material in LIBRARY.items() if name not in self.materials}
 
     @property
     def layer_materials(self) -> dict[str, Material]:
-        """Return the material of each layer; a name that is not known raises ``KeyError``."""
+        """Material of each layer; an unknown name raises ``KeyError``."""
         known = self.known_materials
         return {name: known[layer.material] for name, layer in self.structure.layers.items()}

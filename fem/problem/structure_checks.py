@@ -5,18 +5,16 @@ from collections.abc import Iterator
 
 from reflowshock.fem.problem.attachment_checks import attachment_problems, filter_problems, in_hole, inside
 from reflowshock.fem.problem.fittings import AXES
-from reflowshock.fem.problem.structure import (
+from reflowshock.fem.problem.load_kinds import (
     AtPoint,
-    Gravity,
     InputG,
-    LayerCoupling,
     OnAreas,
     OnBody,
     OnNodes,
     PrescribedMotion,
     StructureLoad,
-    StructureProblem,
 )
+from reflowshock.fem.problem.structure import LayerCoupling, StructureProblem
 from reflowshock.problem import Problem, unknown_name
 
 COUPLING = "dynamics.coupling"
@@ -78,7 +76,7 @@ def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[
 
 def _large_mass(problem: StructureProblem) -> Iterator[Problem]:
     """A large mass moves the supports that hold all components; nothing else may refer to a place in space."""
-    shaking = [name for name, load in problem.loads.items() if isinstance(load, InputG) and load.method == "large_mass"]
+    shaking = [name for name, load in problem.loads.items() if load.is_large_mass]
     if not shaking:
         return
     key = f"loads.{shaking[0]}.method"
@@ -177,21 +175,15 @@ def _where(first: str, second: str) -> str:
 
 
 def _pulse(key: str, load: StructureLoad) -> Iterator[Problem]:
-    condition = load.service_condition if isinstance(load, InputG) else None
-    own_peak = None if isinstance(load, Gravity) else load.peak
-    given = [
-        name
-        for name, value in (("service_condition", condition), ("peak", own_peak), ("table", load.table))
-        if value is not None
-    ]
-    ways = "service_condition, or peak and duration, or table" if isinstance(load, InputG) else "peak, or table"
-    if len(given) != 1 and not (isinstance(load, Gravity) and not given):
-        yield Problem(key, f"is given by {' and '.join(given) or 'nothing'}", None, f"exactly one of {ways}")
-    elif (own_peak is not None or isinstance(load, Gravity)) and load.pulse != "constant" and load.duration is None:
+    names = load.definitions
+    if len(names) != 1 and (names or not load.has_default_peak):
+        message = f"is given by {' and '.join(names) or 'nothing'}"
+        yield Problem(key, message, None, f"exactly one of {load.alternatives}")
+    elif ("peak" in names or load.has_default_peak) and load.pulse != "constant" and load.duration is None:
         if load.table is None:
             yield Problem(f"{key}.duration", f"is missing, a {load.pulse.replace('_', ' ')} needs it", None, "> 0")
-    elif load.duration is not None and (condition or load.table):
-        yield Problem(f"{key}.duration", f"is already given by {given[0]}", f"{load.duration:g} s")
+    elif load.duration is not None and (load.jedec_condition or load.table):
+        yield Problem(f"{key}.duration", f"is already given by {names[0]}", f"{load.duration:g} s")
 
 
 def _yielding(problem: StructureProblem) -> Iterator[tuple[str, str]]:
@@ -318,5 +310,5 @@ def _one_model(problem: StructureProblem) -> Iterator[Problem]:
         message = "is for one model: windows rest on the steps of elements"
         yield Problem("dynamics.numerics.critical_step", message, dynamics.numerics.critical_step, "element")
     for name, load in problem.loads.items():
-        if isinstance(load, InputG) and load.method == "large_mass":
+        if load.is_large_mass:
             yield Problem(f"loads.{name}.method", "moves one model", "large_mass", "direct")

@@ -1,1 +1,1 @@
-"""What every rank does, in order; start with `dynamics.py`."""
+"""Runs from input to results, as every rank executes them; start with `dynamics.py`."""

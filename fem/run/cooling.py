@@ -1,7 +1,7 @@
-"""One run of cooling, from meshes to the state in which a shock begins: what every rank does, in order."""
+"""Run of the cooling stage, from meshes to the stressed initial state of a shock."""
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -17,57 +17,69 @@ from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
 from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
 from reflowshock.fem.model.body import Body
-from reflowshock.fem.output.cooling_report import Unbalanced, write_cooling
+from reflowshock.fem.output.cooling_report import Convergence, CooledPackage, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.problem.inputs import CoolingInput
+from reflowshock.fem.setup.models import Model
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics
-from reflowshock.fem.statics.initial_state import Cooling, begun
+from reflowshock.fem.statics.initial_state import Cooling, with_initial_stress
 
-RANK = 1e-9  # of the largest singular value: below it a rigid motion is not held
+RANK = 1e-9  # relative singular value below which a rigid-body motion is unconstrained
 
 
 def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
-    """Cool the whole model and write displacement, stress and result; collective over ``world``.
+    """Cool the undivided model and write displacement, stress and result; collective over ``world``.
 
-    The board lies free: only planes of symmetry hold it, and pins that bear nothing. So what it is screwed to
-    afterwards holds it as it then is.
+    Only symmetry planes and statically determinate pins, which have no reaction, support the board while it cools. The
+    supports of the drop test then fix it in its deformed shape.
 
     Raises:
-        AgreedError: Input or mesh that does not fit, or no equilibrium; on every rank.
+        AgreedError: The input or a mesh does not fit, or equilibrium is not reached; on every rank.
     """
     start = time.perf_counter()
-    pinned = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
-    tables: JointTables = world.bcast(pinned[1].tables if pinned else None)
-    HERE.slow = "cools the model"
-    pieces = distributed(world, pinned[1].mesh if pinned else None, tables, request)
+    package = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
+    tables: JointTables = world.bcast(package.model.tables if package else None)
+    ACTIVITY.slow = "cools the model"
+    pieces = distributed(world, package.model.mesh if package else None, tables, request)
     ones = np.ones(len(pieces.steps))
     body = make_body(world, pieces, tables, ones, ForceOptions())
     statics = Statics(world, body, pieces.materials, request.change)
-    found, memory = statics.solve(), statics.memory
+    equilibrium, memory = statics.solve(), statics.memory
     statics.free()
-    loaded = begun(body, pieces.materials, found.displacement, request.change, path=True)
-    rest, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
-    unbalanced = Unbalanced(found.residuals, rest, found.products, memory, seconds)
-    whole = pinned[0] if pinned else None
-    displacement = whole_displacement(world, body, found, pinned)
-    cooling = Cooling(whole.mesh.points, displacement, request.change) if whole and displacement is not None else None
-    write_cooling(world, request, (whole, cooling), (loaded, tables), unbalanced)
+    loaded = with_initial_stress(body, pieces.materials, equilibrium.displacement, request.change, path=True)
+    residual, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
+    convergence = Convergence(equilibrium.residuals, residual, equilibrium.products, memory, seconds)
+    displacement = whole_displacement(world, body, equilibrium, package)
+    cooled = None
+    if package and displacement is not None:
+        cooled = CooledPackage(package.whole, Cooling(package.whole.mesh.points, displacement, request.change))
+    write_cooling(world, request, cooled, Model(tables, loaded), convergence)
     agreed(world, lambda: None)
 
 
-Pinned = tuple[Whole, ModelInput[JointTables]]
+@dataclass(frozen=True, slots=True)
+class PinnedPackage:
+    """Package on its board before cooling.
+
+    Attributes:
+        whole: Joined mesh of board, packages and joints.
+        model: Mesh and tables of the single model whose rigid-body motions are fixed.
+    """
+
+    whole: Whole
+    model: ModelInput[JointTables]
 
 
-def pinned_package(request: CoolingInput) -> Pinned:
-    """Read all meshes as one model on its planes of symmetry, its other rigid motions pinned."""
+def pinned_package(request: CoolingInput) -> PinnedPackage:
+    """Read all meshes as one model on its symmetry planes, with all other rigid-body motions pinned."""
     whole = joined(read_package(request))
-    return whole, pinned(model_inputs(whole, "dns", SYMMETRY)["dns"])
+    return PinnedPackage(whole, pinned(model_inputs(whole, "dns", SYMMETRY)["dns"]))
 
 
 def pinned(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
-    """Return a model whose rigid motions that nothing holds are pinned."""
+    """Return a model with pins against every unconstrained rigid-body motion."""
     tables = item.tables
     held, usable = np.zeros((tables.nodes, 3), dtype=bool), np.zeros(tables.nodes, dtype=bool)
     held[tables.held_nodes] = tables.held
@@ -79,7 +91,7 @@ def pinned(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
 
 
 def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput) -> Pieces:
-    """Give each rank its elements; collective."""
+    """Distribute the mesh and assign materials to the elements of each rank; collective."""
     dolfinx_api.compile_ahead(world, mesh.points[mesh.cells[0]] if mesh else None)
     local = distribute(world, mesh)
     formulation = request.shock.numerics.formulation
@@ -87,57 +99,57 @@ def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, req
 
 
 def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
-    """Return what forces of the shock's own terms are out of balance at its beginning, over a scale [N]; collective."""
+    """Return the norm of the unbalanced force at the start of the shock, relative to ``scale`` [N]; collective."""
     motion = explicit_motion(body, [], 1.0)
     motion.update_force()
-    own = body.free & body.shared.owned[:, None]
-    square = world.allreduce(float(np.sum(motion.force[own] ** 2)))
+    owned = body.free & body.shared.owned[:, None]
+    square = world.allreduce(float(np.sum(motion.force[owned] ** 2)))
     return float(np.sqrt(square)) / scale if scale > 0.0 else 0.0
 
 
 def whole_displacement(
-    world: MPI.Comm, body: Body, found: Equilibrium, pinned: Pinned | None
+    world: MPI.Comm, body: Body, equilibrium: Equilibrium, package: PinnedPackage | None
 ) -> NDArray[np.float64] | None:
-    """Return the displacement ``(n, 3)`` [m] of all nodes of the whole mesh on rank 0, None elsewhere; collective."""
+    """Return the displacement of all nodes of the joined mesh, shape (n, 3) [m], on rank 0, else None; collective."""
     owned = body.shared.owned
-    parts = world.gather((body.local.nodes[owned], found.displacement[owned]))
-    if parts is None or pinned is None:
+    parts = world.gather((body.local.nodes[owned], equilibrium.displacement[owned]))
+    if parts is None or package is None:
         return None
-    whole, item = pinned
-    own, result = np.zeros((item.tables.nodes, 3)), np.zeros_like(whole.mesh.points)
+    whole, model = package.whole, package.model
+    at_model_nodes, result = np.zeros((model.tables.nodes, 3)), np.zeros_like(whole.mesh.points)
     for nodes, values in parts:
-        own[nodes] = values
-    result[whole.mesh.cells[item.cells]] = own[item.mesh.cells]
+        at_model_nodes[nodes] = values
+    result[whole.mesh.cells[model.cells]] = at_model_nodes[model.mesh.cells]
     return result
 
 
 def pins(
     points: NDArray[np.float64], held: NDArray[np.bool_], usable: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Choose components whose hold is statically determinate: a load in balance has no reaction there.
+    """Choose displacement components that make the support statically determinate.
 
-    Of the rigid motions that leave all held components at rest, the pivots of a QR factorisation are the components
-    that tell them apart best.
+    A load in equilibrium has no reaction at these pins. They are the pivots of a QR factorisation of the rigid-body
+    motions that leave all fixed components at rest.
 
     Args:
-        points: ``(n, 3)`` [m].
-        held: ``(n, 3)`` components that are held already.
-        usable: ``(n,)`` nodes that may be pinned.
+        points: Nodes, shape (n, 3) [m].
+        held: Components that are already fixed, shape (n, 3).
+        usable: Nodes that may be pinned, shape (n,).
 
     Returns:
-        Nodes and components, one for each rigid motion that is left.
+        Node and component of each pin, one per unconstrained rigid-body motion.
     """
     motions = rigid_motions(points)
     _, values, right = np.linalg.svd(motions[held], full_matrices=True)
     rank = int(np.sum(values > RANK * len(points) ** 0.5)) if held.any() else 0
-    left = np.where((usable[:, None] & ~held)[:, :, None], motions, 0.0).reshape(-1, 6) @ right[rank:].T
-    _, _, pivots = scipy.linalg.qr(left.T, mode="economic", pivoting=True)
+    unconstrained = np.where((usable[:, None] & ~held)[:, :, None], motions, 0.0).reshape(-1, 6) @ right[rank:].T
+    _, _, pivots = scipy.linalg.qr(unconstrained.T, mode="economic", pivoting=True)
     chosen = np.sort(pivots[: 6 - rank])
     return chosen // 3, chosen % 3
 
 
 def rigid_motions(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return translations along and rotations about x, y, z ``(n, 3, 6)``; lengths in units of the body's size."""
+    """Return translations along and rotations about x, y, z, shape (n, 3, 6); lengths in units of the body's size."""
     scaled = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
     motions = np.zeros((len(points), 3, 6))
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""One run of a package or a structure, from its meshes to its results: what every rank does, in order."""
+"""Dynamic run of a package or a structure, from its meshes to its results, as every rank executes it."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from reflowshock.fem.dynamics.energy_balance import EnergyBalance
 from reflowshock.fem.dynamics.history import History, Signal, Watch
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.motion import Motion
-from reflowshock.fem.dynamics.participant import Alone, Participant, explicit_motion
+from reflowshock.fem.dynamics.participant import Participant, SingleModel, explicit_motion
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
@@ -33,36 +33,36 @@ from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.run.time_loop import Outputs, Pictures, run_time_loop
-from reflowshock.fem.setup.models import Divided, Model
+from reflowshock.fem.setup.models import DividedModels, Model
 from reflowshock.materials.roles import materials_of_parts
 
 Models = Mapping[Role, Model[Any]]
 
 
 class DynamicProblem(Protocol):
-    """What moves: a package on a board, or a structure. All methods but properties are collective."""
+    """Problem of a dynamic run: a package on a board, or a structure; methods are collective, properties are not."""
 
     @property
     def request(self) -> RunInput | StructureInput:
-        """Return the input."""
+        """Input of the run."""
 
     @property
-    def divided(self) -> Divided[Any] | None:
-        """Return the models before they are distributed; None for one model that DOLFINx distributes."""
+    def divided(self) -> DividedModels[Any] | None:
+        """Models before distribution, None for a single model that DOLFINx distributes."""
 
     @property
     def signals(self) -> Mapping[str, Signal]:
-        """Return functions of time that belong to the history, by name."""
+        """Functions of time that are recorded in the history, by name."""
 
     @property
     def report(self) -> Report:
-        """Return what the result tells of it."""
+        """Report of the problem in the result file."""
 
     def place(self, world: MPI.Comm) -> Plan:
-        """Choose which ranks carry which model and which cells."""
+        """Assign models and cells to ranks."""
 
     def build(self, comms: Communicators, cells: Mapping[Role, NDArray[np.int32]]) -> tuple[Models, Steps]:
-        """Return the models of this rank and the steps of the run; ``cells`` are those of ``Plan``."""
+        """Return the models of this rank and the time steps of the run; ``cells`` is the attribute of ``Plan``."""
 
     def loads(self, comm: MPI.Comm, model: Model[Any], steps: Steps) -> list[Load]:
         """Return the loads and the damping of a model."""
@@ -71,26 +71,26 @@ class DynamicProblem(Protocol):
         """Return the watch points of a model."""
 
     def trivial_energy(self, steps: Steps) -> float:
-        """Return the energy [J] below which a balance is not judged."""
+        """Return the energy below which the balance is not checked [J]."""
 
     def pictures(self, world: MPI.Comm, models: Models, steps: Steps) -> Sequence[Pictures]:
-        """Return what is taken at windows of its own."""
+        """Return the snapshots taken at windows chosen by the problem."""
 
     @property
     def is_over(self) -> Callable[[History], bool] | None:
-        """Return what says of the history so far whether the run is over before its end; None where nothing does."""
+        """Function that decides from the history whether the run ends early; None if it never does."""
 
     def find_modes(self, comms: Communicators, models: Models, steps: Steps) -> ModeTable | None:
-        """Return the natural modes, if the run is asked for them."""
+        """Return the natural modes if the input requests them, otherwise None."""
 
 
 def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
     """Run a problem and write its results; collective over ``world``.
 
     Raises:
-        AgreedError: Input or mesh that does not fit; on every rank.
-        RankError: Too few or too many ranks; on every rank.
-        EnergyError: Energies that do not balance; on every rank.
+        AgreedError: The input or a mesh does not fit; on every rank.
+        RankError: The number of ranks does not suit the problem; on every rank.
+        EnergyError: The energy balance is violated; on every rank.
     """
     start = time.perf_counter()
     plan = problem.place(world)
@@ -122,47 +122,47 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
         agreed(comms.world, lambda: None)
 
 
-def place(world: MPI.Comm, divided: Divided[Any], request: RunInput | StructureInput) -> Plan:
-    """Choose which ranks carry which of the divided models and which cells, and say so; collective."""
+def place(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
+    """Assign the divided models and their cells to ranks, and print the assignment; collective."""
     works, ranks = works_of(divided, request), request.ranks(world.size)
     return plan_ranks(world, works, ranks, request.checkpoints, divided.scheme)
 
 
 def make_participants(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> CoupledRun:
-    """Return the participants of this rank, ready to move; collective."""
+    """Return the participants of this rank at time zero; collective."""
     bodies = {role: model.body for role, model in models.items()}
     loads = {role: problem.loads(comms.models[role], model, steps) for role, model in models.items()}
     if problem.divided and problem.request.coupled:
         scheme = scheme_of(problem.divided.scheme, problem.divided.rules.coupling.direction)
-        made = couple(comms, bodies, loads, steps.plan, scheme)
+        coupled = couple(comms, bodies, loads, steps.plan, scheme)
     else:
         [(role, body)] = bodies.items()
         motion = make_motion(comms.models[role], body, loads[role], steps.plan.step, problem.request)
-        made = CoupledRun({role: Alone(motion, steps.plan)}, [])
-    for participant in made.participants.values():
+        coupled = CoupledRun({role: SingleModel(motion, steps.plan)}, [])
+    for participant in coupled.participants.values():
         if any(problem.request.initial_velocity):
             participant.motion.launch(np.array(problem.request.initial_velocity))
-    return made
+    return coupled
 
 
 def make_motion(
     comm: MPI.Comm, body: Body, loads: list[Load], step: float, request: RunInput | StructureInput
 ) -> Motion:
-    """Return the motion from rest of one model by the run's solver; collective.
+    """Return the motion of a single model for the run's solver, starting at rest; collective.
 
     Raises:
-        AgreedError: There is nothing to solve for; on every rank.
+        AgreedError: The implicit solver does not support the model; on every rank.
     """
     if not request.implicit:
         return explicit_motion(body, loads, step)
     try:
         return ImplicitMotion(comm, body, loads, step, request.hht_alpha)
-    except ValueError as error:  # of what all ranks know alike
+    except ValueError as error:  # raised on every rank
         raise AgreedError(f"implicit solver: {error}") from error
 
 
 def make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> Outputs:
-    """Open the files of a run, and name what its checkpoints depend on; collective."""
+    """Open the output files of a run and identify the inputs of its checkpoints; collective."""
     request, numerics = problem.request, problem.request.numerics
     inputs = request.computed, steps.plan, digest_of_files(*request.files)
     return Outputs(
@@ -176,7 +176,7 @@ def make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, 
 
 
 def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps: Steps) -> History:
-    """Return the empty history of this run."""
+    """Return an empty history with the watch points of this rank."""
     limit, trivial = problem.request.numerics.energy_balance_limit, problem.trivial_energy(steps)
     balance = EnergyBalance(limit, trivial, steps.plan.step, steps.smallest)
     watches = {role: problem.watch(model) for role, model in models.items()}
@@ -184,22 +184,22 @@ def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps
 
 
 def make_fields(comms: Communicators, models: Models, request: RunInput | StructureInput) -> dict[Role, Fields]:
-    """Open a field file per model of this rank; collective."""
+    """Open one field file for each model of this rank; collective."""
     _, materials = materials_of_parts(part_names(models), request.part_materials)
     yields = any(material.plasticity is not None for material in materials)
-    made = {}
+    fields = {}
     for role, model in models.items():
         part = model.tables.part[model.body.local.cell_numbers]
-        made[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
-    return made
+        fields[role] = Fields(comms.models[role], model.body, part, request.output / f"{role}.pvd", yields)
+    return fields
 
 
 def part_names(models: Models) -> tuple[str, ...]:
-    """Return the names of the parts, which all models of a run have."""
+    """Return the names of the parts, which are the same in all models of a run."""
     return next(iter(models.values())).tables.part_names
 
 
 def factor_cost(participants: Mapping[Role, Participant]) -> FactorCost | None:
-    """Return what the factorisation of an implicit solver took, None for an explicit one."""
+    """Return the factorisation cost of an implicit solver, None for an explicit one."""
     motion = next(iter(participants.values())).motion
     return motion.factor.cost if isinstance(motion, ImplicitMotion) else None

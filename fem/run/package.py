@@ -1,4 +1,4 @@
-"""A package on a board under input-G: what a run of it has of its own."""
+"""Drop test of a package on a board under input-G, as a problem of ``run_dynamics``."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,28 +28,28 @@ from reflowshock.fem.output.structure_modes import ModeTable, write_modes
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.kinematics import TURNING
 from reflowshock.fem.run.dynamics import place, run_dynamics
-from reflowshock.fem.setup.models import Divided, Model
+from reflowshock.fem.setup.models import DividedModels, Model
 from reflowshock.fem.setup.package_models import build_package, divided_package, elastic_package
 
-SPEEDS = 201  # times at which the largest velocity of the table is looked for
-NON_TRIVIAL = 1e-4  # of the energy that the pulse gives a free body: from there on the balance is judged
+SPEEDS = 201  # sampling points of the drop table's velocity
+NON_TRIVIAL = 1e-4  # fraction of a free body's pulse energy above which the balance is checked
 
 
 @dataclass(frozen=True, slots=True)
 class PackageDrop:
-    """A package on a board; a ``dynamics.DynamicProblem``."""
+    """Drop test of a package on a board; implements ``DynamicProblem``."""
 
     request: RunInput
-    divided: Divided[JointTables]
+    divided: DividedModels[JointTables]
     pulse: Pulse
 
     @classmethod
     def read(cls, world: MPI.Comm, request: RunInput) -> "PackageDrop":
-        """Read and divide the meshes; collective. Errors as ``run_dynamics``."""
+        """Read and divide the meshes; collective; raises as ``run_dynamics``."""
         if request.coupled:
             check_size(request.shock.ranks, world.size)
         divided = divided_package(world, request)
@@ -57,22 +57,22 @@ class PackageDrop:
 
     @property
     def signals(self) -> Mapping[str, Signal]:
-        """Return the acceleration of the table."""
+        """Acceleration of the drop table."""
         return {"base_acceleration": self.pulse.value}
 
     @property
     def report(self) -> PackageReport:
-        """Return what the result tells of it."""
+        """Report of the package in the result file."""
         return PackageReport(self.request)
 
     def place(self, world: MPI.Comm) -> Plan:
-        """Choose which ranks carry which model and which cells."""
+        """Assign models and cells to ranks."""
         return place(world, self.divided, self.request)
 
     def build(
         self, comms: Communicators, cells: Mapping[Role, NDArray[np.int32]]
     ) -> tuple[dict[Role, Model[JointTables]], Steps]:
-        """Return the models, and steps that may be implicit or end early."""
+        """Return the models and the time steps, which may be implicit or end early."""
         models, steps = build_package(comms, self.divided, self.request, cells)
         request, shock = self.request, self.request.shock
         ends = [request.end, shock.numerics.dns_duration if request.mode == "dns" else None]
@@ -90,12 +90,12 @@ class PackageDrop:
 
     def watch(self, model: Model[JointTables]) -> JointWatch:
         """Return the watch points of a model."""
-        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping.coefficients
+        yields, damping = self.request.materials.solder.plasticity is not None, self.request.shock.damping
         turning = self.request.kinematics in TURNING
         return JointWatch(model.tables, model.body, yields, damping, turning)
 
     def trivial_energy(self, steps: Steps) -> float:
-        """Return a small part of the energy [J] that the pulse gives a free body."""
+        """Return a small fraction of the energy that the pulse gives to a free body [J]."""
         times = np.linspace(0.0, self.request.shock.decided_duration, SPEEDS)
         speed = max(abs(self.pulse.integral(time)) for time in times)
         return NON_TRIVIAL * 0.5 * steps.moved_mass * speed**2
@@ -103,40 +103,40 @@ class PackageDrop:
     def pictures(
         self, world: MPI.Comm, models: Mapping[Role, Model[JointTables]], steps: Steps
     ) -> Sequence[JointInterfaceStress]:
-        """Return what is taken at ``shock.picture_times``."""
+        """Return the interface stress snapshots at ``shock.picture_times``."""
         times = self.request.shock.picture_times
         tables = {role: (model.tables.joint_interface, model.body) for role, model in models.items()}
         return [JointInterfaceStress(world, tables, picture_windows(times, steps.plan))] if times else []
 
     @property
     def is_over(self) -> Callable[[History], bool] | None:
-        """Return what says whether the shock is over before its end."""
+        """Function that decides whether the shock has settled before its longest duration, or None."""
         return (lambda history: is_settled(history.arrays(WATCHED))) if self.request.settles else None
 
     def find_modes(
         self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps
     ) -> ModeTable | None:
-        """Return the natural modes, if the run is asked for them: of one model, whatever those of the run are."""
+        """Return the natural modes of a single undivided model if the input requests them, otherwise None."""
         if not self.request.shock.modes:
             return None
-        with HERE.busy("finds natural modes"):
-            found = agreed(comms.world, lambda: modes_of(self.request) if comms.world.rank == 0 else None)
-        table: ModeTable = comms.world.bcast(found)
+        with ACTIVITY.busy("finds natural modes"):
+            modes = agreed(comms.world, lambda: modes_of(self.request) if comms.world.rank == 0 else None)
+        table: ModeTable = comms.world.bcast(modes)
         return table
 
 
-def run(world: MPI.Comm, request: RunInput) -> None:
-    """Run one shock and write its results; collective over ``world``, errors as ``run_dynamics``."""
+def run_package(world: MPI.Comm, request: RunInput) -> None:
+    """Run one shock and write its results; collective over ``world``; raises as ``run_dynamics``."""
     run_dynamics(world, PackageDrop.read(world, request))
 
 
 def modes_of(request: RunInput) -> ModeTable:
-    """Find and write the natural modes of board and package, whose joints are coarse where there are coarse ones.
+    """Compute and write the natural modes of board and package, with coarse joints if a mesh of them exists.
 
-    They are those of one linear elastic model with all supports at rest.
+    The model is linear elastic, undivided, and its supports are at rest.
 
     Raises:
-        ValueError: More modes are wanted than there are.
+        ValueError: More modes are requested than there are equations.
     """
     model, mass = elastic_package(request)
     modes = natural_modes(Equations.of(MPI.COMM_SELF, model.body), request.shock.modes)
@@ -146,7 +146,7 @@ def modes_of(request: RunInput) -> ModeTable:
 
 
 def pulse_of(request: RunInput, window: float) -> Pulse:
-    """Return the pulse of a run whose window is given [s]; errors as ``shock_pulse`` and ``check_pulses``."""
+    """Return the pulse of a run with the given window [s]; raises as ``shock_pulse`` and ``check_pulses``."""
     pulse = shock_pulse(request.shock).pulse
     if request.coupled:
         check_pulses(pulse_durations({"drop": pulse}), window, request.numerics.step_fraction)

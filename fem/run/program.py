@@ -1,9 +1,11 @@
-"""The program that each rank runs: read the input, run the shock, end all ranks when one fails or waits too long."""
+"""Program of each MPI rank: read the input, run it, and end all ranks when one fails or waits too long."""
 
 import json
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -13,12 +15,18 @@ from reflowshock.fem.parallel.watchdog import Watchdog
 from reflowshock.fem.problem.inputs import INPUT, CoolingInput, RunInput, StructureInput
 from reflowshock.fem.problem.structure_checks import check
 from reflowshock.fem.run.cooling import run_cooling
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.fem.run.structure import run_structure
+
+RUNS: dict[type, Callable[[MPI.Comm, Any], None]] = {
+    RunInput: run_package,
+    CoolingInput: run_cooling,
+    StructureInput: run_structure,
+}
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:
-    """Run the input file named by the only argument on all ranks of ``world``; return the exit code."""
+    """Run the input file named by the only argument on all ranks of ``world``, and return the exit code."""
     try:
         request = agreed(world, lambda: read_input(arguments))
     except AgreedError as error:
@@ -27,12 +35,7 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
         return 1
     watchdog = Watchdog(world, request.output, request.watchdog_seconds)
     try:
-        if isinstance(request, StructureInput):
-            run_structure(world, request)
-        elif isinstance(request, CoolingInput):
-            run_cooling(world, request)
-        else:
-            run(world, request)
+        RUNS[type(request)](world, request)
     except (AgreedError, EnergyError, RankError) as error:  # raised on every rank
         if world.rank == 0:
             watchdog.speak(str(error))
@@ -47,13 +50,13 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
 
 
 def end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
-    """Tell of an error that only this rank knows, and end the ranks that wait for it."""
+    """Report an error that occurred only on this rank, and end the ranks that wait for it."""
     watchdog.speak(f"rank {world.rank}: {message}")
     world.Abort(1)
 
 
 def read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput:
-    """Read and check the input file, and make the output directory."""
+    """Read and check the input file, and create the output directory."""
     if len(arguments) != 1:
         raise ValueError("usage: mpirun -n N python -m fem INPUT.json")
     request = INPUT.validate_python(json.loads(Path(arguments[0]).read_text(encoding="utf-8")))

@@ -1,4 +1,4 @@
-"""A structure: what a run of it has of its own."""
+"""Dynamic run of a structure, as a problem of ``run_dynamics``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from reflowshock.fem.dynamics.history import Signal
 from reflowshock.fem.estimates.placement import shared
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
-from reflowshock.fem.loads.structure_loads import damping_loads, structure_loads
+from reflowshock.fem.loads.structure_loads import LoadedModel, damping_loads, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.output.structure_modes import ModeTable, find_modes
@@ -25,36 +25,36 @@ from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.kinematics import TURNING
 from reflowshock.fem.run.dynamics import place, run_dynamics
 from reflowshock.fem.run.time_loop import Pictures
-from reflowshock.fem.setup.models import Divided
+from reflowshock.fem.setup.models import DividedModels
 from reflowshock.fem.setup.structure_models import StructureModel, build_coupled, build_structure, divided_structure
 
 
 @dataclass(frozen=True, slots=True)
 class StructureDynamics:
-    """A structure by one of its solvers; a ``dynamics.DynamicProblem``."""
+    """Structure with one of its solvers; implements ``DynamicProblem``."""
 
     request: StructureInput
-    divided: Divided[StructureTables] | None
+    divided: DividedModels[StructureTables] | None
     pulses: Mapping[str, Pulse]
 
     @classmethod
     def read(cls, world: MPI.Comm, request: StructureInput) -> "StructureDynamics":
-        """Read the pulses, and divide the mesh where there are two models; collective. Errors as ``run_dynamics``."""
+        """Read the pulses, and divide the mesh of two coupled models; collective; raises as ``run_dynamics``."""
         pulses = agreed(world, lambda: pulses_of(request.loads))
         return cls(request, divided_structure(world, request) if request.coupled else None, pulses)
 
     @property
     def signals(self) -> Mapping[str, Signal]:
-        """Return the value of each load as ``load@<name>``."""
+        """Value of each load over time, named ``load@<name>``."""
         return {f"load@{name}": pulse.value for name, pulse in self.pulses.items()}
 
     @property
     def report(self) -> StructureReport:
-        """Return what the result tells of it."""
+        """Report of the structure in the result file."""
         return StructureReport(self.request)
 
     def place(self, world: MPI.Comm) -> Plan:
-        """Choose which ranks carry which model and which cells; a single model is on all."""
+        """Assign models and cells to ranks; a single model is on all ranks."""
         if self.divided is None:
             return Plan(shared(("structure",), world.size), {}, {})
         return place(world, self.divided, self.request)
@@ -70,7 +70,7 @@ class StructureDynamics:
 
     def loads(self, comm: MPI.Comm, model: StructureModel, steps: Steps) -> list[Load]:
         """Return the loads and the damping of a model."""
-        loads = structure_loads(comm, model.body, model.tables, self.request, self.pulses)
+        loads = structure_loads(LoadedModel(comm, model.body, model.tables, self.request), self.pulses)
         return loads + damping_loads(self.request.dynamics.damping, model.body)
 
     def watch(self, model: StructureModel) -> PointWatch:
@@ -78,24 +78,24 @@ class StructureDynamics:
         return PointWatch(model.tables.fitted.points, model.body, self.request.kinematics in TURNING)
 
     def trivial_energy(self, steps: Steps) -> float:
-        """Return zero: the balance is exact at any step, so that no energy is too small to be judged."""
+        """Return zero, since the balance is exact and is checked at any energy."""
         return 0.0
 
     def pictures(self, world: MPI.Comm, models: Mapping[Role, StructureModel], steps: Steps) -> Sequence[Pictures]:
-        """Return none."""
+        """Return no snapshots."""
         return ()
 
     @property
     def is_over(self) -> None:
-        """Return None: a structure moves to its end."""
+        """None, since the run of a structure does not end early."""
 
     def find_modes(self, comms: Communicators, models: Mapping[Role, StructureModel], steps: Steps) -> ModeTable | None:
-        """Return the natural modes, if the run is asked for them."""
+        """Return the natural modes if the input requests them, otherwise None."""
         if not self.request.finds_modes:
             return None
         return find_modes(comms.models["structure"], models["structure"], steps.moved_mass, self.request)
 
 
 def run_structure(world: MPI.Comm, request: StructureInput) -> None:
-    """Run one solver on a structure and write its results; collective over ``world``, errors as ``run_dynamics``."""
+    """Run one solver on a structure and write its results; collective over ``world``; raises as ``run_dynamics``."""
     run_dynamics(world, StructureDynamics.read(world, request))

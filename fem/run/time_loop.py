@@ -1,7 +1,8 @@
-"""The time loop: all models through their windows, with samples, fields, checkpoints, progress.
+"""Time loop of a run: windows of all models, with samples, fields, checkpoints and progress.
 
-``shock.duration = "auto"`` becomes the longest duration before a run, which ends at a sample when ``output.settled``
-says so. Rank 0 decides from its samples, which a restart restores. Later modes end when the first one did.
+With ``shock.duration = "auto"`` a run has the longest duration and ends early at the first sample at which
+``output.settled`` finds the response settled. Rank 0 decides from its samples, which a restart restores. The other
+modes of a comparison end when the first one did.
 """
 
 import json
@@ -20,50 +21,50 @@ from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.output.fields import Fields, FieldSample
 from reflowshock.fem.parallel.checkpoint import Checkpoints
+from reflowshock.fem.parallel.checkpoint_state import State
 from reflowshock.fem.parallel.communicators import Role
-from reflowshock.fem.parallel.portable import State
-from reflowshock.fem.parallel.whereabouts import HERE
+from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
-FLATTENED = "the step is that of the undeformed body: where elements are pressed flat, step_fraction must be smaller"
-GUARD = 500  # steps between two looks at the energies, whatever the samples
+FLATTENED = "the time step holds for undeformed elements; reduce numerics.step_fraction for strong compression"
+GUARD = 500  # largest number of steps between two checks of the energies
 
 Participants = Mapping[Role, Participant]
 
 
 class Pictures(Protocol):
-    """Something that is taken of all models at some windows.
+    """Snapshots of all models at the ends of some windows.
 
     Attributes:
-        windows: At whose ends.
+        windows: Numbers of these windows.
     """
 
     windows: frozenset[int]
 
     def sample(self, participants: Participants) -> None:
-        """Take it now; collective over all models."""
+        """Take a snapshot; collective over all models."""
 
     def write(self, directory: Path) -> None:
-        """Write all that was taken; on rank 0."""
+        """Write all snapshots; on rank 0."""
 
     def state(self) -> State:
-        """Return what was taken so far, for a checkpoint."""
+        """Return the snapshots so far, for a checkpoint."""
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Restore the values that ``state`` returned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Where a run writes to.
+    """Outputs of a run.
 
     Attributes:
         history: Samples and energy balance.
-        fields: A field file per model of this rank.
-        field_samples: How many times each of them is written.
-        checkpoints: From which the run continues, and to which it writes.
-        pictures: What else is taken, at windows of its own.
-        is_over: Says of the samples so far whether the run is over before its last window; None where nothing does.
+        fields: Field file of each model of this rank.
+        field_samples: Number of times that each field file is written.
+        checkpoints: Checkpoints from which the run restarts and to which it writes.
+        pictures: Snapshots at chosen windows.
+        is_over: Function that decides from the samples whether the run ends early; None if it never does.
     """
 
     history: History
@@ -77,13 +78,13 @@ class Outputs:
 def run_time_loop(
     world: MPI.Comm, participants: Participants, outputs: Outputs, stopwatch: Stopwatch
 ) -> tuple[int, float]:
-    """Run all windows, from the latest checkpoint where there is one, or until the run is over. Collective.
+    """Run the windows from the start or the latest checkpoint until the run is over; collective.
 
     Returns:
-        The number of windows, and the seconds spent on fields.
+        Number of the last window, and time spent on writing fields [s].
 
     Raises:
-        EnergyError: On every rank, see ``EnergyBalance.judge``.
+        EnergyError: The energy balance is violated; on every rank, see ``EnergyBalance.judge``.
     """
     plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
@@ -95,7 +96,7 @@ def run_time_loop(
             participants, outputs, state, [window for window in sorted(field_windows) if window < first]
         )
     for window in range(first, plan.windows + 1):
-        HERE.window = window
+        ACTIVITY.window = window
         if window:
             run_window(participants, stopwatch)
         sampled = watch(participants, outputs, window)
@@ -109,24 +110,24 @@ def run_time_loop(
         if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
             reported = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
-    HERE.slow = "writes the results"
+    ACTIVITY.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
     return window, output_seconds
 
 
 def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
-    """Return whether the samples say that the run is over; collective, rank 0 decides: it has them, also restored."""
+    """Return whether the run ends early; collective, decided on rank 0, which has the samples."""
     if outputs.is_over is None:
         return False
-    HERE.wait_for("rank 0 to say whether the run is over")
+    ACTIVITY.wait_for("the decision of rank 0 whether the run is over")
     over = bool(world.bcast(outputs.is_over(outputs.history) if world.rank == 0 else None))
-    HERE.go_on()
+    ACTIVITY.go_on()
     return over
 
 
 def watch(participants: Participants, outputs: Outputs, window: int) -> bool:
-    """Take what is due after a window; return whether there was a sample. Errors as ``run_time_loop``."""
+    """Take the samples and snapshots due after a window, and return whether a sample was due."""
     plan = next(iter(participants.values())).plan
     sampled = window % plan.stride == 0 or window == plan.windows
     if sampled:
@@ -140,10 +141,10 @@ def watch(participants: Participants, outputs: Outputs, window: int) -> bool:
 
 
 def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
-    """Advance all models of this rank by one window, each at its turn.
+    """Advance all models of this rank by one window in turn.
 
     Raises:
-        InvertedElementError: On the rank that has the element, with the time.
+        InvertedElementError: An element of this rank is inverted.
     """
     stopwatch.start()
     try:
@@ -153,49 +154,49 @@ def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
         for role, participant in participants.items():
             participant.finish_window()
             stopwatch.lap(role)
-        HERE.slow = ""  # from here on all kernels are compiled
+        ACTIVITY.slow = ""  # from here on all kernels are compiled
     except InvertedElementError as error:
         raise InvertedElementError(f"time {time_of(participants):.6e} s: {error}; {FLATTENED}") from error
 
 
 def time_of(participants: Participants) -> float:
-    """Return the time [s] that the models have reached."""
+    """Return the current time of the models [s]."""
     return next(iter(participants.values())).motion.time
 
 
 def write_fields(participants: Participants, outputs: Outputs, window: int) -> float:
-    """Write the fields of all models of this rank, and keep them for a restart; return the seconds it took."""
+    """Write the fields of all models of this rank, also for a restart; return the time spent [s]."""
     begin = time.perf_counter()
-    with HERE.busy("writes fields"):
+    with ACTIVITY.busy("writes fields"):
         for role, participant in participants.items():
             fields = outputs.fields[role]
             sample = sample_fields(participant, fields)
             fields.write(sample)
-            outputs.checkpoints.keep(f"{role}-{window}", {role: fields.state(sample)})
+            outputs.checkpoints.store(f"{role}-{window}", {role: fields.state(sample)})
     return time.perf_counter() - begin
 
 
 def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
-    """Return the fields of a model as they are now."""
+    """Return the current fields of a model, with displacement relative to the base."""
     motion = participant.motion
     return fields.sample(motion.displacement - motion.base_displacement(), motion.time)
 
 
 def state_of(participants: Participants, outputs: Outputs) -> State:
-    """Return all that changes with time on this rank."""
+    """Return the time-dependent state of this rank, for a checkpoint."""
     models: dict[str, State] = {role: participant.state() for role, participant in participants.items()}
-    pictures = {f"pictures-{k}": some.state() for k, some in enumerate(outputs.pictures)}
+    pictures = {f"pictures-{k}": item.state() for k, item in enumerate(outputs.pictures)}
     return models | {"history": outputs.history.state()} | pictures
 
 
 def save(participants: Participants, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
-    with HERE.busy("writes a checkpoint"):
+    with ACTIVITY.busy("writes a checkpoint"):
         outputs.checkpoints.write(window, time_of(participants), state_of(participants, outputs))
 
 
 def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
-    """Continue from a checkpoint, and write its earlier fields anew; return the seconds that these took."""
+    """Restore a checkpoint and rewrite its earlier fields; return the time spent on fields [s]."""
     checkpoints = outputs.checkpoints
     for role, participant in participants.items():
         participant.restore(state[role])
@@ -209,8 +210,8 @@ def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], 
     }
     for window in field_windows:
         for role in participants:
-            kept = checkpoints.kept(f"{role}-{window}", {role: like[role]})
-            outputs.fields[role].write(FieldSample(**kept[role]))
+            stored = checkpoints.stored(f"{role}-{window}", {role: like[role]})
+            outputs.fields[role].write(FieldSample(**stored[role]))
     if checkpoints.moved and checkpoints.continued is not None:
         save(participants, outputs, checkpoints.continued)
     return time.perf_counter() - begin

@@ -1,1 +1,1 @@
-"""From input files to the models on each rank; `models.py` is what packages and structures share."""
+"""Set-up of the models on each rank from input files; start with `models.py`, which packages and structures share."""

@@ -1,4 +1,4 @@
-"""The models of a run on each rank: divided on rank 0, distributed, given their materials, assembled."""
+"""Set-up of the models of a run: divide on rank 0, distribute, assign materials, assemble."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -26,25 +26,25 @@ from reflowshock.fem.statics.initial_state import InitialState
 
 @dataclass(frozen=True, slots=True)
 class Model(Generic[TablesT_co]):
-    """One model on one rank, before it moves."""
+    """Tables and body of one model on one rank."""
 
     tables: TablesT_co
     body: Body
 
 
 @dataclass(frozen=True, slots=True)
-class Divided(Generic[TablesT_co]):
-    """The models of a run before they are distributed.
+class DividedModels(Generic[TablesT_co]):
+    """Models of a run before they are distributed.
 
     Attributes:
-        meshes: Mesh of each model, on rank 0.
-        tables: Their tables, on every rank.
-        mass_factors: Factor ``(ne,)`` on the density of the cells of each, on every rank.
-        steps: Their steps.
-        rules: What their division followed.
-        scheme: How they are coupled.
-        coupling: What the result tells of it.
-        initial: How its models begin, None from rest without stress.
+        meshes: Mesh of each model, on rank 0; empty on other ranks.
+        tables: Tables of each model, on every rank.
+        mass_factors: Factor on the density of the cells of each model, shape (ne,), on every rank.
+        steps: Time steps of the models.
+        rules: Rules of the division.
+        scheme: Coupling scheme.
+        coupling: Coupling record of the result file.
+        initial: Initial displacement and stress, None for an unstressed start.
     """
 
     meshes: Mapping[Role, MeshData]
@@ -57,37 +57,44 @@ class Divided(Generic[TablesT_co]):
     initial: InitialState | None = None
 
 
-def treatment_of(request: RunInput | StructureInput) -> Treatment:
-    """Return how a run computes its elements."""
-    step = request.numerics.mass_scaled_step if isinstance(request, RunInput) else None
-    return Treatment(request.formulation, request.kinematics, request.numerics.mass_scaled, step or np.inf)
+def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | None = None) -> Treatment:
+    """Return the element formulation, kinematics and mass scaling of a run, with the largest mass-scaled step [s]."""
+    numerics = request.numerics
+    return Treatment(request.formulation, request.kinematics, numerics.mass_scaled, mass_scaled_step or np.inf)
 
 
-def divided_on_root(world: MPI.Comm, divided: Callable[[], Divided[TablesT_co]]) -> Divided[TablesT_co]:
-    """Divide on rank 0, and tell the other ranks all but the meshes; collective, errors of rank 0 on every rank."""
-    found = agreed(world, lambda: divided() if world.rank == 0 else None)
-    shared: Divided[TablesT_co] = world.bcast(replace(found, meshes={}) if found else None)
-    return found or shared
+def divided_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
+    """Divide the models on rank 0 and broadcast all data except the meshes; collective.
+
+    Raises:
+        AgreedError: The division failed on rank 0; on every rank.
+    """
+    divided = agreed(world, lambda: divide() if world.rank == 0 else None)
+    shared: DividedModels[TablesT_co] = world.bcast(replace(divided, meshes={}) if divided else None)
+    return divided or shared
 
 
 def distributed(
     comms: Communicators,
-    divided: Divided[TablesT_co],
+    divided: DividedModels[TablesT_co],
     ranks: Mapping[Role, NDArray[np.int32]],
     request: RunInput | StructureInput,
 ) -> dict[Role, Pieces]:
-    """Distribute the models, and give the elements of this rank their materials; collective.
+    """Distribute the models and assign materials to the elements of this rank; collective.
 
     Args:
-        comms: Communicators.
-        divided: The models.
-        ranks: On rank 0, of each model on several ranks, the rank ``(ne,)`` of each cell.
-        request: The input.
+        comms: Communicators of the run and of its models.
+        divided: Models before distribution.
+        ranks: Rank of each cell, shape (ne,), of every model that is on several ranks; used on rank 0.
+        request: Input of the run.
+
+    Returns:
+        Elements of this rank by model.
     """
-    given = hand_over(comms, divided, ranks)
-    mine = next(iter(divided.meshes.values()), None)
-    dolfinx_api.compile_ahead(comms.world, mine.points[mine.cells[0]] if mine else None)
-    meshes = {role: distribute(comms.models[role], *mesh) for role, mesh in given.items()}
+    parts = send_meshes(comms, divided, ranks)
+    first_mesh = next(iter(divided.meshes.values()), None)
+    dolfinx_api.compile_ahead(comms.world, first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
+    meshes = {role: distribute(comms.models[role], *part) for role, part in parts.items()}
 
     def pieces_of(role: Role) -> Pieces:
         return make_pieces(meshes[role], divided.tables[role], request.part_materials, request.formulation)
@@ -96,31 +103,35 @@ def distributed(
 
 
 def assembled(
-    comms: Communicators, divided: Divided[TablesT_co], pieces: Mapping[Role, Pieces], kinematics: Kinematics
+    comms: Communicators, divided: DividedModels[TablesT_co], pieces: Mapping[Role, Pieces], kinematics: Kinematics
 ) -> dict[Role, Body]:
-    """Assemble the bodies of this rank's models, each for its step; collective."""
+    """Assemble the bodies of this rank's models with their time steps; collective."""
     bodies = {}
-    for role, own in pieces.items():
-        factor = divided.mass_factors[role][own.local.cell_numbers]
+    for role, elements in pieces.items():
+        factor = divided.mass_factors[role][elements.local.cell_numbers]
         response = ForceOptions(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
-        body = make_body(comms.models[role], own, divided.tables[role], factor, response)
-        bodies[role] = divided.initial.begin(role, body, own.materials) if divided.initial else body
+        body = make_body(comms.models[role], elements, divided.tables[role], factor, response)
+        bodies[role] = divided.initial.begin(role, body, elements.materials) if divided.initial else body
     return bodies
 
 
-Given = tuple[MeshData | None, NDArray[np.int32] | None]
+MeshAndRanks = tuple[MeshData | None, NDArray[np.int32] | None]
 
 
-def hand_over(
-    comms: Communicators, divided: Divided[Tables], ranks: Mapping[Role, NDArray[np.int32]]
-) -> dict[Role, Given]:
-    """Return mesh and ranks of cells of this rank's models: None on all but the first that carries one; collective."""
+def send_meshes(
+    comms: Communicators, divided: DividedModels[Tables], ranks: Mapping[Role, NDArray[np.int32]]
+) -> dict[Role, MeshAndRanks]:
+    """Send mesh and cell ranks of each model from rank 0 to the first rank of the model; collective.
+
+    Returns:
+        Mesh and cell ranks of this rank's models, (None, None) where this rank is not the first of the model.
+    """
     world = comms.world
-    given: dict[Role, Given] = dict.fromkeys(comms.models, (None, None))
+    received: dict[Role, MeshAndRanks] = dict.fromkeys(comms.models, (None, None))
     for role, first in comms.first.items():
-        whole = divided.meshes.get(role), ranks.get(role)
+        message = divided.meshes.get(role), ranks.get(role)
         if world.rank == 0 and first:
-            world.send(whole, first)
+            world.send(message, first)
         elif world.rank == first:
-            given[role] = world.recv(source=0) if first else whole
-    return given
+            received[role] = world.recv(source=0) if first else message
+    return received

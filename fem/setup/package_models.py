@@ -1,4 +1,4 @@
-"""From the meshes of a package on a board to its models on each rank."""
+"""Set-up of the models of a package on a board, from its meshes to the bodies on each rank."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,35 +20,36 @@ from reflowshock.fem.loads.shock_loads import check_shaken
 from reflowshock.fem.mesh.column import COPY
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
 from reflowshock.fem.model.assembly import make_body, make_pieces
-from reflowshock.fem.model.attachments import attached, bedded_steps, beddings_of
+from reflowshock.fem.model.attachments import beddings_of, with_attachments, with_support_stiffness
 from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.fittings import AXES, Fittings
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.setup.models import Divided, Model, assembled, distributed, divided_on_root, treatment_of
+from reflowshock.fem.setup.models import DividedModels, Model, assembled, distributed, divided_on_root, treatment_of
 from reflowshock.fem.statics.initial_state import Cooling, InitialState
 from reflowshock.materials.roles import role_of_part
 
-COARSE = "board"  # role of the boxes that velocities are held in
+COARSE = "board"  # material role of the macro model
 
 
-def divided_package(world: MPI.Comm, request: RunInput) -> Divided[JointTables]:
-    """Read, check and divide all meshes on rank 0, and tell the other ranks; collective.
+def divided_package(world: MPI.Comm, request: RunInput) -> DividedModels[JointTables]:
+    """Read, check and divide all meshes on rank 0, and broadcast the result; collective.
 
     Raises:
-        AgreedError: Meshes that do not fit; on every rank.
+        AgreedError: The meshes do not fit the input; on every rank.
     """
     return divided_on_root(world, lambda: divided_on_one_rank(request))
 
 
-def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
-    """Read, check and divide all meshes; errors as ``read_package``, ``division.checks``."""
+def divided_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
+    """Read, check and divide all meshes; raises as ``read_package`` and ``division.checks``."""
     shock = request.shock
     whole = joined(with_neighbours(read_package(request), request.packages))
     fitted = fitted_board(whole, request)
-    plain = survey(whole.mesh, request.materials, treatment_of(request))
-    found = on_springs(plain, whole.mesh, fitted, request.supports)
+    treatment = treatment_of(request, request.numerics.mass_scaled_step)
+    unsupported = survey(whole.mesh, request.materials, treatment)
+    elements = on_springs(unsupported, whole.mesh, fitted, request.supports)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name))
     sprung = bool(fitted and fitted.bedded)
     rules = Rules.of_shock(shock, coarse, shock.decided_duration, sprung=sprung, cooled=bool(request.cooling))
@@ -57,36 +58,36 @@ def divided_on_one_rank(request: RunInput) -> Divided[JointTables]:
     if request.one_way:
         copied, copy = copied_joints(whole.mesh)
         rules = replace(rules, copied=copied, copy=copy)
-    division = divide(whole, found, rules)
-    steps = steps_of_division(whole, found, division, rules)
+    division = divide(whole, elements, rules)
+    steps = steps_of_division(whole, elements, division, rules)
     if fitted:
         steps = replace(steps, model_mass=steps.model_mass + float(fitted.masses[1].sum()))
     held = held_by(request)
     if request.mode == "dns":
-        steps = undivided(steps, float(found.step.min()), rules)
+        steps = undivided(steps, float(elements.step.min()), rules)
         inputs = model_inputs(whole, "dns", held, shock.joint_layer, fitted)
     else:
-        check_division(whole, found, division, rules)
+        check_division(whole, elements, division, rules)
         inputs = model_inputs(whole, division, held, shock.joint_layer, fitted)
     check_shaken([item.tables for item in inputs.values()], shock)
     first = next(iter(inputs.values()))
-    return Divided(
+    return DividedModels(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
-        mass_factors={role: found.factor[item.cells] for role, item in inputs.items()},
+        mass_factors={role: elements.factor[item.cells] for role, item in inputs.items()},
         steps=steps,
         rules=rules,
         scheme=division.scheme,
         coupling={"direction": shock.coupling.direction}
-        | coupling_record(division, found, len(first.tables.interface)),
-        initial=InitialState.of(Cooling.read(request.cooling), whole, inputs, not found.linear.all())
+        | coupling_record(division, elements, len(first.tables.interface)),
+        initial=InitialState.of(Cooling.read(request.cooling), whole, inputs, not elements.linear.all())
         if request.cooling
         else None,
     )
 
 
 def fitted_board(whole: Whole, request: RunInput) -> FittedTable | None:
-    """Return what is fitted to the board, None where nothing is; errors as ``fitted``."""
+    """Return the fittings of the board as tables, None if there are none; raises as ``fitted_to``."""
     if not any(getattr(request, name) for name in Fittings.model_fields):
         return None
     board = whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and COPY not in name)
@@ -94,7 +95,7 @@ def fitted_board(whole: Whole, request: RunInput) -> FittedTable | None:
 
 
 def held_by(request: RunInput) -> dict[str, tuple[int, ...]]:
-    """Return what is held, as ``HELD``: the walls of the holes, unless supports or a large mass hold them otherwise."""
+    """Return the fixed components by facet set, as in ``HELD``, for hole walls, supports or a large mass."""
     if request.shock.method == "large_mass":
         return SYMMETRY
     if not request.supports:
@@ -104,54 +105,56 @@ def held_by(request: RunInput) -> dict[str, tuple[int, ...]]:
 
 
 def build_package(
-    comms: Communicators, divided: Divided[JointTables], request: RunInput, ranks: Mapping[Role, NDArray[np.int32]]
+    comms: Communicators,
+    divided: DividedModels[JointTables],
+    request: RunInput,
+    ranks: Mapping[Role, NDArray[np.int32]],
 ) -> tuple[dict[Role, Model[JointTables]], Steps]:
     """Distribute and assemble the models of this rank; collective.
 
     Args:
-        comms: Communicators.
-        divided: The models.
-        request: The input.
-        ranks: On rank 0, of each model on several ranks, the rank ``(ne,)`` of each cell.
+        comms: Communicators of the run and of its models.
+        divided: Models before distribution.
+        request: Input of the run.
+        ranks: Rank of each cell, shape (ne,), of every model that is on several ranks; used on rank 0.
 
     Returns:
-        The models, and the steps: those of a DNS may be larger than what its elements allow each on its own.
+        Models of this rank, and the time steps, which power iteration may increase in a DNS.
     """
     steps = divided.steps
     pieces = distributed(comms, divided, ranks, request)
     beddings = {
-        role: beddings_of(own.local, divided.tables[role].fitted, request.supports) for role, own in pieces.items()
+        role: beddings_of(part.local, divided.tables[role].fitted, request.supports) for role, part in pieces.items()
     }
     for role, springs in beddings.items():
         for bedding in springs:
-            pieces[role] = bedded_steps(pieces[role], bedding)
+            pieces[role] = with_support_stiffness(pieces[role], bedding)
     if "dns" in pieces and request.numerics.critical_step == "power_iteration":
         factor = divided.mass_factors["dns"][pieces["dns"].local.cell_numbers]
-        model = pieces["dns"], divided.tables["dns"]
-        found = assembled_step(comms.models["dns"], model, factor, beddings["dns"])
-        alone = agreed_minimum(comms.world, [pieces["dns"].steps * np.sqrt(factor)])
-        steps = undivided(steps, max(found, alone), divided.rules)
+        whole_step = assembled_step(comms.models["dns"], pieces["dns"], divided.tables["dns"], factor, beddings["dns"])
+        element_step = agreed_minimum(comms.world, [pieces["dns"].steps * np.sqrt(factor)])
+        steps = undivided(steps, max(whole_step, element_step), divided.rules)
     bodies = assembled(comms, replace(divided, steps=steps), pieces, request.kinematics)
     models = {
-        role: Model(table := divided.tables[role], attached(body, table.fitted.masses, beddings[role]))
+        role: Model(table := divided.tables[role], with_attachments(body, *table.fitted.masses, beddings[role]))
         for role, body in bodies.items()
     }
     return models, steps
 
 
 def elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
-    """Return all of a package on its board as one linear elastic model on this rank alone, and its mass [kg].
+    """Return package and board as one linear elastic model on a single rank, and its mass [kg].
 
-    Its joints are coarse where there is a mesh of coarse ones: they change no mode of the board.
+    Coarse joints are used if a mesh of them exists, since the modes of the board do not depend on joint details.
     """
     coupling = request.shock.coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
     meshes = (request.meshes[0], request.coarse_joints) if request.coarse_joints else request.meshes
     shock = request.shock.model_copy(update={"coupling": coupling, "method": "direct"})
-    alone = request.model_copy(update={"shock": shock, "meshes": meshes, "watch": {}, "gauges": {}})
-    whole = joined(with_neighbours(read_package(alone), request.packages))
-    given = model_inputs(whole, "dns", held_by(alone), shock.joint_layer, fitted_board(whole, alone))["dns"]
-    tables, local = given.tables, distribute(MPI.COMM_SELF, given.mesh)
+    single = request.model_copy(update={"shock": shock, "meshes": meshes, "watch": {}, "gauges": {}})
+    whole = joined(with_neighbours(read_package(single), request.packages))
+    model = model_inputs(whole, "dns", held_by(single), shock.joint_layer, fitted_board(whole, single))["dns"]
+    tables, local = model.tables, distribute(MPI.COMM_SELF, model.mesh)
     pieces = make_pieces(local, tables, request.materials, request.formulation)
     body = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), None)
-    body = attached(body, tables.fitted.masses, beddings_of(local, tables.fitted, request.supports))
+    body = with_attachments(body, *tables.fitted.masses, beddings_of(local, tables.fitted, request.supports))
     return Model(tables, body), float(body.mass.sum())

@@ -1,1 +1,1 @@
-"""Quasi-static problems: board and package during reflow, residual stress of cooling."""
+"""Quasi-static problems: board and package during reflow, residual stress of cooling; start with `structure.py`."""

@@ -1,9 +1,9 @@
-"""Static equilibrium of a body whose parts want to expand differently: one factor, and Newton's method where it yields.
+"""Static equilibrium of a body under thermal expansion, by Newton's method with one elastic factorisation.
 
-The stress has a convex potential (``kernels.hencky``): each linear system is symmetric and positive, and conjugate
-gradients with the elastic factor as preconditioner solve it in few products, since the tangent is at most as stiff as
-the elastic body. A step that ends beyond the least energy on its way is cut where the slope changes sign. Only the
-limits of hourglass forces (``kernels.nonlinear_one_point``) have no potential: there convergence is linear.
+The stress has a convex potential (``kernels.hencky``), so each linear system is symmetric and positive definite.
+Conjugate gradients preconditioned by the elastic factor solve it in few products, since the tangent is at most as stiff
+as the elastic body. A line search shortens a Newton step that passes the minimum of the energy along its direction.
+Only the limits of hourglass forces (``kernels.nonlinear_one_point``) have no potential; there convergence is linear.
 """
 
 from collections.abc import Sequence
@@ -24,20 +24,20 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.statics.hencky import HenckyElements, free_expansion
 from reflowshock.materials.parameters import Material
 
-CONVERGED = 1e-11  # force out of balance over the forces that hold free expansion back
+CONVERGED = 1e-11  # residual force relative to the force that suppresses free expansion
 ITERATIONS, PRODUCTS, LINE_SEARCHES = 50, 500, 12
-OVERSHOOT = 0.5  # of the slope at its start is where a step along a direction ends at most
-LOOSEST = 0.1  # of the force out of balance: what conjugate gradients may leave of it (Eisenstat & Walker 1996)
+OVERSHOOT = 0.5  # largest slope at the end of a step, as a fraction of the slope at its start
+LOOSEST = 0.1  # largest relative tolerance of conjugate gradients (Eisenstat & Walker 1996)
 
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """What was found.
+    """Converged displacement with its convergence history.
 
     Attributes:
-        displacement: ``(n, 3)`` [m], slaves with their masters.
-        residuals: Force out of balance after each iteration, over the forces that hold free expansion back.
-        products: Products with tangents, each with a solution by the factor.
+        displacement: Displacement, slaves included, shape (n, 3) [m].
+        residuals: Residual force after each iteration, relative to the force that suppresses free expansion.
+        products: Number of products with the tangent, each with one solution by the factor.
     """
 
     displacement: NDArray[np.float64]
@@ -48,9 +48,15 @@ class Equilibrium:
 def thermal_force(
     body: Body, chosen: NDArray[np.bool_] | slice, materials: Sequence[Material], change: float
 ) -> NDArray[np.float64]:
-    """Return the forces ``(n, 3)`` [N] by which some elements, held at rest, want to expand.
+    """Return the nodal forces of suppressed thermal expansion of selected elements, shape (n, 3) [N].
 
-    The mean gradients of a constant stress are exact for all elements: they pass the patch test.
+    All elements pass the patch test, so their mean gradients are exact for a constant stress.
+
+    Args:
+        body: Model on this rank.
+        chosen: Selected elements, shape (ne,), or a slice.
+        materials: Material of each index of ``body.elements``.
+        change: Temperature change [K].
     """
     elements = body.elements.subset(np.arange(len(body.elements.cells))[chosen])
     strain = np.zeros((len(materials), 6))
@@ -64,10 +70,10 @@ def thermal_force(
 
 
 class Statics:
-    """The static problem of a change of temperature on one rank; all methods are collective.
+    """Static problem of a temperature change on one rank; all methods are collective.
 
     Attributes:
-        scale: Magnitude [N] of the forces that hold free expansion back.
+        scale: Norm of the force that suppresses free expansion [N].
     """
 
     def __init__(self, comm: MPI.Comm, body: Body, materials: Sequence[Material], change: float) -> None:
@@ -75,12 +81,12 @@ class Statics:
 
         Args:
             comm: Communicator of the body.
-            body: Its supports hold all rigid motions; whatever its force terms.
+            body: Model on this rank, with supports against all rigid-body motions; its force terms are not used.
             materials: Material of each index of ``body.elements``.
-            change: Of temperature [K].
+            change: Temperature change [K].
 
         Raises:
-            AgreedError: The supports leave a rigid motion, or memory ran out; on every rank.
+            AgreedError: A rigid-body motion is unconstrained, or memory ran out; on every rank.
         """
         self._comm, self._body = comm, body
         yields = np.array([material.plasticity is not None for material in materials])[body.elements.material]
@@ -96,53 +102,53 @@ class Statics:
 
     @property
     def memory(self) -> float:
-        """Return the memory of the factor on all ranks [B]."""
+        """Memory of the factor on all ranks [B]."""
         return self._factor.cost.memory
 
     def free(self) -> None:
-        """Give the factor's memory back."""
+        """Free the memory of the factor."""
         self._factor.free()
 
     def solve(self) -> Equilibrium:
-        """Find the equilibrium.
+        """Solve for the equilibrium.
 
         Raises:
-            AgreedError: Forces stay out of balance; on every rank.
+            AgreedError: The iteration does not converge; on every rank.
         """
-        place = self._solution(self._right)
+        displacement = self._solution(self._right)
         residuals, products = [], 0
         if not self.scale > 0.0:
-            return Equilibrium(place, (0.0,), 0)
-        force, tangents = self._state(place)
+            return Equilibrium(displacement, (0.0,), 0)
+        force, tangents = self._state(displacement)
         for _ in range(ITERATIONS):
             residuals.append(float(np.sqrt(self._dot(force, force))) / self.scale)
             if residuals[-1] <= CONVERGED:
-                return Equilibrium(place, tuple(residuals), products)
+                return Equilibrium(displacement, tuple(residuals), products)
             progress = residuals[-1] / residuals[-2] if len(residuals) > 1 else 1.0
-            step, needed = self._newton_step(force, tangents, min(LOOSEST, progress**2))
-            products += needed
-            place, force, tangents = self._along(place, step, float(self._dot(step, force)))
+            step, step_products = self._newton_step(force, tangents, min(LOOSEST, progress**2))
+            products += step_products
+            displacement, force, tangents = self._line_search(displacement, step, float(self._dot(step, force)))
         raise AgreedError(
-            f"cooling: forces out of balance by {residuals[-1]:.2e} of those that hold expansion back after"
-            f" {ITERATIONS} iterations, allowed are {CONVERGED:g}"
+            f"cooling: residual force {residuals[-1]:.2e} of the force that suppresses expansion after"
+            f" {ITERATIONS} iterations; allowed: {CONVERGED:g}"
         )
 
-    def _along(
-        self, place: NDArray[np.float64], step: NDArray[np.float64], slope: float
+    def _line_search(
+        self, displacement: NDArray[np.float64], step: NDArray[np.float64], slope: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[InternalForce]]:
-        """Go along a step, not beyond the least energy on the way; return place, force out of balance, tangents."""
+        """Take a step, shortened to the minimum of the energy; return displacement, residual force and tangents."""
         length = 1.0
         for _ in range(LINE_SEARCHES):
-            there = place + length * step
-            force, tangents = self._state(there)
-            after = self._dot(step, force)
-            if after >= -OVERSHOOT * slope:
+            trial = displacement + length * step
+            force, tangents = self._state(trial)
+            trial_slope = self._dot(step, force)
+            if trial_slope >= -OVERSHOOT * slope:
                 break
-            length *= slope / (slope - after)
-        return there, force, tangents
+            length *= slope / (slope - trial_slope)
+        return trial, force, tangents
 
     def _state(self, displacement: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[InternalForce]]:
-        """Return the force out of balance ``(n, 3)`` [N], of free components, and the terms of the tangent."""
+        """Return the residual force of the free components, shape (n, 3) [N], and the terms of the tangent."""
         force = self._load.copy()
         tangents: list[InternalForce] = list(self._terms)
         for term in self._terms:
@@ -156,34 +162,34 @@ class Statics:
     def _newton_step(
         self, force: NDArray[np.float64], tangents: Sequence[InternalForce], tolerance: float
     ) -> tuple[NDArray[np.float64], int]:
-        """Solve tangent times step = force by preconditioned conjugate gradients; return also the products."""
-        step, rest = np.zeros_like(force), force.copy()
-        wanted = tolerance * np.sqrt(self._dot(force, force))
-        better = self._solution(rest)
-        direction, product = better.copy(), self._dot(rest, better)
+        """Solve tangent times step = force by preconditioned conjugate gradients; return also the product count."""
+        step, residual = np.zeros_like(force), force.copy()
+        limit = tolerance * np.sqrt(self._dot(force, force))
+        preconditioned = self._solution(residual)
+        direction, product = preconditioned.copy(), self._dot(residual, preconditioned)
         count = 0
-        while count < PRODUCTS and np.sqrt(self._dot(rest, rest)) > wanted:
-            pull = np.zeros_like(force)
+        while count < PRODUCTS and np.sqrt(self._dot(residual, residual)) > limit:
+            internal = np.zeros_like(force)
             for term in tangents:
-                term.add(direction, pull)
-            self._gather(pull)
-            length = -product / self._dot(direction, pull)
+                term.add(direction, internal)
+            self._gather(internal)
+            length = -product / self._dot(direction, internal)
             step += length * direction
-            rest += length * pull
+            residual += length * internal
             count += 1
-            better = self._solution(rest)
-            before, product = product, self._dot(rest, better)
-            direction = better + product / before * direction
+            preconditioned = self._solution(residual)
+            previous, product = product, self._dot(residual, preconditioned)
+            direction = preconditioned + product / previous * direction
         return step, count
 
     def _gather(self, force: NDArray[np.float64]) -> None:
-        """Move forces of slaves to their masters, add up all ranks, and leave out what is held."""
+        """Move forces of slaves to their masters, sum over ranks, and set fixed components to zero."""
         self._body.tie.gather(force)
         self._body.shared.add(force)
         force[~self._body.free] = 0.0
 
     def _solution(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement of the elastic body under forces ``(n, 3)`` [N], equal on all copies."""
+        """Return the displacement of the elastic body under nodal forces, shape (n, 3) [N]."""
         right, solution = self._vectors
         right.array = force[self._equations.own]
         self._factor.solve(right, solution)
@@ -192,6 +198,6 @@ class Statics:
         return displacement
 
     def _dot(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-        """Return a sum over all free components of all ranks."""
+        """Return the scalar product over the free components of all ranks."""
         own = self._equations.own
         return float(self._comm.allreduce(float(first[own] @ second[own])))

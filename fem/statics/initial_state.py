@@ -1,8 +1,9 @@
-"""The state in which a shock begins: a displacement of cooling, from which every stress follows.
+"""Initial stress of a shock after cooling, derived from the displacement of cooling.
 
-Where all is linear and small the motion does not know of it: stresses add. Elsewhere elements that yield or turn begin
-with the stress and plastic strain of their integration points, linear ones with a constant force (``pretension``). Each
-model leaves out what its forces at the interface add up to: the other model's are the opposite.
+If everything is linear and small, the motion does not depend on the initial stress, and stresses add. Otherwise
+path-dependent and corotational elements start with the stress and plastic strain of their integration points, and
+linear elements carry a constant force (``pretension``). At the coupling interface each model leaves out the sum of its
+initial forces, which the forces of the other model would cancel.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,17 +28,17 @@ from reflowshock.fem.statics.equilibrium import thermal_force
 from reflowshock.fem.statics.hencky import HenckyElements, free_expansion
 from reflowshock.materials.parameters import Material
 
-SAME = 1e-9  # of the size of a mesh: how far nodes of the file may be from its own
+SAME = 1e-9  # largest distance between nodes of equal meshes, relative to the size of the mesh
 
 
 @dataclass(frozen=True, slots=True)
 class Cooling:
-    """What cooling did to a whole mesh, in its numbers.
+    """Displacement of cooling at the nodes of a joined mesh.
 
     Attributes:
-        points: ``(n, 3)`` [m] where it was free of stress.
-        displacement: ``(n, 3)`` [m] since.
-        change: Of temperature [K].
+        points: Stress-free positions of the nodes, shape (n, 3) [m].
+        displacement: Displacement by cooling, shape (n, 3) [m].
+        change: Temperature change [K].
     """
 
     points: NDArray[np.float64]
@@ -45,38 +46,38 @@ class Cooling:
     change: float
 
     def write(self, path: Path) -> None:
-        """Write a file that ``read`` reads."""
+        """Write the cooling file."""
         np.savez(path, points=self.points, displacement=self.displacement, change=self.change)
 
     @classmethod
     def read(cls, path: Path) -> "Cooling":
-        """Read what ``write`` wrote."""
+        """Read a cooling file written by ``write``."""
         with np.load(path) as arrays:
             return cls(arrays["points"], arrays["displacement"], float(arrays["change"]))
 
     def check(self, whole: Whole) -> None:
-        """Compare with a mesh.
+        """Check that a mesh is the one that was cooled.
 
         Raises:
-            MeshError: It is another one.
+            MeshError: The meshes differ.
         """
         points = whole.mesh.points
         size = float(np.ptp(points, axis=0).max())
         if points.shape != self.points.shape or np.abs(points - self.points).max() > SAME * size:
             raise MeshError(
-                f"the residual stress is that of a mesh with {len(self.points)} nodes, other than these {len(points)}:"
-                " cooling and shock need the same fine joints"
+                f"the residual stress belongs to another mesh ({len(self.points)} nodes, this mesh has {len(points)});"
+                " use the same fine joints for cooling and shock"
             )
 
 
 @dataclass(frozen=True, slots=True)
 class InitialState:
-    """How the models of a run begin.
+    """Initial state of the models of a run.
 
     Attributes:
-        displacement: Role -> ``(n, 3)`` [m] of the model's nodes, in its numbers.
-        change: Of temperature [K].
-        path: Whether any element of the run yields or turns.
+        displacement: Displacement of cooling at the nodes of each model, shape (n, 3) [m].
+        change: Temperature change [K].
+        path: Whether an element of the run yields or has finite rotations.
     """
 
     displacement: Mapping[Role, NDArray[np.float64]]
@@ -87,7 +88,7 @@ class InitialState:
     def of(
         cls, cooling: Cooling, whole: Whole, inputs: Mapping[Role, ModelInput[TablesT_co]], path: bool
     ) -> "InitialState":
-        """Take each model's nodes from those of the whole mesh; errors as ``Cooling.check``."""
+        """Select the nodes of each model from the joined mesh; raises as ``Cooling.check``."""
         cooling.check(whole)
         displacement = {}
         for role, item in inputs.items():
@@ -96,63 +97,67 @@ class InitialState:
         return cls(displacement, cooling.change, path)
 
     def begin(self, role: Role, body: Body, materials: Sequence[Material]) -> Body:
-        """Return a body that begins in this state; collective over its model.
+        """Return a body with this initial state; collective over its model.
 
         Args:
-            role: Of the model.
-            body: At rest, free of stress.
+            role: Role of the model.
+            body: Stress-free body at rest.
             materials: Material of each index of its elements.
         """
         displacement = np.ascontiguousarray(self.displacement[role][body.local.nodes])
-        return begun(body, materials, displacement, self.change, self.path)
+        return with_initial_stress(body, materials, displacement, self.change, self.path)
 
 
-def begun(
+def with_initial_stress(
     body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float, path: bool
 ) -> Body:
-    """Return a body that begins with the stress of cooling; collective over its model.
+    """Return a body with the residual stress of cooling; collective over its model.
 
     Args:
-        body: At rest, free of stress.
+        body: Stress-free body at rest.
         materials: Material of each index of its elements.
-        displacement: ``(n, 3)`` [m] of cooling.
-        change: Of temperature [K].
-        path: Whether elements of any model yield or turn.
+        displacement: Displacement of cooling, shape (n, 3) [m].
+        change: Temperature change [K].
+        path: Whether an element of any model yields or has finite rotations.
     """
     initial = mean_stress(body, materials, displacement, change)
-    begin = partial(begin_path, materials=materials, displacement=displacement, change=change)
+    begin = partial(set_initial_points, materials=materials, displacement=displacement, change=change)
     body = replace(body, initial_stress=initial, begin=begin)
-    return with_forces(body, materials, displacement, change) if path else body
+    return with_initial_forces(body, materials, displacement, change) if path else body
 
 
 def mean_stress(
     body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
 ) -> NDArray[np.float64]:
-    """Return the elastic mean stress ``(ne, 6)`` [Pa] of all elements after a change of temperature [K]."""
+    """Return the elastic mean stress of all elements after a temperature change [K], shape (ne, 6) [Pa]."""
     elements = body.elements
     expansion = free_expansion(materials, change)[elements.material]
     straining = displacement[elements.cells] - expansion[:, None] * elements.points[elements.cells]
     return element_stress(body.geometry.gradient, elements.elasticity[elements.material], straining)
 
 
-def with_forces(body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float) -> Body:
-    """Return a body whose elements bear their stress, but for the sums of their forces at the interface; collective."""
+def with_initial_forces(
+    body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
+) -> Body:
+    """Return a body whose elements carry their initial stress, without resultants at the interface; collective."""
     linear = [term for term in body.terms if not isinstance(term, NonlinearElements)]
     chosen = np.ones(len(body.elements.cells), dtype=bool)
     for term in body.terms:
         if isinstance(term, NonlinearElements):
             chosen[term.numbers] = False
-            begin_path(term, materials, displacement, change)
-    pretension = pretension_of(body, chosen, linear, (materials, displacement, change))
+            set_initial_points(term, materials, displacement, change)
+    expanding = thermal_force(body, chosen, materials, change)
+    suppressed = expansion_energy(body, chosen, materials, change)
+    pretension = pretension_of(linear, displacement, expanding, suppressed)
     terms = [*body.terms, pretension]
-    leave_out_interface(body, terms, pretension)
+    balance_interface(body, terms, pretension)
     return replace(body, terms=terms)
 
 
-def begin_path(
+def set_initial_points(
     term: NonlinearElements, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
 ) -> None:
-    """Give elements with a path the stress and plastic strain of their points; lanes that repeat one get them, too."""
+    """Set stress and plastic strain at the integration points of path-dependent elements, padding lanes included."""
     points = HenckyElements.build(term.elements, materials, free_expansion(materials, change)).points(displacement)
     order, state = term.lanes.element, by_lane(term.history["state"])
     state[..., :6] = points.stress[order]
@@ -163,40 +168,44 @@ def begin_path(
         by_lane(term.history["slip"])[...] = -in_modes(points.stretched)[order]
 
 
-def pretension_of(
-    body: Body,
-    chosen: NDArray[np.bool_],
-    linear: Sequence[ForceTerm],
-    cooled: tuple[Sequence[Material], NDArray[np.float64], float],
-) -> Pretension:
-    """Return force and energy of linear elements at no displacement of the shock.
-
-    Args:
-        body: The body.
-        chosen: ``(ne,)`` its linear elements.
-        linear: Their terms.
-        cooled: Materials, displacement ``(n, 3)`` [m] of cooling, change of temperature [K].
-    """
-    materials, displacement, change = cooled
-    expanding = thermal_force(body, chosen, materials, change)
-    force = np.zeros_like(displacement)
-    for term in linear:
-        term.add(displacement, force)
+def expansion_energy(
+    body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float
+) -> float:
+    """Return the elastic energy of suppressed thermal expansion of selected elements, shape (ne,) [J]."""
     strain = np.zeros((len(materials), 6))
     strain[:, :3] = free_expansion(materials, change)
     density = 0.5 * np.einsum("mi,mij,mj->m", strain, body.elements.elasticity, strain)[body.elements.material]
-    held_back = float(density[chosen] @ body.geometry.volume[chosen])
-    stored = held_back - float(np.vdot(displacement, expanding + 0.5 * force))
+    return float(density[chosen] @ body.geometry.volume[chosen])
+
+
+def pretension_of(
+    linear: Sequence[ForceTerm],
+    displacement: NDArray[np.float64],
+    expanding: NDArray[np.float64],
+    suppressed: float,
+) -> Pretension:
+    """Return initial force and energy of the linear elements.
+
+    Args:
+        linear: Force terms of the linear elements.
+        displacement: Displacement of cooling, shape (n, 3) [m].
+        expanding: Nodal forces of suppressed thermal expansion, shape (n, 3) [N].
+        suppressed: Energy of suppressed thermal expansion [J].
+    """
+    force = np.zeros_like(displacement)
+    for term in linear:
+        term.add(displacement, force)
+    stored = suppressed - float(np.vdot(displacement, expanding + 0.5 * force))
     return Pretension(-force - expanding, stored)
 
 
-def leave_out_interface(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
-    """Let the forces of all terms on nodes of the interface add up to zero; collective."""
+def balance_interface(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
+    """Adjust the pretension so that the initial forces at interface nodes add up to zero; collective."""
     rest, force = np.zeros_like(pretension.force), np.zeros_like(pretension.force)
     for term in terms:
         term.add(rest, force)
     body.tie.gather(force)
     body.shared.add(force)
-    here = body.interface[body.interface >= 0]
-    here = here[body.shared.owned[here]]
-    pretension.force[here] += force[here]
+    nodes = body.interface[body.interface >= 0]
+    nodes = nodes[body.shared.owned[nodes]]
+    pretension.force[nodes] += force[nodes]

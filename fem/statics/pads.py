@@ -1,9 +1,8 @@
-"""Mean motion of pads, and its transpose: the solder's wrench on a pad as forces at nodes.
+"""Mean motion P u of pads, and its transpose P^T w: the solder's wrench on a pad as nodal forces.
 
-The motion of a pad is the mean displacement over its wetted disc and the rotation that fits best in the mean square,
-given at the pad's centre, which lies the copper's thickness off the face. Both are linear in the displacement, rigid
-motions come out exactly, and forces from the transpose do the work of the wrench, whatever the mesh:
-w . (P u) = (P^T w) . u.
+The motion of a pad is the mean displacement over its wetted disc and the least-squares rotation, both at the pad's
+centre, which is the copper thickness away from the face. They are linear in the displacement and exact for rigid-body
+motions, and the transpose conserves work on any mesh: w . (P u) = (P^T w) . u.
 """
 
 from collections.abc import Sequence
@@ -19,17 +18,17 @@ from reflowshock.fem.mesh.tie import bilinear, closest_facets
 
 SIDES = ("board_side", "package_side")
 RINGS, ANGLES = 4, 12  # quadrature points on a disc
-OUTSIDE = 1e-6  # of the disc's radius: how far a point of it may be off the faces
+OUTSIDE = 1e-6  # largest distance of a quadrature point from the faces, relative to the radius of the disc
 
 
 @dataclass(frozen=True, slots=True)
 class Pads:
-    """The pads of the joints, side 0 on the board, 1 on the package.
+    """Pads of the joints; side 0 is the board, side 1 the package.
 
     Attributes:
         names: Name of each joint.
-        centres: ``(joints, 2, 3)`` [m] of the wetted discs, as drawn.
-        radii: ``(joints, 2)`` [m].
+        centres: Centres of the wetted discs in the undeformed state, shape (joints, 2, 3) [m].
+        radii: Radii of the wetted discs, shape (joints, 2) [m].
     """
 
     names: Sequence[str]
@@ -38,10 +37,12 @@ class Pads:
 
 
 def pad_matrix(mesh: MeshData, pads: Pads) -> scipy.sparse.csr_matrix:
-    """Return P ``(12 joints, 3 n)``: motion of the pads (joint, side, displacement and rotation) from displacements.
+    """Return the matrix P from nodal displacements to pad motions, shape (12 joints, 3 n).
+
+    Rows are ordered by joint, side, displacement and rotation.
 
     Raises:
-        MeshError: A wetted disc reaches beyond its side.
+        MeshError: A wetted disc extends beyond the face of its side.
     """
     sides = [_side_matrix(mesh, side, pads, number) for number, side in enumerate(SIDES)]
     rows = np.arange(12 * len(pads.names)).reshape(len(pads.names), 2, 6)
@@ -50,10 +51,10 @@ def pad_matrix(mesh: MeshData, pads: Pads) -> scipy.sparse.csr_matrix:
 
 
 def _side_matrix(mesh: MeshData, side: str, pads: Pads, number: int) -> scipy.sparse.csr_matrix:
-    """Return the rows ``(6 joints, 3 n)`` of one side."""
+    """Return the rows of one side, shape (6 joints, 3 n)."""
     facets = mesh.facets_of(side)
     if not len(facets):
-        raise MeshError(f"the mesh has no facets {side}, on which pads lie")
+        raise MeshError(f"the mesh has no facet set {side!r} for the pads")
     offsets, shares = disc_rule(RINGS, ANGLES)
     plane, flat = np.array([1.0, 1.0, 0.0]), mesh.points * [1.0, 1.0, 0.0]
     centre, radius = pads.centres[:, number], pads.radii[:, number]
@@ -72,10 +73,10 @@ def _side_matrix(mesh: MeshData, side: str, pads: Pads, number: int) -> scipy.sp
 
 
 def disc_rule(rings: int, angles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return points ``(q, 3)`` of the unit disc around the z axis and their shares ``(q,)`` in its area.
+    """Return a quadrature rule on the unit disc: points, shape (q, 3), and area fractions, shape (q,).
 
-    Gauss points in the square of the radius times equal angles, symmetric about both axes: exact for polynomials of
-    degree 2 rings - 1 in the square of the radius and below ``angles`` in the angle.
+    The rule is a product of Gauss points in the squared radius and equally spaced angles, symmetric about both axes. It
+    is exact for polynomials of degree 2 rings - 1 in the squared radius and below ``angles`` in the angle.
     """
     nodes, weights = np.polynomial.legendre.leggauss(rings)
     radius = np.repeat(np.sqrt(0.5 * (1.0 + nodes)), angles)
@@ -87,25 +88,25 @@ def disc_rule(rings: int, angles: int) -> tuple[NDArray[np.float64], NDArray[np.
 def _functional(
     radius: NDArray[np.float64], arm: NDArray[np.float64], offsets: NDArray[np.float64], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the weights ``(joints, 6, q, 3)`` of displacements at quadrature points in the motion of each pad."""
+    """Return the weights of quadrature-point displacements in the pad motions, shape (joints, 6, q, 3)."""
     axes = np.eye(3)
     mean = np.broadcast_to(shares[None, :, None] * axes[:, None, :], (len(radius), 3, len(shares), 3))
-    # The mean of x^2 over a disc is a^2 / 4; a turn about z takes both x and y.
-    turning = (
+    # The mean of x^2 over a disc is a^2 / 4; a rotation about z involves both x and y.
+    rotation = (
         np.cross(axes[:, None, :], offsets[None]) * shares[None, :, None] * np.array([4.0, 4.0, 2.0])[:, None, None]
     )
-    turn = turning[None] / radius[:, None, None, None]
-    levers = np.cross(axes[None, :, :], arm[:, None, :])  # (joints, axis of the turn, component)
+    turn = rotation[None] / radius[:, None, None, None]
+    levers = np.cross(axes[None, :, :], arm[:, None, :])  # (joints, rotation axis, component)
     shift = mean + np.einsum("jki,jkqc->jiqc", levers, turn)
     return np.concatenate([shift, turn], axis=1)
 
 
 def _check_inside(distance: NDArray[np.float64], side: str, pads: Pads, number: int) -> None:
-    """Raise ``MeshError`` where points ``(joints, q)`` of a disc are off the side by some ``distance`` [m]."""
+    """Raise ``MeshError`` if a quadrature point is off the face, by its distance, shape (joints, q) [m]."""
     worst = distance.max(axis=1) / pads.radii[:, number]
     joint = int(np.argmax(worst))
     if worst[joint] > OUTSIDE:
         raise MeshError(
-            f"the wetted disc of {pads.names[joint]}, radius {1e3 * pads.radii[joint, number]:.4g} mm, reaches"
+            f"the wetted disc of {pads.names[joint]}, radius {1e3 * pads.radii[joint, number]:.4g} mm, extends"
             f" {1e3 * distance[joint].max():.4g} mm beyond {side}"
         )

@@ -1,4 +1,4 @@
-"""Board and package that neither expand nor bend: for a reflow where nothing is flexible, but the package floats."""
+"""Rigid board and package, for a reflow in which the package floats but nothing expands or bends."""
 
 from functools import cached_property
 
@@ -15,19 +15,19 @@ from reflowshock.materials.roles import materials_of_parts
 
 
 class RigidPlates:
-    """``state.Structure`` of rigid plates; the package floats, or is lifted as its die's corners are.
+    """Rigid plates as a ``HeatedStructure``; the package floats, or follows the die corners.
 
     Attributes:
-        points: ``(n, 3)`` [m] nodes as drawn, each once.
-        package: ``(n,)`` whether a node belongs to the package.
-        rigid_modes: Free motions of the package.
+        points: Nodes in the undeformed state, shape (n, 3) [m].
+        package: Whether a node belongs to the package, shape (n,).
+        rigid_modes: Free rigid-body motions of the package.
     """
 
     def __init__(self, assembly: Assembly) -> None:
         """Read the mesh.
 
         Raises:
-            MeshError: A mesh that does not fit the pads or the materials.
+            MeshError: The mesh does not fit the pads or the materials.
         """
         mesh = connected(read_mesh(assembly.mesh))
         tables = thermal_tables(mesh, assembly.pads.centres[:, 1].mean(axis=0))
@@ -46,14 +46,14 @@ class RigidPlates:
         self._free = fields[~held]
         self._held = fields[held]
         self._shares, self._held_weight = np.linalg.pinv(at_corners[held]), weight[held]
-        names = tuple(name for name, stays in zip(motions.names, held, strict=True) if not stays)
+        names = tuple(name for name, is_held in zip(motions.names, held, strict=True) if not is_held)
         pad_motion = [self._motion(field) for field in self._free]
         shape = (len(names), len(assembly.pads.names), 2, 6)
         self.rigid_modes = RigidModes(names, np.reshape(pad_motion, shape), weight[~held])
 
     @cached_property
     def _held_motion(self) -> NDArray[np.float64]:
-        """Return the motion of the pads for a unit of each motion that corners hold: ``(m, joints, 2, 6)``."""
+        """Pad motion for a unit of each package motion fixed by the corners, shape (m, joints, 2, 6)."""
         return np.array([self._motion(field) for field in self._held]).reshape(
             -1, *self.rigid_modes.pad_motion.shape[1:]
         )
@@ -61,7 +61,7 @@ class RigidPlates:
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
     ) -> HeatedState:
-        """Return the state, see ``state.Structure``; the temperature changes nothing."""
+        """Return the state, see ``HeatedStructure.solve``; the temperature has no effect."""
         check_loads(self.rigid_modes, wrenches, rigid)
         displacement = np.tensordot(rigid, self._free, 1)
         if self._moved:

@@ -1,7 +1,7 @@
-"""A heated structure in a process of its own, apart from the MPI and the memory of what reflows the joints.
+"""Heated structure in a separate process, isolated from the MPI and the memory of the joint reflow.
 
-The process is one rank: its factor is needed once and its solutions take a fraction of a second. It starts to factor
-at once, and is waited for when it is asked for the first time. It ends with its parent, however that ends.
+The process has one rank, since it factors once and each solution takes a fraction of a second. It starts to factor
+immediately; the first request waits for it. It ends with its parent process in any case.
 """
 
 import os
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes
 from reflowshock.processes import ProcessPool
 
@@ -24,14 +24,14 @@ Answer = TypeVar("Answer")
 
 
 class StructureError(RuntimeError):
-    """The structure cannot be built or solved, or its process has ended."""
+    """Failure to build or solve the structure, or end of its process."""
 
 
 class StructureProcess:
-    """``state.Structure`` in a process of its own; a context that ends it."""
+    """``HeatedStructure`` in a separate process; a context manager that ends the process."""
 
     def __init__(self, assembly: Assembly) -> None:
-        """Start to read and to factor."""
+        """Start to read the mesh and to factor."""
         self._pool = ProcessPool(1)
         self._built = self._pool.submit(_build, assembly)
 
@@ -45,23 +45,23 @@ class StructureProcess:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Return the nodes ``(n, 3)`` [m] as drawn; this and all below wait for the factor and raise StructureError."""
+        """Nodes in the undeformed state, shape (n, 3) [m]; waits for the factor and may raise ``StructureError``."""
         return self._answer(self._built)[0]
 
     @property
     def package(self) -> NDArray[np.bool_]:
-        """Return ``(n,)``: whether a node belongs to the package."""
+        """Whether a node belongs to the package, shape (n,)."""
         return self._answer(self._built)[1]
 
     @property
     def rigid_modes(self) -> RigidModes:
-        """Return the free rigid motions of the package."""
+        """Free rigid-body motions of the package."""
         return self._answer(self._built)[2]
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
     ) -> HeatedState:
-        """Return the state at a temperature [K], see ``state.Structure``."""
+        """Return the state at a temperature [K], see ``HeatedStructure.solve``."""
         self._answer(self._built)
         return self._answer(self._pool.submit(_solve, temperature, corner, wrenches, rigid))
 
@@ -69,21 +69,21 @@ class StructureProcess:
         try:
             return future.result()
         except BrokenProcessPool as error:
-            raise StructureError(f"the process of the structure has ended with {self._pool.ending()}") from error
-        except Exception as error:  # whatever it is there, it is the structure's
+            raise StructureError(f"the structure's process ended with {self._pool.ending()}") from error
+        except Exception as error:  # raised in the process
             raise StructureError(str(error)) from error
 
 
-_structure: "ThermalStructure"  # of the process that has built it
+_structure: "ThermalStructure"  # set in the separate process by `_build`
 
 
 def _build(assembly: Assembly) -> tuple[NDArray[np.float64], NDArray[np.bool_], RigidModes]:
-    """Build the structure, and keep it for `_solve`."""
+    """Build the structure and store it for `_solve`."""
     global _structure
-    own = own_environment(os.environ)
+    environment = without_mpi_job(os.environ)
     os.environ.clear()
-    os.environ.update(own)
-    from mpi4py import MPI  # starts MPI, in an environment of its own
+    os.environ.update(environment)
+    from mpi4py import MPI  # starts MPI, outside the job of the parent
 
     from reflowshock.fem.statics.structure import ThermalStructure
 

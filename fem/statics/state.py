@@ -1,4 +1,4 @@
-"""What is asked of board and package during reflow, and what they answer."""
+"""Input, interface and state of board and package during reflow."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,14 +14,14 @@ from reflowshock.materials.roles import Materials
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """Board and package that are heated.
+    """Input for board and package during reflow.
 
     Attributes:
-        mesh: Gmsh file of both, flat as at the reference temperature.
-        pads: Where the joints sit.
+        mesh: Gmsh file of board and package, flat at the reference temperature.
+        pads: Pads of the joints.
         materials: Material of each role.
-        thermal: Course of temperatures; where ``effects.solder_force`` is off, wrenches do not bend anything.
-        gravity: [m/s^2] downwards, along -z.
+        thermal: Temperature profile and effects; without ``effects.solder_force``, wrenches cause no deformation.
+        gravity: Gravity along -z [m/s^2].
     """
 
     mesh: Path
@@ -33,12 +33,13 @@ class Assembly:
 
 @dataclass(frozen=True, slots=True)
 class RigidModes:
-    """Rigid motions of the package that nothing but the solder resists.
+    """Rigid-body motions of the package that only the solder resists.
 
     Attributes:
-        names: Of each: ``x``, ``y``, ``z`` [m], ``turn_x``, ``turn_y``, ``turn_z`` [rad] about the centre of its pads.
-        pad_motion: ``(k, joints, 2, 6)`` motion of the pads for a unit of each.
-        weight: ``(k,)`` [N, N m] force of gravity along each.
+        names: Names of the motions: ``x``, ``y``, ``z`` [m], ``turn_x``, ``turn_y``, ``turn_z`` [rad] about the centre
+            of the pads.
+        pad_motion: Motion of the pads for a unit of each motion, shape (k, joints, 2, 6).
+        weight: Force of gravity along each motion, shape (k,) [N, N m].
     """
 
     names: tuple[str, ...]
@@ -46,18 +47,18 @@ class RigidModes:
     weight: NDArray[np.float64]
 
     def imbalance(self, wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return weight and wrenches ``(joints, 2, 6)`` along each motion ``(k,)`` [N, N m]: zero at rest."""
+        """Return weight plus wrenches, shape (joints, 2, 6), along each motion, shape (k,) [N, N m]; zero at rest."""
         return self.weight + np.tensordot(self.pad_motion, wrenches, 3)
 
 
 @dataclass(frozen=True, slots=True)
 class HeatedState:
-    """Board and package under given loads.
+    """State of board and package under given loads.
 
     Attributes:
-        displacement: ``(n, 3)`` [m] at the nodes.
-        pad_motion: ``(joints, 2, 6)`` displacement [m] and rotation vector [rad] of the pads, board and package.
-        corner_force: ``(c,)`` [N] forces, upwards, that move the corners of the die; none where the package floats.
+        displacement: Nodal displacement, shape (n, 3) [m].
+        pad_motion: Displacement [m] and rotation vector [rad] of the pads on board and package, shape (joints, 2, 6).
+        corner_force: Upward forces that move the die corners, shape (c,) [N]; empty if the package floats.
     """
 
     displacement: NDArray[np.float64]
@@ -66,19 +67,19 @@ class HeatedState:
 
 
 class HeatedStructure(Protocol):
-    """Board and package, elastic or rigid, in this process or another."""
+    """Interface of board and package during reflow, elastic or rigid, in this process or another."""
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Return the nodes ``(n, 3)`` [m] as drawn, each once."""
+        """Nodes in the undeformed state, shape (n, 3) [m]."""
 
     @property
     def package(self) -> NDArray[np.bool_]:
-        """Return ``(n,)``: whether a node belongs to the package."""
+        """Whether a node belongs to the package, shape (n,)."""
 
     @property
     def rigid_modes(self) -> RigidModes:
-        """Return the free rigid motions of the package."""
+        """Free rigid-body motions of the package."""
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
@@ -86,19 +87,19 @@ class HeatedStructure(Protocol):
         """Return the state at a temperature [K].
 
         Args:
-            temperature: [K].
-            corner: Displacement of the die's corners [m], upwards; of no effect where the package floats.
-            wrenches: ``(joints, 2, 6)`` [N, N m] of the solder on the pads, moments about the centres of the pads.
-            rigid: ``(k,)`` [m, rad] amounts of the free rigid motions.
+            temperature: Temperature [K].
+            corner: Upward displacement of the die corners [m]; no effect if the package floats.
+            wrenches: Forces and moments about the pad centres of the solder, shape (joints, 2, 6) [N, N m].
+            rigid: Amplitudes of the free rigid-body motions, shape (k,) [m, rad].
         """
 
 
 def check_loads(modes: RigidModes, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]) -> None:
-    """Raise ``ValueError`` where loads or rigid motions have another shape than the structure, or are no numbers."""
-    for name, given, expected in (
+    """Raise ``ValueError`` if wrenches or rigid motions have a wrong shape or are not finite."""
+    for name, values, expected in (
         ("wrenches", wrenches, modes.pad_motion.shape[1:]),
         ("rigid", rigid, modes.weight.shape),
     ):
-        if np.shape(given) != expected or not np.isfinite(given).all():
-            finite = "" if np.isfinite(given).all() else ", not all finite"
-            raise ValueError(f"{name} has the shape {np.shape(given)}{finite}; wanted are numbers of shape {expected}")
+        if np.shape(values) != expected or not np.isfinite(values).all():
+            finite = "" if np.isfinite(values).all() else ", not all finite"
+            raise ValueError(f"{name} has the shape {np.shape(values)}{finite}; required: finite, shape {expected}")

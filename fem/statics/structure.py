@@ -1,12 +1,13 @@
-"""Package and board while the solder is liquid: how temperature, weight and the solder's wrenches move the pads.
+"""Elastic package and board while the solder is liquid: pad motion under temperature, weight and solder wrenches.
 
-Everything is linear in the loads, so a state is a sum of fields that are found once (a kelvin, the weight, a force at
-each corner of the die that is moved), the answer to the wrenches, and free rigid motions of the package.
+The problem is linear, so a state is a sum of precomputed fields (for one kelvin, the weight, a force at each moved die
+corner), the response to the wrenches, and free rigid-body motions of the package.
 
 The board rests on its holes and sags between them under its weight. Heights count from the mean height of its pads, and
-what the solder pushes on the board in all is borne right there, in equal parts: a board that gave way as a whole, far
-softer than it bends under the package, would only shift the zero (H 4.3, 200 mm between the holes: by 0.5 mm) and make
-the exchange with the solder diverge. In balance that push is the package's weight, unless a tool moves the package.
+the resultant push of the solder on the board is supported directly below the pads, in equal parts. Without this support
+the board would deflect as a whole, much more than it bends under the package (H 4.3, 200 mm between the holes: 0.5 mm);
+that would only shift the zero and make the iteration with the solder diverge. In equilibrium the push is the package's
+weight, unless a tool moves the package.
 """
 
 from dataclasses import dataclass
@@ -28,15 +29,15 @@ from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """Moved corners of a model on one rank; none where the package floats.
+    """Die corners with prescribed height on one rank; none if the package floats.
 
     Attributes:
-        model: The model.
-        nodes: ``(c,)`` local node of each corner, -1 where another rank owns it.
-        fields: ``(c, n, 3)`` [m/N] displacement for a force upwards at each.
-        motions: ``(k, n, 3)`` rigid motions of the package that the corners hold.
-        held: ``(m,)`` whether they hold each of the package's motions.
-        matrix: ``(c + k, c + k)`` as above.
+        model: Thermoelastic model.
+        nodes: Local node of each corner, -1 if another rank owns it, shape (c,).
+        fields: Displacement for a unit upward force at each corner, shape (c, n, 3) [m/N].
+        motions: Rigid-body motions of the package that the corners fix, shape (k, n, 3).
+        held: Whether the corners fix each rigid-body motion of the package, shape (m,).
+        matrix: Saddle-point matrix of corner compliance and fixed motions, shape (c + k, c + k).
     """
 
     model: Thermoelastic
@@ -48,50 +49,51 @@ class Corners:
 
     @classmethod
     def of(cls, model: Thermoelastic, nodes: NDArray[np.int32], package: NDArray[np.float64]) -> "Corners":
-        """Find what forces at corners do; collective.
+        """Compute the response to corner forces; collective.
 
         Args:
-            model: The model.
-            nodes: ``(c,)`` local node of each corner, -1 where this rank does not have it.
-            package: ``(m, n, 3)`` free rigid motions of the package.
+            model: Thermoelastic model.
+            nodes: Local node of each corner, -1 if it is not on this rank, shape (c,).
+            package: Free rigid-body motions of the package, shape (m, n, 3).
         """
         nodes = np.where((nodes >= 0) & model.body.shared.owned[nodes], nodes, -1)
         fields = np.array([model.displacement(push) for push in _pushes(nodes, package.shape[1])])
         fields = fields.reshape(len(nodes), *package.shape[1:])
-        found = cls(model, nodes, fields, package, np.zeros(len(package), bool), np.empty((0, 0)))
-        turned = np.array([found.heights(field) for field in package]).reshape(len(package), len(nodes)).T
-        held = np.abs(turned).max(axis=0, initial=0.0) > 0.0
-        across = turned[:, held]
-        compliance = np.array([found.heights(field) for field in fields]).reshape(len(nodes), len(nodes)).T
-        empty = np.zeros((across.shape[1], across.shape[1]))
-        return cls(model, nodes, fields, package[held], held, np.block([[compliance, across], [across.T, empty]]))
+        corners = cls(model, nodes, fields, package, np.zeros(len(package), bool), np.empty((0, 0)))
+        lifts = np.array([corners.heights(field) for field in package]).reshape(len(package), len(nodes)).T
+        held = np.abs(lifts).max(axis=0, initial=0.0) > 0.0
+        held_lifts = lifts[:, held]
+        compliance = np.array([corners.heights(field) for field in fields]).reshape(len(nodes), len(nodes)).T
+        zeros = np.zeros((held_lifts.shape[1], held_lifts.shape[1]))
+        matrix = np.block([[compliance, held_lifts], [held_lifts.T, zeros]])
+        return cls(model, nodes, fields, package[held], held, matrix)
 
     def heights(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how far the corners move upwards in a displacement ``(n, 3)``: ``(c,)``, collective."""
+        """Return the upward displacement of the corners, shape (c,), in a displacement, shape (n, 3); collective."""
         mine = np.where(self.nodes >= 0, displacement[self.nodes, 2], 0.0)
         return np.asarray(self.model.space.comm.allreduce(mine))
 
     def move(
         self, displacement: NDArray[np.float64], height: float, load: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bring the corners to a height; collective.
+        """Move the corners to a height; collective.
 
         Args:
-            displacement: ``(n, 3)`` [m] without the forces.
-            height: [m].
-            load: ``(m,)`` forces along the package's motions.
+            displacement: Displacement without corner forces, shape (n, 3) [m].
+            height: Upward displacement of the corners [m].
+            load: Forces along the rigid-body motions of the package, shape (m,) [N, N m].
 
         Returns:
-            The displacement with the forces, and the forces ``(c,)`` [N].
+            Displacement with the corner forces, shape (n, 3) [m], and the corner forces, shape (c,) [N].
         """
-        wanted = np.concatenate([height - self.heights(displacement), -load[self.held]])
-        force, rigid = np.split(np.linalg.solve(self.matrix, wanted), [len(self.nodes)])
+        right_side = np.concatenate([height - self.heights(displacement), -load[self.held]])
+        force, rigid = np.split(np.linalg.solve(self.matrix, right_side), [len(self.nodes)])
         moved = displacement + np.tensordot(force, self.fields, 1) + np.tensordot(rigid, self.motions, 1)
         return moved, force
 
 
 def _pushes(nodes: NDArray[np.int32], count: int) -> NDArray[np.float64]:
-    """Return forces of 1 N upwards at each node that this rank owns: ``(c, count, 3)``."""
+    """Return an upward force of 1 N at each node that this rank owns, shape (c, count, 3)."""
     pushes = np.zeros((len(nodes), count, 3))
     mine = np.flatnonzero(nodes >= 0)
     pushes[mine, nodes[mine], 2] = 1.0
@@ -100,13 +102,13 @@ def _pushes(nodes: NDArray[np.int32], count: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class PlacedPads:
-    """What rank 0 takes from the mesh, for all.
+    """Tables of the mesh that rank 0 computes for all ranks.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        tables: Parts, supports, free motions.
-        pads: P of ``pads.pad_matrix``.
-        corners: ``(c,)`` nodes of the die's corners that are moved.
+        points: Nodes of the mesh, shape (n, 3) [m].
+        tables: Parts, supports and free rigid-body motions.
+        pads: Matrix P of ``pads.pad_matrix``.
+        corners: Nodes of the moved die corners, shape (c,).
     """
 
     points: NDArray[np.float64]
@@ -116,29 +118,29 @@ class PlacedPads:
 
 
 class ThermalStructure:
-    """Package and board, factored once; ``state.Structure``.
+    """Elastic package and board, factored once, as a ``HeatedStructure``.
 
     Attributes:
-        points: ``(n, 3)`` [m] nodes as drawn, each once.
-        package: ``(n,)`` whether a node belongs to the package.
-        rigid_modes: What free rigid motions of the package do to its pads.
+        points: Nodes in the undeformed state, shape (n, 3) [m].
+        package: Whether a node belongs to the package, shape (n,).
+        rigid_modes: Free rigid-body motions of the package.
     """
 
-    def __init__(self, comm: MPI.Comm, found: PlacedPads, mesh: MeshData | None, assembly: Assembly) -> None:
-        """Factor, and find what all states have in common; collective. Use ``build``."""
+    def __init__(self, comm: MPI.Comm, placed: PlacedPads, mesh: MeshData | None, assembly: Assembly) -> None:
+        """Factor and compute the load-independent fields; collective; use ``build`` instead."""
         self._comm, self._thermal = comm, assembly.thermal
-        self.points, self.package = found.points, found.tables.package
-        self._model = Thermoelastic(comm, mesh, found.tables, assembly.materials)
+        self.points, self.package = placed.points, placed.tables.package
+        self._model = Thermoelastic(comm, mesh, placed.tables, assembly.materials)
         local, owned = self._model.body.local, self._model.body.shared.owned
         self._nodes, self._owned = local.nodes, owned
-        self._pads = found.pads[:, (3 * local.nodes[:, None] + np.arange(3)).ravel()]
-        self._package = self._model.space.fields[len(found.tables.motions[0].numbers) :]
+        self._pads = placed.pads[:, (3 * local.nodes[:, None] + np.arange(3)).ravel()]
+        self._package = self._model.space.fields[len(placed.tables.motions[0].numbers) :]
         weight = self._model.weight(assembly.gravity)
         self._weight = self._load(weight)
-        self._kelvin, self._sag = (self._on_level(force) for force in (self._model.expansion, weight))
-        self._corners = Corners.of(self._model, local.locate(found.corners), self._package)
+        self._kelvin, self._sag = (self._levelled(force) for force in (self._model.expansion, weight))
+        self._corners = Corners.of(self._model, local.locate(placed.corners), self._package)
         self._free = self._package[~self._corners.held]
-        names = np.array(found.tables.motions[1].names)[~self._corners.held]
+        names = np.array(placed.tables.motions[1].names)[~self._corners.held]
         motion = [self._motion(field) for field in self._free]
         shape = (len(names), *self._motion(weight).shape)
         self.rigid_modes = RigidModes(
@@ -150,59 +152,59 @@ class ThermalStructure:
         """Read board and package and factor their stiffness; collective.
 
         Raises:
-            AgreedError: A mesh that does not fit the pads or the materials, or no memory; on every rank.
+            AgreedError: The mesh does not fit the pads or the materials, or memory ran out; on every rank.
         """
         mesh = agreed(comm, lambda: connected(read_mesh(assembly.mesh)) if comm.rank == 0 else None)
-        found = agreed(comm, lambda: tabulate(mesh, assembly) if mesh else None)
-        return cls(comm, comm.bcast(found), mesh, assembly)
+        placed = agreed(comm, lambda: tabulate(mesh, assembly) if mesh else None)
+        return cls(comm, comm.bcast(placed), mesh, assembly)
 
     @property
     def cost(self) -> FactorCost:
-        """Return what the factorisation took."""
+        """Cost of the factorisation."""
         return self._model.cost
 
     @property
     def equations(self) -> int:
-        """Return the number of equations."""
+        """Number of equations."""
         return self._model.equations
 
     def solve(
         self, temperature: float, corner: float, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]
     ) -> HeatedState:
-        """Return the state at a temperature [K], see ``state.Structure``; collective.
+        """Return the state at a temperature [K], see ``HeatedStructure.solve``; collective.
 
         Raises:
-            ValueError: Wrenches or rigid motions that are not as many as joints and free motions, or not finite.
+            ValueError: Wrenches or rigid motions have a wrong shape or are not finite.
         """
         check_loads(self.rigid_modes, wrenches, rigid)
         displacement = (temperature - self._thermal.reference) * self._kelvin + self._sag
         load = self._weight
         if self._thermal.effects.solder_force != "off" and np.any(wrenches):
-            force = (self._pads.T @ borne(wrenches).ravel()).reshape(-1, 3)
-            displacement += self._on_level(force)
+            force = (self._pads.T @ with_board_support(wrenches).ravel()).reshape(-1, 3)
+            displacement += self._levelled(force)
             load = load + self._load(force)
         displacement, corner_force = self._corners.move(displacement, corner, load)
         displacement += np.tensordot(rigid, self._free, 1)
         return HeatedState(self._gathered(displacement), self._motion(displacement), corner_force)
 
-    def _on_level(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement under forces, heights from the mean height of the board's pads; collective."""
+    def _levelled(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the displacement under nodal forces, relative to the mean height of the board's pads; collective."""
         displacement = self._model.displacement(force)
         displacement[:, 2] -= self._motion(displacement)[:, 0, 2].mean() * ~self.package[self._nodes]
         return displacement
 
     def _load(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return forces along the free motions of the package, those that corners hold included; collective."""
+        """Return the forces along all rigid-body motions of the package; collective."""
         work = self._model.space.work(force)
         return work[len(work) - len(self._package) :]
 
     def _motion(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the motion of the pads ``(joints, 2, 6)``; collective."""
+        """Return the motion of the pads, shape (joints, 2, 6); collective."""
         mine = self._pads @ np.where(self._owned[:, None], displacement, 0.0).ravel()
         return np.asarray(self._comm.allreduce(mine)).reshape(-1, 2, 6)
 
     def _gathered(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement at all nodes of the mesh; collective."""
+        """Return the displacement at all nodes of the mesh, shape (n, 3) [m]; collective."""
         whole = np.zeros_like(self.points)
         whole[self._nodes[self._owned]] = displacement[self._owned]
         if self._comm.size > 1:
@@ -210,18 +212,18 @@ class ThermalStructure:
         return whole
 
 
-def borne(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return wrenches ``(joints, 2, 6)`` with the support of the board below its pads."""
+def with_board_support(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return wrenches, shape (joints, 2, 6), plus the supporting force below the board's pads."""
     supported = wrenches.copy()
     supported[:, 0, 2] -= wrenches[:, 0, 2].mean()
     return supported
 
 
 def tabulate(mesh: MeshData, assembly: Assembly) -> PlacedPads:
-    """Read supports, pads and corners off a mesh.
+    """Determine supports, pads and corners of a mesh.
 
     Raises:
-        MeshError: Board, package, die or the sides for the pads are missing, or a pad reaches beyond its side.
+        MeshError: Board, package, die or a pad side is missing, or a pad extends beyond its side.
     """
     centre = assembly.pads.centres[:, 1].mean(axis=0)
     corners = die_corners(mesh) if assembly.thermal.package == "moved" else np.empty(0, np.intp)

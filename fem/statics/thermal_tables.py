@@ -1,4 +1,4 @@
-"""Board and package before they are distributed: one mesh, what is held, which rigid motions are free."""
+"""Tables of board and package before distribution: one mesh, fixed components, free rigid-body motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from reflowshock.fem.mesh.tie import Tie
 from reflowshock.materials.roles import role_of_part
 
 MOTIONS = ("x", "y", "z", "turn_x", "turn_y", "turn_z")
-BLOCKED = 1e-9  # of the body's size: a motion that moves a held component less is free
+BLOCKED = 1e-9  # displacement of fixed components, relative to the body's size, up to which a motion is free
 
 
 @dataclass(frozen=True, slots=True)
 class RigidMotions:
-    """Free rigid motions of one body, displacements linear in the turns.
+    """Free rigid-body motions of one body, with linearised rotations.
 
     Attributes:
-        centre: ``(3,)`` [m] that the turns are about.
-        numbers: Free ones, numbers in ``MOTIONS``.
+        centre: Centre of the rotations, shape (3,) [m].
+        numbers: Indices of the free motions in ``MOTIONS``.
     """
 
     centre: NDArray[np.float64]
@@ -34,19 +34,20 @@ class RigidMotions:
 
     @classmethod
     def free(cls, points: NDArray[np.float64], held: NDArray[np.bool_], centre: NDArray[np.float64]) -> "RigidMotions":
-        """Find the motions of a body with ``points (n, 3)`` [m] that no held component ``(n, 3)`` blocks."""
-        every = cls(centre, tuple(range(6)))
+        """Return the motions of a body's points, shape (n, 3) [m], that no fixed component, shape (n, 3), blocks."""
+        motions = cls(centre, tuple(range(6)))
         limit = BLOCKED * float(np.ptp(points, axis=0).max())
-        moved = [np.abs(field[held]).max(initial=0.0) for field in every.fields(points)]
-        return cls(centre, tuple(number for number, move in zip(every.numbers, moved, strict=True) if move <= limit))
+        largest = [np.abs(field[held]).max(initial=0.0) for field in motions.fields(points)]
+        free = tuple(number for number, moved in zip(motions.numbers, largest, strict=True) if moved <= limit)
+        return cls(centre, free)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return their names: shifts along and turns about x, y, z."""
+        """Names of the motions: translations along and rotations about x, y, z."""
         return tuple(MOTIONS[number] for number in self.numbers)
 
     def fields(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement at ``points (n, 3)`` of a unit of each motion: ``(k, n, 3)`` [m/m, m/rad]."""
+        """Return the displacement of points, shape (n, 3), for a unit of each motion, shape (k, n, 3) [m/m, m/rad]."""
         axes = np.eye(3)
         fields = [
             np.broadcast_to(axes[number], points.shape)
@@ -57,7 +58,7 @@ class RigidMotions:
         return np.array(fields).reshape(len(fields), *points.shape)
 
     def pins(self, points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the points and components ``(k,)`` whose values determine the motions, far apart where they turn."""
+        """Return points and components, shape (k,), that determine the motions; those of rotations are far apart."""
         size = float(np.ptp(points, axis=0).max())
         scale = np.array([1.0 if number < 3 else 1.0 / size for number in self.numbers])
         fields = scale[:, None] * self.fields(points).reshape(len(self.numbers), points.size)
@@ -71,11 +72,11 @@ BOARD_PARTS = ("board", "board_patch", "copper_board")
 
 @dataclass(frozen=True, slots=True)
 class ThermalTables(Tables):
-    """Tables of board and package, which nothing connects while the solder is liquid.
+    """Tables of board and package, unconnected while the solder is liquid.
 
     Attributes:
-        package: ``(n,)`` whether a node belongs to the package.
-        motions: Free rigid motions of board and package.
+        package: Whether a node belongs to the package, shape (n,).
+        motions: Free rigid-body motions of board and package.
     """
 
     package: NDArray[np.bool_]
@@ -83,20 +84,20 @@ class ThermalTables(Tables):
 
 
 def connected(mesh: MeshData) -> MeshData:
-    """Let board and patch share their nodes."""
+    """Return the mesh with the nodes of board and board patch merged."""
     macro, meso = find_interface(mesh)
     return merge_nodes(mesh, meso, macro)[0]
 
 
 def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables:
-    """Hold planes of symmetry, let the board rest on one point at each hole, and pin what is free after that.
+    """Return the supports of board and package: symmetry planes, one point at each hole, and pins.
 
-    Pins bear nothing, since loads on free motions are balanced by inertia; the points at the holes bear the weight of
-    the board and let it expand.
+    The points at the holes carry the weight of the board and let it expand. Pins fix the remaining rigid-body motions;
+    they have no reaction, since inertia balances the loads along free motions.
 
     Args:
-        mesh: Board and package.
-        centre: ``(3,)`` [m] that turns of the package are about.
+        mesh: Mesh of board and package.
+        centre: Centre of the package's rotations, shape (3,) [m].
 
     Raises:
         MeshError: Board or package is missing, or they share nodes.
@@ -116,20 +117,20 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
 
 
 def package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
-    """Return ``(n,)``: whether a node belongs to the package; errors as ``thermal_tables``."""
+    """Return whether a node belongs to the package, shape (n,); raises as ``thermal_tables``."""
     of_board = mesh.in_parts(BOARD_PARTS.__contains__)
     if of_board.all() or not of_board.any():
-        raise MeshError(f"board and package are needed, the mesh has {', '.join(mesh.part_names)}")
+        raise MeshError(f"the mesh needs board and package; its parts are {', '.join(mesh.part_names)}")
     package = np.zeros(len(mesh.points), dtype=bool)
     package[mesh.cells[~of_board]] = True
     both = np.intersect1d(mesh.cells[of_board], mesh.cells[~of_board])
     if len(both):
-        raise MeshError(f"board and package share {len(both)} nodes: nothing may join them while the solder is liquid")
+        raise MeshError(f"board and package share {len(both)} nodes, but must be separate while the solder is liquid")
     return package
 
 
 def resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
-    """Return one node at the lower end of each mounting hole, the one nearest to the centre of the board."""
+    """Return one node at the lower end of each mounting hole, the nearest to the centre of the board."""
     nodes = mesh.facet_nodes("mounting_holes")
     if not len(nodes):
         return nodes.astype(np.intp)
@@ -141,14 +142,14 @@ def resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
 
 
 def die_corners(mesh: MeshData) -> NDArray[np.intp]:
-    """Return the nodes at the upper corners of the die that no plane of symmetry cuts off: one in a quarter model.
+    """Return the nodes at the upper die corners that no symmetry plane removes, one in a quarter model.
 
     Raises:
-        MeshError: There is no die.
+        MeshError: The mesh has no die.
     """
     cells = mesh.cells[mesh.in_parts(lambda name: role_of_part(name) == "die")]
     if not len(cells):
-        raise MeshError(f"no die whose corner could be moved; the mesh has {', '.join(mesh.part_names)}")
+        raise MeshError(f"the mesh has no die whose corners could be moved; its parts are {', '.join(mesh.part_names)}")
     nodes = np.unique(cells)
     points = mesh.points[nodes]
     top = nodes[points[:, 2] >= points[:, 2].max() - 1e-6 * np.ptp(points[:, 2])]

@@ -1,14 +1,14 @@
-"""Linear quasi-static thermoelasticity of one model: K u = f + (T - T0) F, factored once, solved for any load.
+"""Linear quasi-static thermoelasticity of one model, K u = f + (T - T0) F, factored once for all loads.
 
     F_a = sum_e V_e <grad N_a>_e C_e alpha_e                [N/K]
 
-<.>_e is the mean over an element: incompatible modes have no mean strain, so a constant thermal strain does no work on
-them and needs the mean gradients only. They are the program's own hexahedra, which do not lock in the bending of layers
-that are thin (PHYSICS 3); trilinear ones would be many times too stiff.
+<.>_e is the mean over an element. Incompatible modes have no mean strain, so a constant thermal strain does no work on
+them, and the mean gradients suffice. These hexahedra do not lock in the bending of thin layers; trilinear ones would be
+many times too stiff.
 
-Free rigid motions R are no part of the answer: inertia bears what is out of balance, f - M R (R^T M R)^-1 R^T f, and
-the answer has no momentum, R^T M u = 0. That is symmetric, leaves the pins that make K positive definite without a
-force, and makes no difference where loads are in balance.
+The solution contains no free rigid-body motions R: inertia balances the unbalanced load, f - M R (R^T M R)^-1 R^T f,
+and the solution has no momentum, R^T M u = 0. This is symmetric, leaves the pins that make K positive definite without
+a reaction, and does not change the solution for balanced loads.
 """
 
 from dataclasses import dataclass
@@ -31,14 +31,14 @@ from reflowshock.materials.roles import Materials, materials_of_parts
 
 @dataclass(frozen=True, slots=True)
 class RigidSpace:
-    """Free rigid motions of a model on one rank.
+    """Free rigid-body motions R of a model on one rank.
 
     Attributes:
         comm: Communicator of the model.
-        fields: ``(k, n, 3)`` displacements of a unit of each.
-        owned: ``(n,)`` nodes that count on this rank.
-        mass: ``(n,)`` [kg].
-        inverse: ``(k, k)`` of R^T M R.
+        fields: Displacement for a unit of each motion, shape (k, n, 3).
+        owned: Whether this rank owns a node, shape (n,).
+        mass: Nodal mass, shape (n,) [kg].
+        inverse: Inverse of R^T M R, shape (k, k).
     """
 
     comm: MPI.Comm
@@ -49,7 +49,7 @@ class RigidSpace:
 
     @classmethod
     def of(cls, comm: MPI.Comm, body: Body, tables: ThermalTables) -> "RigidSpace":
-        """Take the free motions of board and package; collective."""
+        """Return the space of the free motions of board and package; collective."""
         points, package = body.local.points, tables.package[body.local.nodes]
         fields = np.concatenate(
             [
@@ -62,35 +62,35 @@ class RigidSpace:
         return cls(comm, fields, body.shared.owned, body.mass, np.linalg.inv(gram))
 
     def work(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return R^T f ``(k,)`` of forces ``(n, 3)``, over all ranks."""
+        """Return R^T f, shape (k,), of nodal forces, shape (n, 3); collective."""
         owned = self.owned
         return np.asarray(self.comm.allreduce(np.einsum("kni,ni->k", self.fields[:, owned], force[owned])))
 
     def balance(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the forces with those of inertia."""
+        """Return nodal forces plus the inertia forces that balance them."""
         acceleration = np.tensordot(self.inverse @ self.work(force), self.fields, 1)
         return force - self.mass[:, None] * acceleration
 
     def still(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement without its momentum."""
+        """Return a displacement without its rigid-body part."""
         momentum = self.work(self.mass[:, None] * displacement)
         return displacement - np.tensordot(self.inverse @ momentum, self.fields, 1)
 
 
 class Thermoelastic:
-    """A model on this rank, factored.
+    """Factored thermoelastic model on one rank.
 
     Attributes:
-        body: Nodes, elements, masses.
-        space: Its free rigid motions.
-        expansion: ``(n, 3)`` [N/K] F, forces that a kelvin gives.
+        body: Nodes, elements and masses.
+        space: Free rigid-body motions.
+        expansion: Nodal forces F of thermal expansion, shape (n, 3) [N/K].
     """
 
     def __init__(self, comm: MPI.Comm, mesh: MeshData | None, tables: ThermalTables, materials: Materials) -> None:
         """Distribute the mesh of rank 0 and factor; collective.
 
         Raises:
-            AgreedError: A rank without elements, a matrix that is not positive definite, or no memory; on every rank.
+            AgreedError: A rank has no elements, the matrix is not positive definite, or memory ran out; on every rank.
         """
         local = distribute(comm, mesh)
         pieces = agreed(comm, lambda: make_pieces(local, tables, materials))
@@ -105,20 +105,20 @@ class Thermoelastic:
 
     @property
     def cost(self) -> FactorCost:
-        """Return what the factorisation took."""
+        """Cost of the factorisation."""
         return self._factor.cost
 
     @property
     def equations(self) -> int:
-        """Return the number of equations."""
+        """Number of equations."""
         return self._equations.total
 
     def weight(self, gravity: float) -> NDArray[np.float64]:
-        """Return the forces ``(n, 3)`` [N] of gravity [m/s^2] along -z."""
+        """Return the nodal forces of gravity [m/s^2] along -z, shape (n, 3) [N]."""
         return -gravity * self.body.mass[:, None] * np.array([0.0, 0.0, 1.0])
 
     def displacement(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the displacement ``(n, 3)`` [m] under forces ``(n, 3)`` [N], without rigid motions; collective."""
+        """Return the displacement, shape (n, 3) [m], under nodal forces, shape (n, 3) [N]; collective."""
         self._right.array = self.space.balance(force)[self._equations.own]
         self._factor.solve(self._right, self._solution)
         result = np.empty_like(force)
@@ -127,11 +127,11 @@ class Thermoelastic:
 
 
 def expansion_force(body: Body, expansion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nodal forces ``(n, 3)`` [N/K] of a kelvin, over all ranks; collective.
+    """Return the nodal forces of thermal expansion per kelvin, shape (n, 3) [N/K]; collective.
 
     Args:
-        body: The model.
-        expansion: ``(nm, 3)`` [1/K] coefficients of each material along x, y, z.
+        body: Model on this rank.
+        expansion: Expansion coefficients of each material along x, y, z, shape (nm, 3) [1/K].
     """
     elements, geometry = body.elements, body.geometry
     stress = symmetric(np.einsum("mij,mj->mi", elements.elasticity[:, :, :3], expansion))

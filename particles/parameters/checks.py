@@ -5,6 +5,7 @@ from math import degrees, pi
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
+from reflowshock.particles.parameters.schemes import SCHEMES
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
 from reflowshock.problem import Problem
@@ -12,7 +13,6 @@ from reflowshock.problem import Problem
 SPACINGS_IN_NECK = 2.0
 SPACINGS_IN_GAP = 3.0
 SPACINGS_IN_RADIUS = 2.0
-LARGEST_EXPLICIT = 1.0
 MOST_PARTICLES = 200_000
 ROUNDING = 1e-9
 
@@ -67,9 +67,10 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
 
 def _wall_problems(solder: Solder) -> list[Problem]:
     scheme = solder.numerics.scheme
-    if scheme == "gripc" and solder.wall != "free-slip":
-        message = 'the scheme "gripc" has walls with free slip only'
-        return [Problem("solder.wall", message, solder.wall, "free-slip")]
+    walls = SCHEMES[scheme].walls
+    if solder.wall not in walls:
+        message = f'the scheme "{scheme}" does not support this wall'
+        return [Problem("solder.wall", message, solder.wall, ", ".join(walls))]
     if (solder.wall == "slip") == (solder.slip_length is not None):
         return []
     value = "none" if solder.slip_length is None else mm(solder.slip_length)
@@ -79,16 +80,17 @@ def _wall_problems(solder: Solder) -> list[Problem]:
 
 def _time_step_problems(solder: Solder) -> list[Problem]:
     numerics = solder.numerics
-    if numerics.scheme != "gripc" or numerics.time_step_limit <= LARGEST_EXPLICIT:
+    largest = SCHEMES[numerics.scheme].largest_time_step
+    if numerics.time_step_limit <= largest:
         return []
-    message = 'scheme "gripc" takes surface tension explicitly: no step above the capillary limit is stable'
+    message = f'scheme "{numerics.scheme}" is explicit in surface tension: steps above the capillary limit are unstable'
     key = "solder.numerics.time_step_limit"
-    return [Problem(key, message, f"{numerics.time_step_limit:g}", f"<= {LARGEST_EXPLICIT:g}")]
+    return [Problem(key, message, f"{numerics.time_step_limit:g}", f"<= {largest:g}")]
 
 
 def _basis_problems(solder: Solder) -> list[Problem]:
     basis = solder.numerics.basis
-    if solder.numerics.scheme == "gripc" or basis == "quadratic":
+    if SCHEMES[solder.numerics.scheme].has_basis or basis == "quadratic":
         return []
     message = f'the scheme "{solder.numerics.scheme}" has no basis to choose'
     return [Problem("solder.numerics.basis", message, basis, 'quadratic, or any with scheme = "gripc"')]

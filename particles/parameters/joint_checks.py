@@ -10,6 +10,7 @@ from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, mm_p
 from reflowshock.particles.parameters.effects import acting_weight, decide_effects
 from reflowshock.particles.parameters.estimate import particle_count
 from reflowshock.particles.parameters.scenes import Joint, PackagePath
+from reflowshock.particles.parameters.schemes import SCHEMES
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
 from reflowshock.problem import Problem
@@ -138,8 +139,9 @@ def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find what does not go with a package that moves."""
     if joint.package is None and joint.path is None:
         return []
-    if solder.numerics.scheme == "gripc":
-        return [Problem("solder.numerics.scheme", "the scheme gripc needs plates at rest", "gripc", "energy")]
+    scheme = solder.numerics.scheme
+    if not SCHEMES[scheme].moves_plates:
+        return [Problem("solder.numerics.scheme", f"the scheme {scheme} needs plates at rest", scheme, "energy")]
     return [] if joint.path is None else _speed_problems(joint, joint.path, solder)
 
 
@@ -156,7 +158,7 @@ def _speed_problems(joint: Joint, path: PackagePath, solder: Solder) -> list[Pro
     if not inertia["on"]:
         message = f"without inertia a package is moved from rest to rest, at no particular speed; {inertia['why']}"
         return [Problem(key, message, mm_per_s(speed), 'no speed, or solder.effects.inertia = "on"')]
-    if solder.numerics.scheme != "ispg":
+    if not SCHEMES[solder.numerics.scheme].moves_at_speed:
         message = f"a package is moved at a speed ({mm_per_s(speed)}) by the scheme ispg alone"
         return [Problem("solder.numerics.scheme", message, solder.numerics.scheme, "ispg")]
     if path.steps is not None:

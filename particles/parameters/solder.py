@@ -10,6 +10,7 @@ from pydantic import Field
 
 from reflowshock.effect import Switch
 from reflowshock.parameters import Parameters
+from reflowshock.particles.parameters.schemes import Scheme, SchemeOrAuto, Wall
 from reflowshock.quantity import Quantity
 
 
@@ -25,7 +26,7 @@ class FlowNumerics(Parameters):
     Where max_steps is not given, it is 1000; with ispg as many more as the slowest swing of the solder dies away in.
     """
 
-    scheme: Literal["auto", "energy", "ispg", "gripc"] = "auto"
+    scheme: SchemeOrAuto = "auto"
     basis: Literal["linear", "quadratic"] = "quadratic"
     time_step_limit: float = Field(20.0, gt=0, le=100)
     tolerance: float = Field(1.0e-6, gt=0, lt=1)
@@ -35,7 +36,7 @@ class FlowNumerics(Parameters):
 class SolderNumerics(FlowNumerics):
     """How the reflow is computed, by a scheme that is decided."""
 
-    scheme: Literal["energy", "ispg", "gripc"] = "energy"
+    scheme: Scheme = "energy"
     spacing: Annotated[float, Quantity("mm")] = Field(4.0e-5, gt=0)
 
 
@@ -63,7 +64,7 @@ class Walls(Parameters):
     The slip length belongs to wall = "slip" (Navier): the depth below the wall at which the flow would rest.
     """
 
-    wall: Literal["free-slip", "no-slip", "slip"] = "free-slip"
+    wall: Wall = "free-slip"
     slip_length: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
 
 

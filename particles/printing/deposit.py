@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.grid import Grid
-from reflowshock.particles.parameters.printing import WITHIN_REACH, Printing
-from reflowshock.particles.scenes.droplet import liquid_of, start_shape
+from reflowshock.particles.flows.droplet_shape import start_shape
+from reflowshock.particles.flows.printing import WITHIN_REACH, Printing
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Fields, Law
@@ -24,6 +24,7 @@ from reflowshock.particles.sph.heat import Heat, enthalpy_at
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
+from reflowshock.particles.sph_flows.droplet import liquid_of
 from reflowshock.particles.surface.cloud_level_set import with_mirror_image
 from reflowshock.particles.surface.level_set import LevelSet, signed_distance_in_band
 from reflowshock.particles.surface.morphological_closing import part_of_vertex
@@ -95,7 +96,7 @@ class Deposit:
 
     def __post_init__(self) -> None:
         drop = self.scene.drop
-        points, surface, spacing = start_shape(drop)
+        points, surface, spacing = start_shape(drop, EDGE)
         self.start = points, surface, spacing
         self.law, tension = liquid_of(drop, spacing)
         self.ground = empty_ground(self.scene, spacing)

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.surface_measure import volume_and_gradient
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.flows.printing import Printing
+from reflowshock.particles.flows.result import Metrics
 from reflowshock.particles.printing.deposit import Deposit, add_to_ground, empty_ground
-from reflowshock.particles.sph.flow import Metrics
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 from reflowshock.particles.surface.morphological_closing import close_gaps, connected_groups
 

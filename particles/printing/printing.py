@@ -16,10 +16,11 @@ import numpy as np
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.flows.printing import Printing
+from reflowshock.particles.flows.result import FlowResult, Metrics, Picture
 from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
-from reflowshock.particles.sph.flow import PICTURES, FlowResult, Metrics, Picture
+from reflowshock.particles.sph.flow import PICTURES
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.surface.morphological_closing import TopologyChange
 from reflowshock.particles.surface.surface_mesh import SurfaceLost

@@ -171,6 +171,14 @@ def _barrel(a: float, b: float, target: float) -> _State:
     return _State(arc / arc[-1], np.stack((r, z, psi, volume)), np.array([arc[-1], curvature]), np.asarray)
 
 
+@dataclass(frozen=True, slots=True)
+class _Fluid:
+    """Surface tension [N/m] and weight of the unit volume [N/m^3]."""
+
+    surface_tension: float
+    weight: float
+
+
 def sessile_meridian(volume: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
     """Find the meridian of a drop on a uniform wall (Bashforth & Adams), from the wall to the apex.
 
@@ -181,7 +189,7 @@ def sessile_meridian(volume: float, contact_angle: float, surface_tension: float
         weight: rho g [N/m^3].
     """
     cap = np.cbrt(np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle)))
-    return _sessile(np.cbrt(volume), cap, contact_angle, (surface_tension, weight), is_plane=False)
+    return _sessile(np.cbrt(volume), cap, contact_angle, _Fluid(surface_tension, weight), is_plane=False)
 
 
 def sessile_section(area: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
@@ -190,25 +198,24 @@ def sessile_section(area: float, contact_angle: float, surface_tension: float, w
     Without weight it is a segment of a circle. Arguments as `sessile_meridian`, with the area of the section [m^2].
     """
     segment = np.sqrt(contact_angle - np.sin(contact_angle) * np.cos(contact_angle))
-    return _sessile(np.sqrt(area), segment, contact_angle, (surface_tension, weight), is_plane=True)
+    return _sessile(np.sqrt(area), segment, contact_angle, _Fluid(surface_tension, weight), is_plane=True)
 
 
 def _sessile(
-    length: float, weightless: float, contact_angle: float, fluid: tuple[float, float], *, is_plane: bool
+    length: float, weightless: float, contact_angle: float, fluid: _Fluid, *, is_plane: bool
 ) -> Meridian:
-    """Shoot from the apex until the line has turned by the contact angle [rad]; its curvature is the root of the size.
+    """Shoot from the apex until the profile has turned by the contact angle; find the apex curvature from the size.
 
     Args:
-        length: of a cube, or a square, of the drop's size [m].
-        weightless: curvature that the drop has without weight, over that length.
-        contact_angle: [rad].
-        fluid: surface tension [N/m] and weight of the unit volume [N/m^3].
-        is_plane: whether the drop is the same along y.
+        length: Edge of a cube, or of a square, of the size of the drop [m].
+        weightless: Apex curvature without weight, times that length.
+        contact_angle: Contact angle [rad].
+        fluid: Surface tension and weight.
+        is_plane: Whether the drop is the same along y.
     """
     from scipy.optimize import brentq
 
-    surface_tension, weight = fluid
-    bond = weight * length**2 / surface_tension
+    bond = fluid.weight * length**2 / fluid.surface_tension
 
     def shoot(curvature: float) -> Floats:
         return _from_apex(curvature, bond, contact_angle, is_plane)
@@ -221,7 +228,7 @@ def _sessile(
     r, depth, _ = shoot(curvature)
     height = depth[-1]
     at_apex = curvature if is_plane else 2.0 * curvature
-    pressure = (at_apex + bond * height) * surface_tension / length
+    pressure = (at_apex + bond * height) * fluid.surface_tension / length
     return Meridian(
         r[::-1] * length, (height - depth[::-1]) * length, float(pressure), 0.0, contact_angle, float("nan")
     )

@@ -7,8 +7,8 @@ import h5py
 import meshio
 import numpy as np
 
+from reflowshock.particles.flows.result import FlowResult, Picture
 from reflowshock.particles.reference.young_laplace import Meridian
-from reflowshock.particles.sph.flow import FlowResult, Picture
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 
 BODY = "body"

@@ -19,9 +19,6 @@ from reflowshock.particles.core.cloud import Cloud, TooLittleSolder, box_cloud, 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
-from reflowshock.particles.gripc.gripc_step import GripcStep
-from reflowshock.particles.ispg.adaptation import Adaptation
-from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.effects import AT_REST, LIQUID_EFFECTS, decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
@@ -29,12 +26,10 @@ from reflowshock.particles.physics.physics import Acting, Physics
 from reflowshock.particles.physics.plate_motion import Travel
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
 from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
+from reflowshock.particles.scenes.step_methods import start_solver
 from reflowshock.particles.steps.flow import LiquidFlow
-from reflowshock.particles.steps.inertial_step import InertialStep
-from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, Snapshot
-from reflowshock.particles.steps.step_solver import StepSolver
 from reflowshock.particles.steps.time_step import TimeStep, capillary_limit, largest_step, most_steps, swing_period
 from reflowshock.particles.surface.contact_line import ContactLine
 
@@ -155,21 +150,8 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     """Set up a flow from rest, with only the effects that are on."""
     largest, bound = largest_step(solder, cloud.spacing)
     time_step = TimeStep(largest, cloud.spacing, largest, bound, bound)
-    physics, solver = build_physics(solder, effects, lines), step_solver(solder, effects)
-    if isinstance(solver, IspgStep):
-        physics = replace(physics, events=(*physics.events, Adaptation(solver, physics)))
+    solver, physics = start_solver(solder, effects, build_physics(solder, effects, lines))
     return LiquidFlow(Body.at_rest(cloud), physics, time_step, solver)
-
-
-def step_solver(solder: Solder, effects: dict[str, bool]) -> StepSolver:
-    """How steps are solved: as asked for, or on tetrahedra where momentum is carried or shared, else towards rest."""
-    if solder.numerics.scheme == "ispg":
-        return IspgStep()
-    if solder.numerics.scheme == "gripc":
-        return GripcStep(solder.numerics.basis)
-    if any(effects[name] for name in AT_REST):
-        return InertialStep(solder.density)
-    return Relaxation(solder.density)
 
 
 def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool], angle: float | None = 0.5 * pi) -> StopRule:

@@ -6,13 +6,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
-from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
-from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.flows.result import FlowResult, Metrics, Picture
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Particles, Simulation
@@ -26,43 +26,6 @@ SAMPLES = 2000
 
 Sample = Callable[[Simulation], tuple[float, ...]]
 Vector = tuple[float, float, float]
-Metrics = dict[str, tuple[float, str]]
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """Liquid particles at one time.
-
-    Attributes:
-        time: Time [s].
-        points: Positions, shape (n, 3) [m].
-        velocity: Velocities, shape (n, 3) [m/s].
-        pressure: Pressures, shape (n,) [Pa].
-    """
-
-    time: float
-    points: Floats
-    velocity: Floats
-    pressure: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class FlowResult:
-    """Result of a flow.
-
-    Attributes:
-        pictures: Particles in the order of time; the last picture is at the end.
-        walls: Wall particles, shape (m, 3) [m].
-        history: Arrays of equal length by name, the first is time [s].
-        metrics: Value and unit by name.
-        words: Results in words by name.
-    """
-
-    pictures: list[Picture]
-    walls: Floats
-    history: dict[str, Floats]
-    metrics: Metrics
-    words: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -165,7 +128,7 @@ def _flow_until(
             progress(min(1.0, simulation.time / until))
 
 
-def device_of(scene: SphFlow) -> Callable[[Fields, int, Law], Particles]:
+def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     """Return the class of particles for the device of a flow; CUDA is imported only if it is requested.
 
     Raises:
@@ -178,7 +141,7 @@ def device_of(scene: SphFlow) -> Callable[[Fields, int, Law], Particles]:
     return CudaParticles
 
 
-def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
+def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
     """Return the parameters of the pair interactions of a flow in the plane of x and z.
 
     Args:
@@ -217,7 +180,7 @@ def law_of(scene: SphFlow, periods: Vector, gravity: Vector, has_surface: bool) 
     )
 
 
-def shear_law(scene: SphFlow) -> dict[str, Any]:
+def shear_law(scene: FlowScene) -> dict[str, Any]:
     """Return the entries of `Law` for a shear-dependent viscosity."""
     rheology = scene.rheology
     if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
@@ -247,21 +210,9 @@ def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
     )  # fmt: skip
 
 
-def wall_layers(scene: SphFlow) -> int:
+def wall_layers(scene: FlowScene) -> int:
     """Return the number of layers of wall particles that fill the support of liquid near a wall."""
     return int(np.ceil(SUPPORT * scene.numerics.smoothing_length))
-
-
-def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: float) -> Floats:
-    """Return the points of a lattice in the plane of x and z, shape (3, n) [m].
-
-    Args:
-        columns: Numbers of the columns along x.
-        rows: Numbers of the rows along z.
-        spacing: Distance between columns and between rows [m].
-    """
-    x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")
-    return spacing * np.stack((x.ravel(), np.zeros(x.size), z.ravel()))
 
 
 def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:

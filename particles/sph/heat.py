@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats
 from reflowshock.materials import enthalpy
-from reflowshock.particles.parameters.flows import DIFFUSIVE
-from reflowshock.particles.parameters.freezing import Freezing
+from reflowshock.particles.flows.freezing import Freezing
+from reflowshock.particles.flows.sph_numerics import DIFFUSIVE
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.particle_rates import apart, constants_of, periods_of, summed

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.parameters.flows import CENTRAL, largest_time_step
+from reflowshock.particles.flows.sph_numerics import CENTRAL, largest_time_step
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.threads import ThreadParticles

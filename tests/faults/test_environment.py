@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.workflow.process.kernel_cache import VARIABLE
+from reflowshock.workflow.process.kernel_folder import VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, which reads \\ as one

@@ -10,9 +10,9 @@ from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
-from reflowshock.fem.parallel import portable
+from reflowshock.fem.parallel import checkpoint_state
+from reflowshock.fem.parallel.checkpoint_state import State
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.parallel.portable import State
 from reflowshock.materials.roles import Materials
 from tests.support.fem_levels import joint_on_board
 from tests.support.fem_program import run_warm
@@ -39,11 +39,11 @@ def begun(comm: MPI.Comm) -> ExplicitMotion:
 def continued(comm: MPI.Comm, parts: list[State]) -> ExplicitMotion:
     """Return a motion that goes on from the states of all ranks of another division."""
     motion = begun(comm)
-    state = portable.blank({"motion": motion.state()})
+    state = checkpoint_state.blank({"motion": motion.state()})
     for part in parts:
-        portable.take(state, {"motion": part}, {"motion"} if comm.rank == 0 else set())
-    assert portable.is_complete(state)
-    motion.restore(portable.values(state)["motion"])
+        checkpoint_state.take(state, {"motion": part}, {"motion"} if comm.rank == 0 else set())
+    assert checkpoint_state.is_complete(state)
+    motion.restore(checkpoint_state.values(state)["motion"])
     motion.take_steps(STEPS - HALF)
     return motion
 

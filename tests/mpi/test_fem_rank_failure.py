@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.parallel.status_board import ERROR
 from reflowshock.workflow.process.launch import mpi_command
 from tests.support.fem_models import write_small_assembly
@@ -121,7 +121,7 @@ def test_misfortune_of_one_rank_ends_all(assembly, tmp_path, what, message):
     (folder,) = checkpoints.glob("*/")
     assert re.search(f"; last checkpoint: {folder} .window (1[5-9]|2[01]), time [0-9.]+e-06 s", said), said
     if what == "SIGSTOP":
-        assert re.search(r"rank 1 \((macro|meso)\): no sign of life for", said)
+        assert re.search(r"rank 1 \((macro|meso)\): no status for", said)
 
 
 def test_a_rank_that_is_stopped_in_set_up_is_named(assembly, tmp_path):
@@ -148,7 +148,7 @@ def test_a_rank_that_fails_while_it_loads_libraries_ends_all(tmp_path, raised, w
         f"            raise {raised}\n"
         "sys.meta_path.insert(0, Broken())\n"
     )
-    environment = own_environment(os.environ) | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.getcwd()])}
+    environment = without_mpi_job(os.environ) | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.getcwd()])}
     line = mpi_command(2, [sys.executable, "-m", "reflowshock.fem", str(tmp_path / "absent.json")], True)
     ended = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode != 0

@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.parallel.checkpoint import Checkpoints
-from reflowshock.fem.parallel.portable import Same, State
+from reflowshock.fem.parallel.checkpoint_state import Same, State
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import MPIRUN
 from tests.support.warm_start import warm_python
@@ -126,7 +126,7 @@ def test_latest_whole_generation_of_the_same_inputs_is_read(tmp_path):
 
 def test_without_a_folder_nothing_is_kept():
     files = Checkpoints(MPI.COMM_SELF, None, "one", 0.0)
-    files.keep("fields", state())
+    files.store("fields", state())
     files.write(1, 1e-6, state())
     assert not files.is_due()
     assert files.read(state()) is None

@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.problem.inputs import INPUT, RunInput
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.fem.run.structure import run_structure
 
 ENERGIES = {"kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance"}

@@ -35,7 +35,7 @@ def request(directory: Path, mode: Literal["two_scale", "dns"], name: str, **cha
 
 def dns(directory: Path, name: str, **changes) -> tuple[dict, dict[str, np.ndarray]]:
     (directory / name).mkdir()
-    package.run(MPI.COMM_SELF, RunInput.model_validate(request(directory, "dns", name, **changes)))
+    package.run_package(MPI.COMM_SELF, RunInput.model_validate(request(directory, "dns", name, **changes)))
     return results(directory / name)
 
 

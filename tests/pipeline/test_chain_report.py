@@ -15,7 +15,7 @@ def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
     (run_folder / "report.html").unlink()
     write_report(run_folder, read_case_of_run(run_folder), run_folder)
     page = (run_folder / "report.html").read_text()
-    sections = ("Result", "Ranked joints", "3D view", "Shock", "What the real shapes change", "Stress at the package",
+    sections = ("Result", "Ranked joints", "3D view", "Shock", "Effect of joint shapes", "Stress at the package pads",
                 "Warpage", "Joint shapes", "Joint meshes", "Two scales", "Energy balance", "Cost")  # fmt: skip
     places = [page.index(f"<h2>{section}</h2>") for section in sections]
     assert places == sorted(places)
@@ -27,7 +27,7 @@ def test_the_report_tells_warpage_shape_effect_and_interface(run_folder):
 
 def test_without_such_effects_there_are_no_such_sections(first_run):
     page = (first_run[0] / "report.html").read_text()
-    for section in ("Warpage", "What the real shapes change", "Stress at the package"):
+    for section in ("Warpage", "Effect of joint shapes", "Stress at the package pads"):
         assert f"<h2>{section}</h2>" not in page
 
 
@@ -40,9 +40,9 @@ def test_a_run_that_ended_after_the_reflow_has_a_report(run_folder):
     assert (
         "<h2>Joint shapes</h2>" in page
         and "standoff over the array" in page
-        and "Distinct shapes at their places" in page
+        and "Joint shapes in the array" in page
     )
-    assert "This run has not come to its end: surface, solder_mesh, shock not run." in page
+    assert "This run is incomplete; stages not run: surface, solder_mesh, shock." in page
     assert "<h2>Joint meshes</h2>" not in page and "<h2>Shock</h2>" not in page
     assert not (run_folder / "shock").exists()
     assert reflowshock("run", run_folder, "--until", "surface").returncode == 0

@@ -1,4 +1,4 @@
-"""Runs side by side: what differs in parameters and answers, on the terminal and in a page; what is refused."""
+"""Comparison of runs in the terminal and in a page, and rejected arguments."""
 
 import json
 import shutil
@@ -11,7 +11,7 @@ from tests.support.warm_start import warm_command
 
 @pytest.fixture
 def two_runs(run_folder, tmp_path):
-    """The run folder of the shortened case, and a copy of it."""
+    """Return the run folder of the shortened case and a copy of it."""
     return run_folder, shutil.copytree(run_folder, tmp_path / "other")
 
 
@@ -19,13 +19,13 @@ def compare(*arguments):
     return warm_command("compare", *map(str, arguments))
 
 
-def test_a_run_is_like_itself(two_runs):
+def test_copy_of_a_run_is_equal(two_runs):
     done = compare(*two_runs)
     assert done.returncode == 0, done.stderr
-    assert "all parameters are the same" in done.stdout and "all answers are the same" in done.stdout
+    assert "all parameters are equal" in done.stdout and "all results are equal" in done.stdout
 
 
-def test_answers_that_differ_are_told_with_their_change(two_runs, tmp_path):
+def test_different_results_are_printed_with_their_change(two_runs, tmp_path):
     first, other = two_runs
     summary = json.loads((other / "summary.json").read_text())
     summary["metrics"]["peel_stress"]["value"] *= 1.25
@@ -42,20 +42,20 @@ def test_answers_that_differ_are_told_with_their_change(two_runs, tmp_path):
     page = tmp_path / "compare.html"
     done = compare(first, other, "--out", page)
     assert done.returncode == 0, done.stderr
-    assert "peel stress" in done.stdout and "(+25 %)" in done.stdout and "all parameters are the same" in done.stdout
+    assert "peel stress" in done.stdout and "(+25 %)" in done.stdout and "all parameters are equal" in done.stdout
     text = page.read_text()
     assert "(+25 %)" in text and "(+100 %)" in text and text.count("data-figure=") == 1
-    assert compare(first, other, "--out", page).returncode == 0  # its own page it writes again
+    assert compare(first, other, "--out", page).returncode == 0  # a page of this command is overwritten
 
 
-def test_what_cannot_be_compared_is_refused(two_runs, drop_folder, tmp_path):
+def test_incomparable_runs_are_rejected(two_runs, drop_folder, tmp_path):
     first, other = two_runs
     for arguments, words in (
-        ((first,), "needs two or more run folders"),
+        ((first,), "requires two or more run folders"),
         ((first, first), "is given twice"),
         ((first, tmp_path), "is not a run folder"),
-        ((first, drop_folder), "is a run of another kind of case, [drop], than small, [package]"),
-        ((first, other, "--out", tmp_path / "no/page.html"), "there is no folder"),
+        ((first, drop_folder), "is a run of kind [drop], but small is of kind [package]"),
+        ((first, other, "--out", tmp_path / "no/page.html"), "does not exist"),
     ):
         done = compare(*arguments)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)

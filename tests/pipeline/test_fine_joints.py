@@ -56,7 +56,7 @@ def test_the_fine_joint_agrees_with_the_dns(critical_run):
 def test_the_report_tells_of_two_scales(critical_run):
     page = (critical_run / "report.html").read_text()
     assert "<h2>Two scales</h2>" in page
-    assert "how they were chosen" in page
+    assert "selection of fine joints" in page
     assert "coarse" in page
 
 

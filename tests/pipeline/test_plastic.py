@@ -38,7 +38,7 @@ def test_a_joint_that_breaks_is_the_verdict_of_a_healthy_run(plastic_run):
     assert result.stdout.splitlines()[-1] == summary["answer"]
     assert f"{verdict['joint']}: plastic work " in summary["answer"] and ", FAIL; discretisation" in summary["answer"]
     page = (folder / "report.html").read_text()
-    assert "some break" in page and "plastic work density of the solder layer there" in page
+    assert "some break" in page and "plastic work density, solder layer at this pad" in page
     assert "Largest plastic work density of the layer first" in page
     failed = [name for name, joint in verdict["joints"].items() if joint["verdict"] == "FAIL"]
     told = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]

@@ -106,5 +106,5 @@ def test_solder_that_yields_is_linked_stably():
 
 
 def test_one_way_is_refused():
-    with pytest.raises(ValueError, match="gravouil_combescure links two models"):
+    with pytest.raises(ValueError, match="gravouil_combescure does not support direction = one_way"):
         scheme_of("gravouil_combescure", "one_way")

@@ -145,7 +145,7 @@ def test_energy_stays_over_many_windows():
 def test_damping_takes_the_energy_that_is_missing(damping):
     """As strong as levels bear: the highest modes, to which it does most, must fall as well."""
     model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3), damping=damping)
-    loads = [RayleighDamping.build(model.body, (0.0, damping * model.window))]
+    loads = [RayleighDamping.build(model.body, 0.0, damping * model.window)]
     motion = ExplicitMotion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
     held = []

@@ -14,8 +14,8 @@ from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.mesh.tie import net_load
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.parallel.checkpoint_state import values
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.parallel.portable import values
 from reflowshock.materials.roles import Materials
 from tests.stability.test_fem_window_grid import GROWTH
 from tests.support.fem_levels import joint_on_board

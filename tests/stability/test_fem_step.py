@@ -8,7 +8,7 @@ from reflowshock.cases.hard.trials.bodies import dns_body
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
-from reflowshock.fem.dynamics.participant import Alone, explicit_motion
+from reflowshock.fem.dynamics.participant import SingleModel, explicit_motion
 from reflowshock.fem.errors import EnergyError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -76,7 +76,7 @@ def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
 
 def steps_until_stopped(body: Body, step: float, loads: list[Load], critical: float) -> tuple[int, str]:
     """Take steps as a run does, with a look at the energies now and then; return when it was stopped, and why."""
-    participant = Alone(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
+    participant = SingleModel(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
     balance = EnergyBalance(limit=0.02, trivial=0.0, step=step, critical=critical)
     balance.judge(energy_sums(participant, 0.0), 0.0)
     for window in range(1, 21):

@@ -16,7 +16,7 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.run.cooling import pinned
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
-from reflowshock.fem.statics.initial_state import begun
+from reflowshock.fem.statics.initial_state import with_initial_stress
 from reflowshock.materials.parameters import Material
 
 SMALL = ForceOptions()
@@ -65,7 +65,7 @@ def cooled(
     return Cooled(
         plain,
         found,
-        begun(body(), pieces.materials, found.displacement, change, path=True),
+        with_initial_stress(body(), pieces.materials, found.displacement, change, path=True),
         float(pieces.steps.min()),
         thermal_force(plain, slice(None), pieces.materials, change),
     )

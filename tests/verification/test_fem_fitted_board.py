@@ -19,7 +19,7 @@ from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.problem.fittings import Fittings, Neighbour
 from reflowshock.fem.problem.inputs import INPUT
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.fem.run.structure import run_structure
 from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_models import BOARD_X, BOARD_Y, BOARD_Z, board_mesh, write_msh
@@ -139,7 +139,7 @@ def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict
     tables |= {"materials": {"board": STEEL}, "supports": supports} | FITTED | more
     request = INPUT.validate_python(tables)
     request.output.mkdir()
-    run(MPI.COMM_SELF, request)
+    run_package(MPI.COMM_SELF, request)
     return outputs_of(request.output)
 
 

@@ -129,5 +129,5 @@ def test_numbers_out_of_range(spring, step, alpha, message):
 
 
 def test_elements_that_are_not_linear_are_refused(spring):
-    with pytest.raises(AgreedError, match="the implicit solver is linear and cannot take object"):
+    with pytest.raises(AgreedError, match="the implicit solver is linear and does not support object"):
         implicit(replace(spring[0], terms=[object()]), 1e-6)

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import write_small_assembly
 
@@ -18,7 +18,7 @@ def dns(meshes: list[Path], directory: Path, solver: str) -> Path:
     numerics = {"kinematics": "small", "mass_scaled": ("copper",), "history_samples": 20, "field_samples": 2}
     numerics |= {"dns_solver": solver}
     shock = Shock(service_condition="B", duration=1e-5, numerics=numerics)
-    run(
+    run_package(
         MPI.COMM_SELF,
         RunInput(mode="dns", meshes=meshes, materials=ELASTIC, shock=shock, output=directory),
     )

@@ -13,7 +13,7 @@ from reflowshock.fem.loads.load import Load
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.global_matrix import Equations
-from reflowshock.fem.parallel import portable
+from reflowshock.fem.parallel import checkpoint_state
 from reflowshock.fem.problem.shock import Damping
 from tests.support.fem_bodies import STEEL
 from tests.verification.test_fem_loads import bar, largest_imbalance, loads_of
@@ -86,7 +86,7 @@ def test_state_continues_to_the_same_bits():
         ImplicitMotion(MPI.COMM_SELF, body, loads_of("motion", body, mesh, 0.0), 2 * critical) for _ in range(2)
     )
     run(first, 20 * critical)
-    second.restore(portable.values(first.state()))
+    second.restore(checkpoint_state.values(first.state()))
     run(first, 40 * critical)
     run(second, 40 * critical)
     assert np.array_equal(first.displacement, second.displacement)
@@ -103,7 +103,7 @@ def test_free_vibration_decays_as_its_ratio_says(terms):
     omega, shape = 2 * np.pi * modes.frequency[along], modes.shape[along]
     given = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
     ratio, period = sum(terms), 2 * np.pi / omega
-    damping = RayleighDamping.build(body, given.coefficients)
+    damping = RayleighDamping.build(body, *given.coefficients)
     motion = ImplicitMotion(MPI.COMM_SELF, body, [damping], period / 400)
     motion.displacement[:] = shape
     motion.restart()

@@ -157,7 +157,7 @@ def test_damping_ratio_is_that_of_the_exact_decay(kind):
     frequency = SPEED / (4 * LENGTH)
     coefficients = Damping(**{f"{kind}_ratio": ratio}, frequency=frequency).coefficients
     step = 0.5 * damped_critical_step(critical, coefficients[1])
-    motion = motion_of(body, step, [RayleighDamping.build(body, coefficients)])
+    motion = motion_of(body, step, [RayleighDamping.build(body, *coefficients)])
     mode = np.sin(np.pi * body.local.points[:, 0] / (2 * LENGTH))
     motion.displacement[:, 0] = 1e-6 * mode
     motion.update_force()

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
-from reflowshock.fem.loads.structure_loads import structure_loads
+from reflowshock.fem.loads.structure_loads import LoadedModel, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulses_of
 from reflowshock.fem.run.structure import run_structure
 from reflowshock.fem.setup.structure_models import build_structure
@@ -32,7 +32,7 @@ def test_impulse_is_the_integral_of_the_force(tmp_path, solver):
     request = structure_input(tmp_path, loads={"poke": poke}, supports={}, dynamics=dynamics, solver=solver)
     model, steps = build_structure(MPI.COMM_SELF, request, [])
     body = model.body
-    loads = structure_loads(MPI.COMM_SELF, body, model.tables, request, pulses_of(request.loads))
+    loads = structure_loads(LoadedModel(MPI.COMM_SELF, body, model.tables, request), pulses_of(request.loads))
     if solver == "explicit":
         motion = motion_of(body, steps.plan.step, loads)
     else:

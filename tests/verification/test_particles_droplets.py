@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
-from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics, cap
+from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
-from reflowshock.particles.scenes.droplet import droplet, solve_droplet
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph_flows.droplet import droplet, solve_droplet
 
 INK = {"diameter": 93.5e-6, "density": 1000.0, "surface_tension": 0.072, "viscosity": 0.02}
 JET = INK | {"diameter": 23e-6, "viscosity": 0.0149, "speed": 5.0}

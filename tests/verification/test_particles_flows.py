@@ -7,13 +7,16 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
-from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
-from reflowshock.particles.parameters.rheology import Rheology
+from reflowshock.particles.flows.channel import Poiseuille, exact_speeds
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.flow_effects import decide_flow
+from reflowshock.particles.flows.rheology import Rheology
+from reflowshock.particles.flows.sph_numerics import SphNumerics
+from reflowshock.particles.flows.vortices import TaylorGreen
 from reflowshock.particles.reference.dam_break import FRONT
-from reflowshock.particles.scenes.dam_break import dam, solve_dam_break
-from reflowshock.particles.scenes.viscous_flows import channel, exact_speeds, solve_poiseuille, solve_taylor_green
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph_flows.dam_break import dam, solve_dam_break
+from reflowshock.particles.sph_flows.viscous_flows import channel, solve_poiseuille, solve_taylor_green
 
 
 def value(result, name):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import pyvista
 
-from reflowshock.particles.parameters.droplets import cap
-from reflowshock.particles.parameters.printing import Printing, PrintingNumerics
+from reflowshock.particles.flows.droplet import cap
+from reflowshock.particles.flows.printing import Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import SOLID, CuredBody, Deposit
 from reflowshock.particles.sph import flow
 from reflowshock.particles.surface.level_set import depths

@@ -1,4 +1,4 @@
-"""How far the board of a drop will about deflect, from its parameters alone, and what its scene then calls for."""
+"""Estimated deflection of the board, and the kinematics and duration that follow from it."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from reflowshock.effect import Decision
-from reflowshock.fem.estimates.drop_effects import Deflection, SolderPlasticity, called_for
+from reflowshock.fem.estimates.drop_effect import Deflection
+from reflowshock.fem.estimates.drop_effects import SolderPlasticity, called_for
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
 
 if TYPE_CHECKING:
@@ -24,14 +25,17 @@ SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinne
 HELD, STRETCH = 0.58, 0.6
 HALF_SPACE = 0.3  # Poisson's ratio of laminates under a pad
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
-MOST_PERIODS = 1000  # that are looked at: no pulse of a drop lasts longer
+MOST_PERIODS = 1000  # periods of the response; no pulse of a drop lasts longer
 
 
 def expected_deflection(case: "BoardDropCase") -> Deflection:
-    """Return how far the board deflects at small rotations; PulseError where a table of its pulse cannot be read.
+    """Return the estimated deflection of the board at small rotations.
 
     The board is a beam between its holes in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
-    Width, package and later modes are left out.
+    Width, package and higher modes are neglected.
+
+    Raises:
+        PulseError: The table of the pulse cannot be read.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
@@ -41,7 +45,7 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
 
 
 def expected_duration(case: "BoardDropCase") -> float:
-    """Return how long a shock will about be followed [s]: if it is ``auto``, until half a swing after the first peak.
+    """Return the expected duration of a shock [s]; if it is ``auto``, until half a swing after the first peak.
 
     After a pulse t the board swings as if pushed at t / 2: it is out at t / 2 + T / 4 and back at t / 2 + T / 2, half a
     swing. Where it turns it stretches as well, w'' + omega^2 w (1 + c (w/h)^2) = 0, which shortens its period T.

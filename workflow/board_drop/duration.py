@@ -1,4 +1,4 @@
-"""How long a drop is followed: the time that the case gives, or at most a period of its board after the pulse."""
+"""Duration of a drop: as the case sets it, or at most one period of the board after the pulse."""
 
 import math
 from typing import TYPE_CHECKING
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
 
 
 def longest_duration(case: "BoardDropCase") -> float:
-    """Return the time [s] that a shock is followed: if it is ``auto``, at most, a period after its pulse.
+    """Return the longest duration of a shock [s]; if it is ``auto``, one period of the board after the pulse.
 
-    Screws hold a board more firmly than pins, so its own period is shorter. Errors as ``expected_deflection``.
+    The period is that of a pinned beam; screws shorten it. Errors as ``expected_deflection``.
     """
     from reflowshock.fem.loads.pulse import Tabulated
     from reflowshock.fem.loads.shock_pulse import input_pulse
@@ -25,9 +25,9 @@ def longest_duration(case: "BoardDropCase") -> float:
 
 
 def first_mode(case: "BoardDropCase") -> tuple[float, float]:
-    """Return length [m] and angular frequency [rad/s] of the board as a beam that is pinned at its holes.
+    """Return length [m] and angular frequency [rad/s] of the board as a beam pinned at its holes.
 
-    What is fitted to it counts as if all of it were at its middle, where it makes it slowest.
+    Fitted masses are placed at the middle, where they lower the frequency most.
     """
     board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
     length, young = max(zip(spans(board), (young_x, young_y), strict=True))
@@ -37,7 +37,7 @@ def first_mode(case: "BoardDropCase") -> tuple[float, float]:
 
 
 def fitted_mass(case: "BoardDropCase") -> float:
-    """Return the mass of lumped masses and further packages [kg], mirror images included; at most, if on a plane."""
+    """Return an upper bound of the lumped masses and further packages [kg], mirror images included."""
     images = 4.0 if case.board.symmetry == "quarter" else 1.0
     roles = case.materials
     packages = sum(

@@ -1,4 +1,4 @@
-"""Which joints of a shock are fine: all, those that the case names, or the most stressed ones of a coarse run."""
+"""Fine joints of a shock: all, named ones, or the most stressed ones of a coarse run."""
 
 import json
 from collections.abc import Iterator
@@ -21,19 +21,19 @@ FINE, CRITICAL = "shock.coupling.fine_joints", "shock.coupling.critical_joints"
 
 @dataclass(frozen=True, slots=True)
 class FineJoints:
-    """Names of the fine joints, or "all", and how they were chosen."""
+    """Names of the fine joints, or "all", and the reason for the choice."""
 
     names: tuple[str, ...] | str
     why: str
 
 
 def needs_coarse_joints(coupling: "JointCoupling | None") -> bool:
-    """Whether some joint, or the macro model of a one-way run, needs the coarse mesh of joints."""
+    """Return whether a joint, or the macro model of a one-way run, needs the coarse joint mesh."""
     return coupling is not None and (coupling.fine_joints != "all" or coupling.direction == "one_way")
 
 
 class CoarseJoints(Effect["DropScene"]):
-    """Joints that are also meshed coarse."""
+    """Effect: joints with a coarse mesh."""
 
     name = "coarse_joints"
     adds = "eight hexahedra a joint instead of the fine mesh"
@@ -44,7 +44,7 @@ class CoarseJoints(Effect["DropScene"]):
     toggle = Toggle(FINE, "critical", "all")
 
     def decide(self, drop: "DropScene") -> Decision:
-        """As the case says."""
+        """Return the setting of the case."""
         coupling = drop.shock.coupling
         if coupling.direction == "one_way":
             why = "shock.coupling.direction = one_way: the macro model has all joints coarse"
@@ -56,12 +56,12 @@ class CoarseJoints(Effect["DropScene"]):
 
 
 def named_joints(coupling: "JointCoupling") -> FineJoints:
-    """Return the fine joints of a case that says which they are."""
+    """Return the fine joints that a case names."""
     return FineJoints(coupling.fine_joints, f"{FINE} = {_in_words(coupling.fine_joints)}")
 
 
 def most_stressed(history: Path, count: int) -> FineJoints:
-    """Return the critical joints of a history, by peel stress, or by plastic work where solder yields."""
+    """Return the critical joints of a history, ranked by peel stress, or by plastic work if the solder yields."""
     import numpy as np
 
     from reflowshock.fem.output.ranking import ranked, ranking_measure
@@ -70,22 +70,22 @@ def most_stressed(history: Path, count: int) -> FineJoints:
     with np.load(history) as arrays:
         names, order, measure = arrays["joints"], ranked(arrays), ranking_measure(arrays)
         peak = measure.peaks(arrays)
-    told = [f"{names[k]} {quantity({'value': float(peak[k]), 'unit': measure.unit})}" for k in order[: count + 1]]
-    why = f"the most stressed of {len(names)} by {measure.name} in a run with coarse joints: {', '.join(told[:count])}"
-    if len(told) > count:
-        why += f"; the next is {told[count]}"
+    peaks = [f"{names[k]} {quantity({'value': float(peak[k]), 'unit': measure.unit})}" for k in order[: count + 1]]
+    why = f"the most stressed of {len(names)} by {measure.name} in a run with coarse joints: {', '.join(peaks[:count])}"
+    if len(peaks) > count:
+        why += f"; the next is {peaks[count]}"
     return FineJoints(tuple(str(names[k]) for k in order[:count]), why)
 
 
 def write_fine_joints(folder: Path, fine: FineJoints) -> None:
-    """Write ``fine_joints.json`` of a shock."""
+    """Write ``fine_joints.json`` into the folder of a shock."""
     (folder / "fine_joints.json").write_text(
         json.dumps({"names": fine.names, "why": fine.why}, indent=1) + "\n", encoding="utf-8"
     )
 
 
 def read_fine_joints(folder: Path) -> FineJoints | None:
-    """Read what ``write_fine_joints`` wrote; None where the shock has none."""
+    """Read ``fine_joints.json`` of a shock; None if it does not exist."""
     path = folder / "fine_joints.json"
     if not path.exists():
         return None
@@ -95,7 +95,7 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Find joints that the model does not have, and more critical ones than there are."""
+    """Yield problems of unknown joints, and of more critical joints than the model has."""
     from reflowshock.meshing.board.pads import pad_table
 
     coupling, sites = case.shock.coupling, pad_table(case.package, case.board, case.warpage)
@@ -112,7 +112,7 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterator[Problem]:
-    """Say of a name that the model does not have which one was meant."""
+    """Yield the problem of an unknown joint name, with the nearest valid name."""
     names = [site.name for site in sites]
     if name in names:
         return
@@ -122,7 +122,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
 
 
 def _image(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> str:
-    """Return the joint of a quarter model that is the mirror image of one outside it; empty where there is none."""
+    """Return the joint of a quarter model whose mirror image has the name; empty if none does."""
     from reflowshock.meshing.board.pads import joint_name
 
     package = case.package

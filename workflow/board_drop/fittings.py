@@ -62,24 +62,24 @@ def drawn_board(case: "BoardDropCase") -> DrawnBoard:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Find what cannot be fitted to the board, and supports that do not go with the shock."""
+    """Yield problems of fittings off the board, and of supports that contradict the shock."""
     board = drawn_board(case)
     yield from fitting_problems(case, board)
     yield from neighbour_problems(case, board)
     for table in ("watch", "gauges"):
         if PACKAGE in getattr(case, table):
-            yield Problem(f"{table}.{PACKAGE}", "has the name of what is told of the package itself", PACKAGE)
+            yield Problem(f"{table}.{PACKAGE}", "is reserved for the results of the package itself", PACKAGE)
     if case.shock.method == "large_mass" and case.supports:
-        message = "moves holes that nothing else holds"
+        message = "needs mounting holes without supports"
         yield Problem("shock.method", message, "large_mass", "direct, or no supports")
     sprung = [name for name, support in case.supports.items() if support.bedding]
     if sprung and case.shock.coupling.scheme == "local_steps":
-        message = f"does not go with supports.{sprung[0]}.bedding: springs take no local steps"
+        message = f"does not support supports.{sprung[0]}.bedding"
         yield Problem("shock.coupling.scheme", message, "local_steps", "held_velocity, impulse, auto")
 
 
 def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Problem]:
-    """Find further packages that cannot be, or not where they are: off the board, over a hole or another package."""
+    """Yield problems of further packages: off the board, over a hole or over another package."""
     package = case.package.substrate
     taken = {"package": ((0.0, 0.0), (package.length, package.width))}
     for name, item in case.packages.items():

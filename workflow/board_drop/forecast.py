@@ -1,4 +1,4 @@
-"""Sizes, time steps and cost of a run, from its parameters alone."""
+"""Forecast of sizes, time steps and cost of a run, from the case alone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -38,17 +38,17 @@ from reflowshock.workflow.reflow.joints import distinct_joints
 
 @dataclass(frozen=True, slots=True)
 class PackageForecast:
-    """What a run will be like.
+    """Forecast of a run.
 
     Attributes:
-        effects: effect -> {"on", "why"}; those of the reflow at the joint with the largest gap.
-        joints: number of joints.
-        distinct: number of joints that have to be computed.
-        particles: smallest and largest number of particles of a joint.
-        parts: part of the mesh -> its size and step in the shock; those of the two-scale run where there is one.
-        shock: time steps and wall time; None without a shock.
-        seconds: stage -> predicted wall time [s], where there is a prediction.
-        load_steps: of a reflow with temperatures, those with liquid solder; else 0.
+        effects: Decision ("on", "why") of each effect; for the reflow, at the joint with the largest gap.
+        joints: Number of joints.
+        distinct: Number of joints that are computed.
+        particles: Smallest and largest number of particles of a joint.
+        parts: Size and time step of each part of the mesh, in the two-scale run if there is one.
+        shock: Time steps and wall time of the shock; None without a shock.
+        seconds: Predicted wall time of each stage [s], where there is a prediction.
+        load_steps: Load steps with liquid solder; 0 without ``[thermal]``.
     """
 
     effects: dict
@@ -61,46 +61,49 @@ class PackageForecast:
     load_steps: int = 0
 
 
-def forecast(case: PackageCase) -> PackageForecast:
-    """Predict sizes, time steps and cost of a run."""
+def forecast_package(case: PackageCase) -> PackageForecast:
+    """Predict sizes and cost of the reflow of a package."""
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
     geometries = case.joints
-    given = () if case.thermal else case.package.surfaces
-    flowing = {name: geometry for name, geometry in geometries.items() if name not in given}
+    user_surfaces = () if case.thermal else case.package.surfaces
+    flowing = {name: geometry for name, geometry in geometries.items() if name not in user_surfaces}
     distinct = [group.geometry for group in distinct_joints(flowing)]
     counts = [particle_count(case.solder, geometry) for geometry in distinct]
     workers = max(1, min(available_cores(), len(distinct)))
-    of_reflow = PackageForecast(
+    reflow = PackageForecast(
         effects=decide_effects(max(geometries.values(), key=lambda geometry: geometry.gap), case.solder),
         joints=len(geometries),
         distinct=len(distinct),
         particles=(min(counts, default=0), max(counts, default=0)),
         parts={},
         shock=None,
-        seconds={"reflow": SECONDS_OF_STAGE + sum(reflow_seconds(case.solder, one) for one in distinct) / workers},
+        seconds={
+            "reflow": SECONDS_OF_STAGE + sum(reflow_seconds(case.solder, geometry) for geometry in distinct) / workers
+        },
     )
-    of_reflow = of_reflow if case.thermal is None else _heated(of_reflow, case, case.thermal)
-    return _with_shock(of_reflow, case) if isinstance(case, BoardDropCase) else of_reflow
+    return reflow if case.thermal is None else _heated(reflow, case, case.thermal)
 
 
-def _heated(of_reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
-    """Predict a reflow in load steps: how many joints the structure makes distinct is not known, all may be."""
+def _heated(reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> PackageForecast:
+    """Predict a reflow in load steps, assuming that warpage makes all joints distinct."""
     heated = forecast_heated(case, thermal)
-    share, liquid = of_reflow.joints / of_reflow.distinct, of_reflow.seconds["reflow"] - SECONDS_OF_STAGE
+    share, liquid = reflow.joints / reflow.distinct, reflow.seconds["reflow"] - SECONDS_OF_STAGE
     return replace(
-        of_reflow,
-        effects=of_reflow.effects | heated.effects,
-        distinct=of_reflow.joints,
+        reflow,
+        effects=reflow.effects | heated.effects,
+        distinct=reflow.joints,
         load_steps=len(heated.steps),
         seconds={"reflow": SECONDS_OF_STAGE + share * heated.exchanges * liquid},
     )
 
 
-def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForecast:
+def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
+    """Predict sizes, time steps and cost of reflow and shock."""
+    reflow = forecast_package(case)
     share = expected_duration(case) / longest_duration(case)
-    of_shock, case = shock_effects(case), decided(case)
+    drop_effects, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts, share)
     numerics = case.shock.numerics
@@ -116,16 +119,16 @@ def _with_shock(of_reflow: PackageForecast, case: BoardDropCase) -> PackageForec
         modes["two_scale"] += share * shock.search + seconds_outside_windows(case, coarse_parts(case), share)
     identical = again if case.shock.identical_joints else 0.0
     return replace(
-        of_reflow,
-        effects=of_reflow.effects | of_shock | cooling,
+        reflow,
+        effects=reflow.effects | drop_effects | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
-        seconds=of_reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes) + identical + once},
+        seconds=reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes) + identical + once},
     )
 
 
 def step_problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Find more steps than any run takes, and what is over before two models meet again."""
+    """Yield problems of too many time steps, and of a pulse or duration shorter than a coupling window."""
     import numpy as np
 
     from reflowshock.fem.estimates.estimate import damped_critical_step
@@ -135,13 +138,13 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
     with np.errstate(all="ignore"):
         smallest = min(part.scaled_step for part in forecast_parts(case).values())
         step = damped_critical_step(smallest, case.shock.damping.coefficients[1])
-    yield from (found := list(too_many_steps("shock.duration", longest_duration(case), step, "explicit")))
-    if not found and "two_scale" in case.shock.numerics.modes:
+    yield from (problems := list(too_many_steps("shock.duration", longest_duration(case), step, "explicit")))
+    if not problems and "two_scale" in case.shock.numerics.modes:
         yield from shorter_than_window(case)
 
 
 def with_critical_step(quality: dict, materials: Materials) -> dict:
-    """Add the critical time step [s] to the quality of a joint mesh, from the shortest length in each material."""
+    """Return the quality of a joint mesh with its critical time step [s], from the shortest length in each material."""
     import numpy as np
 
     from reflowshock.fem.estimates.estimate import box_critical_step
@@ -154,10 +157,19 @@ def with_critical_step(quality: dict, materials: Materials) -> dict:
 
 
 def package_size(case: PackageCase) -> Size:
-    """Predict what the stages of a case take on one core: the forecast is that of this machine's cores."""
+    """Predict time and memory of the stages of a package on one core."""
+    return _size(forecast_package(case))
+
+
+def board_drop_size(case: BoardDropCase) -> Size:
+    """Predict time and memory of the stages of a board drop on one core."""
+    return _size(forecast_board_drop(case))
+
+
+def _size(outlook: PackageForecast) -> Size:
+    """Return the size of a forecast, whose reflow is that on all cores of this machine."""
     from reflowshock.fem.estimates.solver_cost import cooling_cost
 
-    outlook = forecast(case)
     joints = max(1, outlook.distinct)
     elements = sum(part.elements for part in outlook.parts.values())
     memory = BYTES_OF_ELEMENT * elements + BYTES_OF_PARTICLE * outlook.particles[1]

@@ -1,4 +1,4 @@
-"""What the real shapes of the joints change: the same shock with identical joints under a flat package."""
+"""Effect of the real joint shapes: the same shock with identical joints under a flat package."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Surfaces and meshes of all joints of an array: real ones, bridged ones, and identical ones to compare with."""
+"""Surfaces and meshes of all joints of an array: real, bridged and identical joints."""
 
 import itertools
 import logging
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.identical_joints import PREFIX, identical_sphere
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
@@ -20,16 +19,17 @@ from reflowshock.workflow.reflow.joints import refuse_joints_without_mesh
 if TYPE_CHECKING:
     from reflowshock.meshing.board.package_side import PackageSide
     from reflowshock.meshing.board.pads import PadSite
+    from reflowshock.meshing.board.parameters import Board, Package
     from reflowshock.meshing.joint.joint_mesh import JointMesh
     from reflowshock.meshing.surface.closed_surface import ClosedSurface
     from reflowshock.particles.steps.shape import JointShape
 
 
 def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
-    """Write the surface of each joint, in its own orientation, and of bridged ones in common; return their measures.
+    """Write the closed surface of each joint, one for a bridged pair; return the measures of the surfaces.
 
     Raises:
-        ReflowError: joints are open: they have no surface between their pads.
+        ReflowError: A joint is open.
     """
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import measure, write_surface
@@ -50,14 +50,14 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     for name, shape in bodies.items():
         closed = _closed(shape)
         write_surface(folder / f"{name}.vtu", closed)
-        own = measure(closed)
-        measures[name] = {**own, "volume_error": own["volume"] / shape.metrics["volume"][0] - 1.0}
+        size = measure(closed)
+        measures[name] = {**size, "volume_error": size["volume"] / shape.metrics["volume"][0] - 1.0}
     for name, path in package.surfaces.items():
         closed = load_surface(Path(path), package.surface_unit, sites[name])
         write_surface(folder / f"{name}.vtu", closed)
-        own = measure(closed)
-        change = own["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
-        measures[name] = {**own, "given": path, "volume_change": change}
+        size = measure(closed)
+        change = size["volume"] / file_volume(Path(path), package.surface_unit) - 1.0
+        measures[name] = {**size, "given": path, "volume_change": change}
     return measures
 
 
@@ -74,26 +74,27 @@ BETWEEN = "+"  # the names of two joints that are one body
 IMAGE = "_image"  # ends the name of a joint behind a plane of symmetry
 
 
-def mesh_real_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
-    """Put the package where the solder froze and mesh the joints there; return what ``mesh_array`` does."""
+def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool) -> dict[str, dict]:
+    """Place the package at its position after solidification and mesh the joints; return as ``mesh_array``."""
     from reflowshock.meshing.board.displaced_assembly import prescribed, read_computed, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import read_surface
 
-    case, structure = run.case, run.folder / "reflow/structure.npz"
+    structure = run_folder / "reflow/structure.npz"
     displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
-    side = write_displaced_assembly(run.folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
-    sites = {site.name: site for site in read_pads(run.folder / "reflow/pads.json")}
-    surfaces = {path.stem: read_surface(path) for path in sorted((run.folder / "surface").glob("*.vtu"))}
+    side = write_displaced_assembly(run_folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
+    sites = {site.name: site for site in read_pads(run_folder / "reflow/pads.json")}
+    surfaces = {path.stem: read_surface(path) for path in sorted((run_folder / "surface").glob("*.vtu"))}
     bodies = [(surfaces[name], site) for name, site in sites.items() if name in surfaces]
-    bridged = mesh_bridges(surfaces, sites, case, side)
-    found = mesh_array(bodies, side, case, folder)
-    found |= {"bridged_": _write(bridged, "bridged_", case, folder)} if bridged else {}
-    return {kind: quality for kind, quality in found.items() if quality}
+    bridges = mesh_bridges(surfaces, sites, case, side)
+    meshes = mesh_array(bodies, side, case.package, case.board, coarse=coarse)
+    qualities = {kind: _write(joints, kind, case, folder) for kind, joints in meshes.items()}
+    qualities |= {"bridged_": _write(bridges, "bridged_", case, folder)} if bridges else {}
+    return {kind: quality for kind, quality in qualities.items() if quality}
 
 
-def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
-    """Mesh truncated spheres of the solder's volume, on which nothing weighs, under a flat package at their height."""
+def mesh_identical_joints(run: Run[BoardDropCase], folder: Path, *, coarse: bool) -> dict[str, dict]:
+    """Mesh unloaded truncated spheres of the solder volume under a flat package; return as ``mesh_array``."""
     from reflowshock.meshing.board.displaced_assembly import raised, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.sphere_surface import sphere_surface
@@ -106,46 +107,47 @@ def mesh_identical_joints(run: Run[PackageCase], folder: Path) -> dict[str, dict
     drawn = read_pads(run.folder / "geometry/pads.json")
     surface = sphere_surface(sphere)
     bodies = [(surface, replace(site, gap=sphere.height)) for site in drawn]
-    return mesh_array(bodies, side, case, folder, PREFIX)
+    meshes = mesh_array(bodies, side, case.package, case.board, coarse=coarse)
+    return {PREFIX + kind: _write(joints, PREFIX + kind, case, folder) for kind, joints in meshes.items()}
 
 
 def mesh_array(
     bodies: "Sequence[tuple[ClosedSurface, PadSite]]",
     side: "PackageSide",
-    case: PackageCase,
-    folder: Path,
-    prefix: str = "",
-) -> dict[str, dict]:
-    """Mesh joints, once more with few hexahedra where the shock needs coarse joints.
+    package: "Package",
+    board: "Board",
+    *,
+    coarse: bool,
+) -> "dict[str, list[JointMesh]]":
+    """Mesh joints.
 
     Args:
-        bodies: closed surface and place of each joint.
-        side: the package's underside.
-        case: package, materials, shock.
-        folder: where the products go.
-        prefix: begins their names.
+        bodies: Closed surface and pad site of each joint.
+        side: Underside of the package.
+        package: Package.
+        board: Board.
+        coarse: Whether each joint is also meshed coarse.
 
     Returns:
-        Kind of joint mesh, which begins the names of its metrics -> joint -> quality.
+        Joint meshes by kind, ``""`` for fine ones and ``"coarse_"``; the kind is a prefix of file and metric names.
     """
     from reflowshock.meshing.joint.column import columns_of
     from reflowshock.meshing.joint.solder_mesh import mesh_coarse_or_fine, mesh_joint
 
     fine = [
-        mesh_joint(surface, site, case.package, side, columns_of(site, case.package, case.board, side))
-        for surface, site in bodies
+        mesh_joint(surface, site, package, side, columns_of(site, package, board, side)) for surface, site in bodies
     ]
-    kinds = {prefix: fine}
-    if isinstance(case, BoardDropCase) and needs_coarse_joints(case.shock.coupling):
-        kinds[f"{prefix}coarse_"] = [
-            mesh_coarse_or_fine(surface, mesh, (case.package, site), side)
+    meshes = {"": fine}
+    if coarse:
+        meshes["coarse_"] = [
+            mesh_coarse_or_fine(surface, mesh, (package, site), side)
             for (surface, site), mesh in zip(bodies, fine, strict=True)
         ]
-    return {kind: _write(meshes, kind, case, folder) for kind, meshes in kinds.items()}
+    return meshes
 
 
 def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: Path) -> dict[str, dict]:
-    """Write meshes, the tetrahedra of those that are free-form, and their quality; return this by joint."""
+    """Write joint meshes, tetrahedra of free-form joints and quality; return the quality by joint."""
     from reflowshock.meshing.core.quadratic_tetrahedra import write_tetrahedra
     from reflowshock.meshing.joint.joints_file import write_joints
     from reflowshock.meshing.joint.solder_mesh import joint_quality
@@ -162,32 +164,32 @@ def _write(meshes: "Sequence[JointMesh]", kind: str, case: PackageCase, folder: 
 
 @dataclass(frozen=True, slots=True)
 class MirroredSide:
-    """The underside of a quarter of a package, and its images behind x = 0 and y = 0."""
+    """Underside of a quarter package and its mirror images at x = 0 and y = 0."""
 
     quarter: "PackageSide"
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height (k,) over the board's top face at points (k,), (k,) [m]."""
+        """Return the height over the top face of the board at points x, y, all of shape (k,) [m]."""
         return self.quarter.height(np.abs(x), np.abs(y))
 
 
 def mesh_bridges(
     surfaces: "Mapping[str, ClosedSurface]", sites: "Mapping[str, PadSite]", case: PackageCase, side: "PackageSide"
 ) -> "list[JointMesh]":
-    """Mesh the joints that are one body, for other codes: no shock is run with them.
+    """Mesh bridged joints, for use in other codes; the shock does not support them.
 
     Args:
-        surfaces: by name; those of bridged joints have both names.
-        sites: of all joints, by name.
-        case: package, symmetry.
-        side: the package's underside.
+        surfaces: Closed surfaces by name; a bridged pair has both names.
+        sites: Pad sites of all joints by name.
+        case: Case with package and symmetry.
+        side: Underside of the package.
     """
     from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_bridge
 
     quarter = case.board.symmetry == "quarter"
     meshes = []
     for name in (name for name in surfaces if BETWEEN in name):
-        first, second = (sites[own] for own in name.split(BETWEEN))
+        first, second = (sites[joint] for joint in name.split(BETWEEN))
         pair = (first, _nearest_image(first, second)) if quarter else (first, second)
         try:
             meshes.append(mesh_bridge(surfaces[name], pair, case.package, MirroredSide(side) if quarter else side))
@@ -197,7 +199,7 @@ def mesh_bridges(
 
 
 def _nearest_image(first: "PadSite", second: "PadSite") -> "PadSite":
-    """Return the second site or that of its images which is nearest to the first one."""
+    """Return the second site or its mirror image, whichever is nearest to the first site."""
     images = [second]
     for along_x, along_y in itertools.product((1.0, -1.0), repeat=2):
         if (along_x, along_y) != (1.0, 1.0):

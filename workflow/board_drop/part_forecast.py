@@ -1,4 +1,4 @@
-"""Parts of the mesh of a shock before it is meshed: elements, critical time steps, cost of an update."""
+"""Estimated parts of the mesh of a shock: elements, critical time steps, cost of an update."""
 
 import math
 from collections.abc import Mapping
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from reflowshock.meshing.board.estimate import PartEstimate
     from reflowshock.workflow.package.case import BoardDropCase
 
-MACRO = "board"  # role of the parts whose elements the window follows
-BOXES = ("board", "substrate", "die")  # roles whose elements are boxes, but for columns
+MACRO = "board"  # part of the macro model
+BOXES = ("board", "substrate", "die")  # roles with box elements, except in columns
 IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
-MOST_ELEMENTS = 10_000_000  # of a part whose shapes are looked at; more are never meshed
+MOST_ELEMENTS = 10_000_000  # largest part whose element shapes are computed; larger ones are never meshed
 COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
 
 
@@ -26,12 +26,12 @@ class PartForecast:
     """A part of the mesh.
 
     Attributes:
-        elements: its hexahedra.
-        critical_step: of the smallest one [s].
-        scaled_step: the same with its mass scaled to the step of the others [s].
-        cost: of an update over that of an assembled elastic element.
-        linear: whether its force is linear in the displacement.
-        in_boxes: cost of an update of all of them, over that of a linear box in a long row, where rows are kept.
+        elements: Number of hexahedra.
+        critical_step: Critical step of the smallest element [s].
+        scaled_step: Critical step with mass scaling [s].
+        cost: Cost of an update of an element, in updates of an assembled elastic element.
+        linear: Whether the force is linear in the displacement.
+        in_boxes: Cost of an update of all elements, in updates of a linear box in a long row.
     """
 
     elements: int
@@ -46,14 +46,14 @@ Parts = Mapping[str, PartForecast]
 
 
 def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict size and critical time step of every part of the mesh with all joints fine."""
+    """Estimate every part of the mesh with all joints fine."""
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage))
 
 
 def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of a two-scale run, in which joints may be coarse; of a one-way run those of both models."""
+    """Estimate every part of a two-scale run; for a one-way run, the parts of both models."""
     from reflowshock.meshing.board.estimate import count_elements
 
     if case.shock.coupling.direction == "one_way":
@@ -62,14 +62,14 @@ def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 
 def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of the run that finds the critical joints."""
+    """Estimate every part of the mesh with all joints coarse."""
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
 
 
 def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Predict the same of the fine joints of a one-way run; the board around them is left out."""
+    """Estimate the fine joints of a one-way run, without the board around them."""
     from reflowshock.meshing.board.estimate import count_elements
 
     estimates = count_elements(case.package, case.board, case.warpage, fine_joint_count(case))
@@ -79,7 +79,7 @@ def _driven_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 
 def fine_joint_count(case: "BoardDropCase") -> int | None:
-    """Return how many joints of a two-scale run are fine, None if all."""
+    """Return the number of fine joints of a two-scale run; None if all are fine."""
     coupling = case.shock.coupling
     if coupling.fine_joints == "all":
         return None
@@ -115,7 +115,7 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
 
 
 def _joint_shapes(case: "BoardDropCase", name: str, part: "PartEstimate") -> "NDArray[np.float64]":
-    """Return the edges ``(n, 3, 3)`` [m] of the shapes of upright elements of joints; of other parts none."""
+    """Return the edges of the element shapes of a joint part, shape (n, 3, 3) [m]; n = 0 for other parts."""
     import numpy as np
 
     from reflowshock.meshing.joint.butterfly import section_edges
@@ -132,12 +132,12 @@ def _joint_shapes(case: "BoardDropCase", name: str, part: "PartEstimate") -> "ND
 
 
 def is_linear(parts: Parts) -> bool:
-    """Whether the forces of all elements are linear."""
+    """Return whether the forces of all parts are linear."""
     return all(part.linear for part in parts.values())
 
 
 def _in_boxes(case: "BoardDropCase", name: str, part: "PartEstimate") -> float:
-    """Return the cost of an update of all elements of a part, over that of a linear box in a long row."""
+    """Return the cost of an update of a whole part, in updates of a linear box in a long row."""
     from reflowshock.fem.estimates.estimate import BOARD_ADVANTAGE, ROW_COST, UPDATES_PER_SECOND
     from reflowshock.fem.estimates.solver_cost import TURNING_BOARD_RATE
 
@@ -151,7 +151,7 @@ def _in_boxes(case: "BoardDropCase", name: str, part: "PartEstimate") -> float:
 
 
 def relative_cost(case: "BoardDropCase", part: str) -> float:
-    """Return the cost of an element of a part over that of a linear one."""
+    """Return the cost of an update of an element of a part, in updates of a linear element."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
     from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 
@@ -165,17 +165,17 @@ def relative_cost(case: "BoardDropCase", part: str) -> float:
 
 
 def _warped(case: "BoardDropCase") -> bool:
-    """Whether the package is meshed warped or moved, so that its elements are no boxes."""
+    """Return whether the package is meshed warped or displaced, so that its elements are not boxes."""
     return case.thermal is not None or any(case.warpage.model_dump().values())
 
 
 def turns(case: "BoardDropCase", part: str) -> bool:
-    """Whether elements of a part are elastic and turn with frames of their own."""
+    """Return whether a part is elastic and corotational."""
     return case.shock.numerics.kinematics == "corotational" and material_of(case, part).plasticity is None
 
 
 def is_linear_part(case: "BoardDropCase", part: str) -> bool:
-    """Whether elements of a part neither yield nor turn."""
+    """Return whether a part is elastic with small rotations."""
     return case.shock.numerics.kinematics == "small" and material_of(case, part).plasticity is None
 
 
@@ -185,7 +185,7 @@ def role_of(part: str) -> str:
 
 
 def is_box(part: str) -> bool:
-    """Whether a part is of the board's boxes: a column in their place has smaller elements."""
+    """Return whether a part consists of the board's boxes, not of a column around a fine joint."""
     return role_of(part) == MACRO and not part.endswith(COLUMN)
 
 

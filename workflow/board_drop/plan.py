@@ -13,15 +13,19 @@ from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
 
-SETTLES = "ends when the joints' first peak has passed and half a swing of the board has brought no higher one"
+SETTLES = "ends half a swing of the board after the largest stress of the joints"
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
-    """Yield sizes and, where the board is dropped, the shock; then what the costs assume."""
-    yield _sizes(case, outlook) if outlook.parts else f"\n{_joints(case, outlook)}"
-    if not isinstance(case, BoardDropCase) or outlook.shock is None:
-        yield styled("\n[dim]{}", REFLOW_SPEED)
-        return
+    """Yield the joints of a package and the assumed speed of the reflow."""
+    yield f"\n{_joints(case, outlook)}"
+    yield styled("\n[dim]{}", REFLOW_SPEED)
+
+
+def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator[RenderableType]:
+    """Yield sizes, the shock and the assumed speeds of a board drop."""
+    assert outlook.shock is not None
+    yield _sizes(case, outlook)
     yield _shock(case, outlook.shock)
     rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
     yield styled("\n[dim]Costs assume {}", rate)
@@ -54,13 +58,13 @@ def _joints(case: PackageCase, outlook: PackageForecast) -> str:
 
 
 def _expected(shock: ShockForecast, seconds: float) -> str:
-    """Write what is expected of a wall time [s] for the longest duration, and that time where it is another."""
+    """Return the expected and the longest wall time as text, from the wall time [s] of the longest duration."""
     most = f", at most {duration(seconds)}" if shock.share < 1.0 else ""
     return f"about {duration(shock.share * seconds)}{most}"
 
 
 def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
-    every = case.shock.ranks.total
+    rank_count = case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
     table.add_row("scheme", shock.scheme.replace("_", " "), shock.reason)
     table.add_row("fine joints", *_fine_joints(case))
@@ -75,11 +79,9 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("two-scale", _expected(shock, shock.two_scale), _placement(case) + _absent("two_scale", case))
     if case.shock.identical_joints:
         again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns
-        table.add_row(
-            "identical joints", _expected(shock, again), "the first mode again, to see what the real shapes change"
-        )
+        table.add_row("identical joints", _expected(shock, again), "the first mode again, with identical joint shapes")
     part = f"; the first {short(shock.dns_share * longest_duration(case))}" if shock.dns_share < 1.0 else ""
-    dns = f"all {every} ranks on one model{part}" + _absent("dns", case)
+    dns = f"all {rank_count} ranks on one model{part}" + _absent("dns", case)
     table.add_row("DNS", _expected(shock, shock.dns), dns)
     table.add_row(
         "DNS, implicit steps", f"about {duration(shock.implicit)}", "one rank; elastic only (shock.numerics.dns_solver)"
@@ -90,7 +92,7 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
 
 
 def _levels(shock: ShockForecast) -> tuple[str, str]:
-    """Say how many steps the levels take in a window, and what share of the elements is not at the window's."""
+    """Return the steps of the levels in a window, and the share of elements below the window level, as text."""
     elements = [level.elements for level in shock.levels]
     counts = ", ".join(str(level.count) for level in shock.levels)
     share = 1.0 - elements[0] / sum(elements)
@@ -101,7 +103,7 @@ def _levels(shock: ShockForecast) -> tuple[str, str]:
 
 
 def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
-    """Say how many joints are fine, and which."""
+    """Return the number of fine joints and their names, as text."""
     coupling = case.shock.coupling
     if coupling.fine_joints == "critical":
         return f"{coupling.critical_joints}", "the most stressed joints of a preceding run with coarse joints"
@@ -111,16 +113,16 @@ def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
 
 
 def _placement(case: BoardDropCase) -> str:
-    """Say which MPI rank works on which model."""
+    """Return the placement of the models on the MPI ranks, as text."""
     ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
     if ranks.total == 1:
         return f"one rank, {cores}"
     if ranks.placement == "shared":
         return f"all {ranks.total} ranks on both models in turn, {cores}"
     macro = f"{ranks.macro} of {ranks.total}" if ranks.macro else f"some of {ranks.total}"
-    own = f"{macro} ranks on the macro model, the others on the meso model, at the same time"
+    disjoint = f"{macro} ranks on the macro model, the others on the meso model, at the same time"
     if ranks.placement == "disjoint":
-        return f"{own}, {cores}"
+        return f"{disjoint}, {cores}"
     shared = f"all {ranks.total} ranks on both models in turn, or each on one"
     return f"{shared}, decided by speeds measured during the run, {cores}"
 

@@ -94,7 +94,7 @@ def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
 
 
 def _of_coupling(case: BoardDropCase) -> Iterator[Problem]:
-    """Find local steps of what has a path."""
+    """Yield the problem of local time steps with plastic materials or finite rotations."""
     if case.shock.coupling.scheme != "local_steps" or "two_scale" not in case.shock.numerics.modes:
         return
     yielding = _yielding(case)

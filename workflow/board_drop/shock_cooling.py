@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.fem.estimates.thermal_effects import ResidualStress
-from reflowshock.kernel_place import digest
+from reflowshock.kernel_cache import digest
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.part_forecast import PartForecast, role_of
 from reflowshock.workflow.case.run import Findings, Run

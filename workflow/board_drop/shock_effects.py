@@ -1,4 +1,4 @@
-"""The effects of a board's shock, decided before it runs: what acts, why, and what it is expected to change."""
+"""Effects of a shock, decided before it runs: state, reason and expected influence."""
 
 from typing import Any
 
@@ -19,13 +19,13 @@ def shock_effects(case: BoardDropCase) -> dict[str, Decision]:
 
 
 def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
-    """Decide which joints are meshed beside the real, fine ones."""
+    """Decide which further joint meshes are made: coarse and identical joints."""
     return decided(OF_JOINTS, DropScene(case))
 
 
-def with_influence(found: dict, case: BoardDropCase) -> dict[str, Any]:
+def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
     """Return the effects of a run with their predicted influence."""
     predicted = shock_effects(case)
-    known = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) for name in found}
+    known = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) for name in effects}
     expected = {name: {"influence": item["influence"]} for name, item in known.items() if item and "influence" in item}
-    return {name: record | expected.get(name, {}) for name, record in found.items()}
+    return {name: record | expected.get(name, {}) for name, record in effects.items()}

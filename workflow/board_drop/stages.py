@@ -1,6 +1,6 @@
-"""The stages of a package on a board: geometry -> reflow -> surface -> solder_mesh -> shock.
+"""Stages of a package on a board: geometry -> reflow -> surface -> solder_mesh -> shock.
 
-The reflow is in `reflow/stage.py`; the shock is there only where the case has one.
+The reflow stage is in ``reflow/stage.py``. Only cases with a ``[shock]`` table have the stage shock.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from reflowshock.workflow.process.products import read_json, write_json
 
 
 def geometry(run: Run[PackageCase], folder: Path) -> Findings:
-    """Mesh board and package, both flat; tabulate the pads."""
+    """Mesh the flat board and the flat package, and write the pad table."""
     from reflowshock.meshing.board.assembly import write_assembly
     from reflowshock.meshing.board.pads import pad_table, write_pads
     from reflowshock.meshing.board.parameters import Warpage
@@ -29,7 +29,7 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:
-    """Close the surface of each joint, or take the one that the user gives, and measure it."""
+    """Close the surface of each joint, or read the user's surface, and measure it."""
     from reflowshock.workflow.board_drop.joint_meshes import write_surfaces
 
     surfaces = write_surfaces(run, folder)
@@ -38,20 +38,28 @@ def surface(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
-    """Put the package where the solder froze and mesh every joint in its place; once more if all were alike."""
+    """Place the package at its position after solidification and mesh every joint."""
+    from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
+
+    return findings.of_solder_mesh(mesh_real_joints(run.case, run.folder, folder, coarse=False), {})
+
+
+def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
+    """Mesh every joint, and the coarse and identical joints that the shock needs."""
+    from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
     from reflowshock.workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
     from reflowshock.workflow.board_drop.shock_effects import of_joint_meshes
 
-    case, qualities = run.case, mesh_real_joints(run, folder)
-    if not isinstance(case, BoardDropCase):
-        return findings.of_solder_mesh(qualities, {})
+    case = run.case
+    coarse = needs_coarse_joints(case.shock.coupling)
+    qualities = mesh_real_joints(case, run.folder, folder, coarse=coarse)
     if case.shock.identical_joints:
-        qualities |= mesh_identical_joints(run, folder)
+        qualities |= mesh_identical_joints(run, folder, coarse=coarse)
     return findings.of_solder_mesh(qualities, of_joint_meshes(case))
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Drop the board: each mode is one MPI run of the package fem; two modes are compared, and identical joints."""
+    """Run the shock in each mode, one MPI run of ``fem`` each; compare modes, and real with identical joints."""
     from reflowshock.workflow.board_drop.shock_cooling import with_cooling
     from reflowshock.workflow.board_drop.shock_effects import with_influence
     from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
@@ -63,10 +71,10 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     for mode in run.case.shock.numerics.modes:
         run_mode(run, folder / mode, mode, fine)
     results = read_results(folder)
-    found = findings.of_shock(results, folder, run.case.board.thickness)
-    found = replace(found, effects=with_influence(found.effects, run.case))
+    shock_findings = findings.of_shock(results, folder, run.case.board.thickness)
+    shock_findings = replace(shock_findings, effects=with_influence(shock_findings.effects, run.case))
     if run.case.shock.identical_joints:
         main = next(iter(results))
         run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
-        found = identical_joints.compared(found, run, folder, main)
-    return with_cooling(found, run.case, folder)
+        shock_findings = identical_joints.compared(shock_findings, run, folder, main)
+    return with_cooling(shock_findings, run.case, folder)

@@ -1,1 +1,1 @@
-"""The command ``compare``: runs side by side, what differs in their parameters and in their answers."""
+"""The command ``compare``: differences between runs in parameters and results. Start with `runs.py`."""

@@ -1,4 +1,4 @@
-"""compare.html: runs side by side, with their histories in one chart; and the same tables on the terminal."""
+"""Comparison of runs as a page, with their histories in common charts, and as tables in the terminal."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from rich.table import Table
 from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.compare.runs import ComparedRun, answers, differing, joints, parameters
+from reflowshock.workflow.compare.runs import ComparedRun, differing, joints, parameters, results
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import CYCLE
 from reflowshock.workflow.report.curves import MEGA, MILLI, TIME
@@ -18,46 +18,48 @@ from reflowshock.workflow.report.template import write_page
 
 TEMPLATE = "compare.html.j2"
 MARK = b'<meta name="generator" content="reflowshock compare">'
-SHOWN = 24  # rows of answers on a terminal; the page has all
+MOST_ROWS = 24  # results in the terminal; the page has all
 LINES = ("solid", "dashed", "dotted")
 
 
 def show(runs: Sequence[ComparedRun], console: Console) -> None:
-    """Print in which parameters and answers runs differ."""
-    changed, found = parameters(runs), differing(answers(runs))
-    console.print(_table(changed) if changed["rows"] else "all parameters are the same")
-    console.print(_table(found | {"rows": found["rows"][:SHOWN]}) if found["rows"] else "all answers are the same")
-    if len(found["rows"]) > SHOWN:
-        console.print(f"{len(found['rows']) - SHOWN} more answers differ: --out compare.html has all")
+    """Print the parameters and results in which runs differ."""
+    changed, different = parameters(runs), differing(results(runs))
+    console.print(_table(changed) if changed["rows"] else "all parameters are equal")
+    console.print(
+        _table(different | {"rows": different["rows"][:MOST_ROWS]}) if different["rows"] else "all results are equal"
+    )
+    if len(different["rows"]) > MOST_ROWS:
+        console.print(f"{len(different['rows']) - MOST_ROWS} more results differ; use --out compare.html for all")
 
 
 def _table(table: dict) -> Table:
-    made = Table(*table["head"], title_justify="left")
-    for column in made.columns[1:]:
+    layout = Table(*table["head"], title_justify="left")
+    for column in layout.columns[1:]:
         column.justify = "right"
     for row in table["rows"]:
-        made.add_row(*row)
-    return made
+        layout.add_row(*row)
+    return layout
 
 
 def write(runs: Sequence[ComparedRun], path: Path) -> None:
     """Write the page.
 
     Raises:
-        CaseError: the file exists and is no page of this command, or its folder does not exist.
+        CaseError: The file exists and was not written by this command, or its folder does not exist.
     """
     if not path.parent.is_dir():
-        raise CaseError(str(path), [Problem("", f"cannot be written: there is no folder {path.parent}")])
+        raise CaseError(str(path), [Problem("", f"cannot be written: the folder {path.parent} does not exist")])
     if path.exists() and (path.is_dir() or MARK not in path.read_bytes()):
         raise CaseError(
-            str(path), [Problem("", "exists and was not written by reflowshock compare; give another --out")]
+            str(path), [Problem("", "exists and was not written by reflowshock compare; choose another --out")]
         )
     context = {
         "version": __version__,
         "names": [run.name for run in runs],
         "titles": [run.case.case.title or run.case.case.name for run in runs],
         "parameters": parameters(runs),
-        "answers": answers(runs),
+        "answers": results(runs),
         "joints": joints(runs),
         "curves": {"histories": histories(runs)},
     }
@@ -65,7 +67,7 @@ def write(runs: Sequence[ComparedRun], path: Path) -> None:
 
 
 def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
-    """Return the histories that all runs have: the board's centre, the first run's critical joint, watch points."""
+    """Return charts of common histories: board centre, critical joint of the first run, watch points."""
     from reflowshock.fem.output.ranking import PEEL, critical_joint
     from reflowshock.workflow.report.histories import joint_stress
 
@@ -73,8 +75,8 @@ def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
         return []
     charts = []
     if all("board_centre" in run.history for run in runs):
-        moved = [run.history["board_centre"][:, 2] / MILLI for run in runs]
-        charts.append(_chart("board centre, relative to table [mm]", runs, moved))
+        deflections = [run.history["board_centre"][:, 2] / MILLI for run in runs]
+        charts.append(_chart("board centre relative to the table [mm]", runs, deflections))
     if all("peel_board" in run.history for run in runs):
         first = runs[0].history
         joint = str(first["joints"][critical_joint(first)])
@@ -82,7 +84,7 @@ def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
             stress = [joint_stress(run.history, joint, PEEL) / MEGA for run in runs]
             charts.append(_chart(f"peel stress of {joint} [MPa]", runs, stress))
     shared = [name for name in runs[0].history if name.startswith("displacement@")]
-    for name in (one for one in shared if all(one in run.history for run in runs)):
+    for name in (name for name in shared if all(name in run.history for run in runs)):
         axis = int(np.argmax(np.abs(runs[0].history[name]).max(axis=0)))
         label = f"displacement {'xyz'[axis]} of {name.partition('@')[2]} [mm]"
         charts.append(_chart(label, runs, [run.history[name][:, axis] / MILLI for run in runs]))

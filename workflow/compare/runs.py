@@ -1,4 +1,4 @@
-"""What runs have in common and where they differ: parameters, verdicts, metrics, joints, histories."""
+"""Comparison of runs: parameters, verdicts, metrics, joints, histories."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from reflowshock.workflow.pipeline.report import collect_summary
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.tables import named_quantity
 
-MODES = ("two_scale", "dns", "explicit", "implicit")  # the first that a run has is compared
+MODES = ("two_scale", "dns", "explicit", "implicit")  # the first mode of a run is compared
 NONE = "–"
-SMALLEST_CHANGE = 1e-4  # share; below it two values are the same
+SMALLEST_CHANGE = 1e-4  # relative difference below which two values count as equal
 FIRST = (
     "critical_joint", "peel_stress", "layer_von_mises", "layer_plastic_work", "section_axial_force",
     "section_bending_moment", "peak_acceleration@package", "peak_board_strain", "peak_board_displacement",
@@ -32,13 +32,13 @@ FIRST = (
 
 @dataclass(frozen=True, slots=True)
 class ComparedRun:
-    """A run.
+    """Run in a comparison.
 
     Attributes:
-        name: of its folder; the whole path where another one has this name.
-        case: the resolved case.
-        summary: ``summary.json``, or of a run that has not come to its end what its stages found.
-        history: arrays of the first mode; empty without any.
+        name: Name of its folder; the whole path if another run has the same name.
+        case: Resolved case.
+        summary: Content of ``summary.json``; for an incomplete run, the findings of its stages.
+        history: Arrays of the first mode; empty without a shock.
     """
 
     name: str
@@ -51,21 +51,21 @@ def read_runs(folders: Sequence[Path]) -> list[ComparedRun]:
     """Read two or more run folders.
 
     Raises:
-        CaseError: fewer than two, one twice, one that is no run folder, or runs of different kinds of case.
+        CaseError: Fewer than two folders, a repeated one, one that is not a run folder, or different kinds of case.
     """
     if len(folders) < 2:
-        raise CaseError("compare", [Problem("", "needs two or more run folders", len(folders), "2 or more")])
+        raise CaseError("compare", [Problem("", "requires two or more run folders", len(folders), "2 or more")])
     resolved = [folder.resolve() for folder in folders]
-    twice = next((folder for k, folder in enumerate(folders) if resolved[k] in resolved[:k]), None)
-    if twice is not None:
-        raise CaseError(str(twice), [Problem("", "is given twice")])
+    repeated = next((folder for k, folder in enumerate(folders) if resolved[k] in resolved[:k]), None)
+    if repeated is not None:
+        raise CaseError(str(repeated), [Problem("", "is given twice")])
     last = [folder.name for folder in resolved]
     names = [str(folder) if last.count(name) > 1 else name for folder, name in zip(folders, last, strict=True)]
     runs = [_read(folder, name) for folder, name in zip(folders, names, strict=True)]
     other = next((run for run in runs if kind_of(run.case) is not kind_of(runs[0].case)), None)
     if other is not None:
         kinds = [kind_of(run.case).name for run in (runs[0], other)]
-        message = f"is a run of another kind of case, [{kinds[1]}], than {runs[0].name}, [{kinds[0]}]"
+        message = f"is a run of kind [{kinds[1]}], but {runs[0].name} is of kind [{kinds[0]}]"
         raise CaseError(other.name, [Problem("", message)])
     return runs
 
@@ -74,8 +74,8 @@ def _read(folder: Path, name: str) -> ComparedRun:
     case = read_case_of_run(folder)
     path = folder / "summary.json"
     summary = read_json(path) if path.exists() else collect_summary(folder, case)
-    found = (folder / "shock" / mode / "history.npz" for mode in MODES)
-    history = next((path for path in found if path.exists()), None)
+    paths = (folder / "shock" / mode / "history.npz" for mode in MODES)
+    history = next((path for path in paths if path.exists()), None)
     if history is None:
         return ComparedRun(name, case, summary, {})
     with np.load(history) as arrays:
@@ -83,35 +83,35 @@ def _read(folder: Path, name: str) -> ComparedRun:
 
 
 def parameters(runs: Sequence[ComparedRun]) -> dict:
-    """Return the parameters in which the runs differ, each run a column."""
+    """Return the table of parameters in which the runs differ, one column per run."""
     values = [display_values(run.case) for run in runs]
-    keys = dict.fromkeys(key for one in values for key in one if not key.startswith("case."))
-    rows = [[key, *(one.get(key, NONE) for one in values)] for key in keys]
+    keys = dict.fromkeys(key for texts in values for key in texts if not key.startswith("case."))
+    rows = [[key, *(texts.get(key, NONE) for texts in values)] for key in keys]
     return _table("parameter", runs, [row for row in rows if len(set(row[1:])) > 1])
 
 
-def answers(runs: Sequence[ComparedRun]) -> dict:
-    """Return verdict and metrics of the runs, what matters most first; each but the first with its change."""
+def results(runs: Sequence[ComparedRun]) -> dict:
+    """Return the table of verdicts and metrics, the most important first, with changes relative to the first run."""
     metrics = [run.summary["metrics"] for run in runs]
-    names = dict.fromkeys([*FIRST, *(name for one in metrics for name in one)])
+    names = dict.fromkeys([*FIRST, *(name for run_metrics in metrics for name in run_metrics)])
     rows = [
         [
             name.replace("_", " "),
-            *_texts([one.get(name) for one in metrics], partial(_text, name)),
+            *_texts([run_metrics.get(name) for run_metrics in metrics], partial(_text, name)),
         ]
         for name in names
-        if any(name in one for one in metrics)
+        if any(name in run_metrics for run_metrics in metrics)
     ]
-    return _table("answer", runs, [*_verdicts(runs), *rows])
+    return _table("result", runs, [*_verdicts(runs), *rows])
 
 
 def differing(table: Mapping[str, Any]) -> dict:
-    """Return the rows of a table in which its columns differ."""
+    """Return a table with only the rows in which columns differ."""
     return {"head": table["head"], "rows": [row for row in table["rows"] if len(set(row[1:])) > 1]}
 
 
 def joints(runs: Sequence[ComparedRun]) -> dict | None:
-    """Return the peak peel stress of every joint that all runs have, the most stressed of the first run first."""
+    """Return the table of peak peel stress of all common joints, ordered by the first run; None without a shock."""
     from reflowshock.workflow.report.histories import peel_peaks
 
     if not all("peel_board" in run.history for run in runs):
@@ -119,9 +119,9 @@ def joints(runs: Sequence[ComparedRun]) -> dict | None:
     peaks = [peel_peaks(run.history) for run in runs]
     rows = []
     for name in peaks[0]:
-        if all(name in one for one in peaks):
-            metrics = [{"value": one[name], "unit": "Pa"} for one in peaks]
-            ranks = [list(one).index(name) + 1 for one in peaks]
+        if all(name in run_peaks for run_peaks in peaks):
+            metrics = [{"value": run_peaks[name], "unit": "Pa"} for run_peaks in peaks]
+            ranks = [list(run_peaks).index(name) + 1 for run_peaks in peaks]
             rows.append([name, *_texts(metrics, _stress), " / ".join(map(str, ranks))])
     return {"head": ["peel stress of joint", *(run.name for run in runs), "rank"], "rows": rows}
 
@@ -131,32 +131,34 @@ def _stress(metric: Mapping[str, Any]) -> str:
 
 
 def _verdicts(runs: Sequence[ComparedRun]) -> list[list[str]]:
-    """Return rows of health, verdict and margin, as far as the runs have them."""
-    missed = [
+    """Return the rows of health, verdict and smallest margin, if the runs have them."""
+    failed = [
         [name.replace("_", " ") for name, check in run.summary["health"].items() if not check["ok"]] for run in runs
     ]
-    rows = [["health", *(f"missed: {', '.join(names)}" if names else "held" for names in missed)]]
-    found = [run.summary.get("verdict") for run in runs]
-    if any(found):
-        rows.append(["verdict on the design", *(NONE if one is None else one["design"] for one in found)])
-        margins = [None if one is None else one["joints"][one["joint"]]["margin"] for one in found]
+    rows = [["health", *(f"failed: {', '.join(names)}" if names else "passed" for names in failed)]]
+    verdicts = [run.summary.get("verdict") for run in runs]
+    if any(verdicts):
+        rows.append(
+            ["verdict on the design", *(NONE if verdict is None else verdict["design"] for verdict in verdicts)]
+        )
+        margins = [None if verdict is None else verdict["joints"][verdict["joint"]]["margin"] for verdict in verdicts]
         if any(margin is not None for margin in margins):
-            rows.append(["least margin", *(NONE if margin is None else f"{margin:.3g}" for margin in margins)])
+            rows.append(["smallest margin", *(NONE if margin is None else f"{margin:.3g}" for margin in margins)])
     return rows
 
 
 def _texts(metrics: Sequence[Mapping | None], text: Callable[[Mapping], str]) -> list[str]:
-    """Write values; those after the first with their change, where that can be said."""
+    """Write values; those after the first with their relative change, if it is defined."""
     first, *others = metrics
-    told = [NONE if first is None else text(first)]
+    texts = [NONE if first is None else text(first)]
     for metric in others:
         change = "" if first is None or metric is None else _change(first["value"], metric["value"])
-        told.append(NONE if metric is None else text(metric) + change)
-    return told
+        texts.append(NONE if metric is None else text(metric) + change)
+    return texts
 
 
 def _change(first: Any, other: Any) -> str:
-    """Write by how much two values differ; nothing where that is little or has no meaning."""
+    """Write the relative change between two values; empty if it is negligible or undefined."""
     if any(isinstance(value, str | bool) or value is None for value in (first, other)) or not first:
         return ""
     share = other / first - 1.0

@@ -20,7 +20,7 @@ from reflowshock.workflow.convergence.convergence_study import (
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.store.product import read_record
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_places, wave_points
+from reflowshock.workflow.structure.findings import exact_velocities, read_history, read_positions, wave_points
 from reflowshock.workflow.structure.references import BarWave, Cantilever, LayeredBar
 from reflowshock.workflow.structure.stages import solver_folders
 
@@ -83,7 +83,7 @@ def _wave(reference: BarWave | LayeredBar, case: StructureCase, run_folder: Path
     axial = {f"{point}": history[f"velocity@{point}"][:, 2] for point in wave_points(reference)}
     velocities = resample({"time": history["time"], **axial}, axial, case.dynamics.duration, count)
     times = sample_times(case.dynamics.duration, count)
-    exact = exact_velocities(case, reference, read_places(folder), times)
+    exact = exact_velocities(case, reference, read_positions(folder), times)
     return {"wave_error": Quantity(velocities, exact, None, "waves in layers")}
 
 

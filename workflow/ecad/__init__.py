@@ -1,1 +1,4 @@
-"""Boards from ECAD files: what a file says of outline, holes and pads, and the case that is made of it."""
+"""Import of boards from ECAD files: readers for outline, holes and pads, and the case files written from them.
+
+Start with ``command.py``; each reader returns a ``Layout`` (``layout.py``).
+"""

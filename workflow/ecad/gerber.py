@@ -1,4 +1,4 @@
-"""Boards of Gerber X2 and Excellon files in a folder: gerbonara reads them, their attributes say what each one is."""
+"""Reader for boards in a folder of Gerber X2 and Excellon files, which gerbonara parses and X2 attributes identify."""
 
 import json
 import warnings
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reflowshock.workflow.ecad.layout import (
+    MAX_ITEMS,
     MILLI,
-    MOST_ITEMS,
     Component,
     EcadError,
     EcadPad,
@@ -19,71 +19,69 @@ from reflowshock.workflow.ecad.layout import (
     arc_about,
     box_around,
     checked_number,
-    named,
+    components_by_reference,
     outline_notes,
+    read_text,
     round_diameter,
-    text_of,
 )
 
 if TYPE_CHECKING:
     from gerbonara import GerberFile
 
-MOST_FILES = 200
-SAME = 1e-6  # m: pad and opening whose centres are closer belong together
+MAX_FILES = 200
+POSITION_TOLERANCE = 1e-6  # m: a pad and an opening with closer centres belong together
 SHAPES = {"CircleAperture": "circle", "ObroundAperture": "oval"}
 VIA = "ViaDrill"
 
 
 def read_gerber(path: Path) -> Layout:
-    """Read the board whose files are in a folder: copper with pads that name their component, outline, drills.
+    """Read a board from a folder with copper, outline and drill files.
 
     Raises:
-        EcadError: a file is damaged, or there is no outline, or no pad says to which component it belongs (X2: ``.P``).
+        EcadError: A file is damaged, the outline is missing, or no pad has the X2 attribute ``.P`` (component, pin).
     """
     files = _files(path)
     gerbers = {name: _gerber(name, text) for name, text in files.items() if _kind(text) == "gerber"}
     by_function = {
         tuple(gerber.file_attrs.get(".FileFunction", ())): (name, gerber) for name, gerber in gerbers.items()
     }
-    profile = next((found for function, found in by_function.items() if function[:1] == ("Profile",)), None)
+    profile = next((file for function, file in by_function.items() if function[:1] == ("Profile",)), None)
     if profile is None:
-        raise EcadError(path, "has no outline: no Gerber X2 file has the attribute .FileFunction,Profile")
+        raise EcadError(path, "the outline is missing: no Gerber X2 file has the attribute .FileFunction,Profile")
     corners, straight = _outline(profile[1])
     if not corners:
-        raise EcadError(profile[0], "has no outline: nothing is drawn in it")
+        raise EcadError(profile[0], "the outline is missing: nothing is drawn in this file")
     low, high = box_around(corners)
     components = [component for side in ("Top", "Bot") for component in _components(by_function, side)]
     if not components:
-        raise EcadError(
-            path, "no pad says to which component it belongs: Gerber X2 with component attributes is wanted"
-        )
+        raise EcadError(path, "no pad has a component attribute (.P); export Gerber X2 with component attributes")
     return Layout(
         path, low, high, _thickness(path, files),
         tuple(hole for name, text in files.items() if _kind(text) == "drill" for hole in _holes(name, text)),
-        named(components, path),
+        components_by_reference(components, path),
         outline_notes(corners, straight),
     )  # fmt: skip
 
 
 def _files(path: Path) -> dict[Path, str]:
-    """Return the texts of all files of a folder that can be text."""
+    """Return the contents of all text files of a folder."""
     if not path.is_dir():
-        raise EcadError(path, "there is no such folder")
+        raise EcadError(path, "no such folder")
     names = sorted(name for name in path.iterdir() if name.is_file() and not name.name.startswith("."))
-    if len(names) > MOST_FILES:
-        raise EcadError(path, f"has {len(names)} files, allowed: up to {MOST_FILES}")
-    found = {}
+    if len(names) > MAX_FILES:
+        raise EcadError(path, f"the folder has {len(names)} files; allowed: up to {MAX_FILES}")
+    texts = {}
     for name in names:
         try:
-            found[name] = text_of(name)
+            texts[name] = read_text(name)
         except EcadError as error:
-            if not isinstance(error.__cause__, UnicodeDecodeError):  # pictures and archives beside the board
+            if not isinstance(error.__cause__, UnicodeDecodeError):  # pictures and archives may lie in the same folder
                 raise
-    return found
+    return texts
 
 
 def _kind(text: str) -> str:
-    """Return what a file is: Gerber, drill, job (JSON), or nothing of interest."""
+    """Return the type of a file: "gerber", "drill", "job" (JSON), or empty."""
     if "%FS" in text:
         return "gerber"
     if text.lstrip().startswith("M48"):
@@ -95,33 +93,33 @@ def _gerber(path: Path, text: str) -> "GerberFile":
     from gerbonara import GerberFile
 
     if not text.rstrip().endswith(("M02*", "M00*")):
-        raise EcadError(path, "ends too early: its last command is not M02*")
+        raise EcadError(path, "the file is truncated: its last command is not M02*")
     return _parsed(path, GerberFile, text)
 
 
 def _parsed(path: Path, kind: Any, text: str) -> Any:
-    """Read a file by gerbonara, whose readers raise anything where a file is damaged."""
+    """Parse a file with gerbonara; its parsers raise exceptions of any type for damaged files."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = kind.from_string(text)
+            parsed = kind.from_string(text)
     except RecursionError as error:
-        raise EcadError(path, "is nested too deeply") from error
+        raise EcadError(path, "the file is nested too deeply") from error
     except Exception as error:
         raise EcadError(path, f"cannot be read: {str(error) or type(error).__name__}") from error
-    if len(found.objects) > MOST_ITEMS:
-        raise EcadError(path, f"has {len(found.objects)} objects, allowed: up to {MOST_ITEMS}")
-    return found
+    if len(parsed.objects) > MAX_ITEMS:
+        raise EcadError(path, f"the file has {len(parsed.objects)} objects; allowed: up to {MAX_ITEMS}")
+    return parsed
 
 
 def _point(item: Any, x: str, y: str) -> Point:
-    """Return a point of an object of gerbonara [m]."""
+    """Return the point in two attributes of a gerbonara object [m]."""
     scale = MILLI if str(item.unit) == "mm" else 25.4 * MILLI
     return scale * getattr(item, x), scale * getattr(item, y)
 
 
 def _outline(profile: "GerberFile") -> tuple[list[Point], bool]:
-    """Return the points of what is drawn [m], and whether it is straight."""
+    """Return the points of the drawn outline [m], and whether all its segments are straight."""
     points: list[Point] = []
     straight = True
     for item in profile.objects:
@@ -129,7 +127,7 @@ def _outline(profile: "GerberFile") -> tuple[list[Point], bool]:
             continue
         ends = _point(item, "x1", "y1"), _point(item, "x2", "y2")
         if hasattr(item, "clockwise"):
-            offset = _point(item, "cx", "cy")  # from its start
+            offset = _point(item, "cx", "cy")  # relative to the start
             centre = (ends[0][0] + offset[0], ends[0][1] + offset[1])
             points += arc_about(centre, *ends, clockwise=item.clockwise)
             straight = False
@@ -139,9 +137,9 @@ def _outline(profile: "GerberFile") -> tuple[list[Point], bool]:
 
 
 def _components(by_function: dict[tuple, tuple[Path, "GerberFile"]], side: str) -> Iterator[Component]:
-    """Yield the components on a side: flashes of its copper with the attribute ``.P`` (reference, pin)."""
+    """Yield the components on a side from its copper flashes with the attribute ``.P`` (reference, pin)."""
     copper = next(
-        (found for function, found in by_function.items() if function[:1] + function[2:3] == ("Copper", side)), None
+        (file for function, file in by_function.items() if function[:1] + function[2:3] == ("Copper", side)), None
     )
     if copper is None:
         return
@@ -153,12 +151,12 @@ def _components(by_function: dict[tuple, tuple[Path, "GerberFile"]], side: str) 
         if hasattr(item, "x") and len(owner) >= 2 and item.polarity_dark:
             at = _point(item, "x", "y")
             pads[owner[0]].append(EcadPad(owner[1], at, _diameter(path, item), openings.get(_cell(at))))
-    for reference, found in pads.items():
-        yield Component(reference, "", "top" if side == "Top" else "bottom", tuple(found))
+    for reference, pad_list in pads.items():
+        yield Component(reference, "", "top" if side == "Top" else "bottom", tuple(pad_list))
 
 
 def _openings(mask: "tuple[Path, GerberFile] | None") -> dict[tuple[int, int], float]:
-    """Return the diameters [m] of a mask's openings by where they are."""
+    """Return the diameters of the solder mask openings [m] by position on a fine grid."""
     if mask is None:
         return {}
     path, gerber = mask
@@ -166,14 +164,14 @@ def _openings(mask: "tuple[Path, GerberFile] | None") -> dict[tuple[int, int], f
 
 
 def _cell(at: Point) -> tuple[int, int]:
-    return round(at[0] / SAME), round(at[1] / SAME)
+    return round(at[0] / POSITION_TOLERANCE), round(at[1] / POSITION_TOLERANCE)
 
 
 def _diameter(path: Path, item: Any) -> float:
-    """Return the diameter [m] of a circle as large as a flash."""
+    """Return the diameter of the circle with the area of a flash [m]."""
     aperture = item.aperture
     if aperture is None:
-        raise EcadError(path, "has a flash without an aperture")
+        raise EcadError(path, "the file has a flash without an aperture")
     scale = MILLI if str(aperture.unit or item.unit) == "mm" else 25.4 * MILLI
     if hasattr(aperture, "diameter"):
         return scale * checked_number(path, "an aperture", aperture.diameter, 1e3)
@@ -184,23 +182,23 @@ def _diameter(path: Path, item: Any) -> float:
 
 
 def _holes(path: Path, text: str) -> Iterator[Hole]:
-    """Yield the holes of a drill file but those of vias."""
+    """Yield the holes of a drill file except vias."""
     from gerbonara import ExcellonFile
 
     if not text.rstrip().endswith(("M30", "M00")):
-        raise EcadError(path, "ends too early: its last command is not M30")
-    tools = _functions_of_tools(text)
+        raise EcadError(path, "the file is truncated: its last command is not M30")
+    tools = _tool_functions(text)
     for item in _parsed(path, ExcellonFile, text).objects:
         if hasattr(item, "x"):
             scale = MILLI if str(item.unit) == "mm" else 25.4 * MILLI
             diameter = scale * checked_number(path, "a tool", item.aperture.diameter, 1e3)
-            if not any(VIA in function and abs(diameter - size) < SAME for size, function in tools):
+            if not any(VIA in function and abs(diameter - size) < POSITION_TOLERANCE for size, function in tools):
                 yield Hole(_point(item, "x", "y"), diameter)
 
 
-def _functions_of_tools(text: str) -> list[tuple[float, str]]:
-    """Return diameter [m] and function of the tools of a drill file, as X2 comments above them say."""
-    found, function, scale = [], "", MILLI
+def _tool_functions(text: str) -> list[tuple[float, str]]:
+    """Return diameter [m] and function of the tools of a drill file, from the X2 comment above each tool."""
+    tools, function, scale = [], "", MILLI
     for line in text.splitlines():
         if line.startswith("INCH"):
             scale = 25.4 * MILLI
@@ -209,14 +207,14 @@ def _functions_of_tools(text: str) -> list[tuple[float, str]]:
         elif line.startswith("T") and "C" in line:
             size = line.partition("C")[2].split("F")[0].split("S")[0]
             with_size = size.replace(".", "", 1).isdigit()
-            found += [(scale * float(size), function)] if with_size else []
+            tools += [(scale * float(size), function)] if with_size else []
         elif line.startswith("%"):
             break
-    return found
+    return tools
 
 
 def _thickness(path: Path, files: dict[Path, str]) -> float | None:
-    """Return the board's thickness [m] from a Gerber job file, if there is one."""
+    """Return the thickness of the board [m] from a Gerber job file, or None."""
     for name, text in files.items():
         if _kind(text) == "job":
             try:

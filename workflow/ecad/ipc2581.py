@@ -1,4 +1,4 @@
-"""Boards of IPC-2581 (XML): outline, stack-up, pads with the pins that they belong to, drills; nothing else."""
+"""Reader for boards in IPC-2581 (XML): outline, stack-up thickness, pads with their pins, and drilled holes."""
 
 import math
 from collections import defaultdict
@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.ecad.layout import (
+    MAX_ITEMS,
     MILLI,
-    MOST_ITEMS,
     Component,
     EcadError,
     EcadPad,
@@ -18,10 +19,10 @@ from reflowshock.workflow.ecad.layout import (
     arc_about,
     box_around,
     checked_number,
-    named,
+    components_by_reference,
     outline_notes,
+    read_text,
     round_diameter,
-    text_of,
 )
 
 UNITS = {"MILLIMETER": MILLI, "MICRON": 1e-6, "INCH": 25.4 * MILLI}
@@ -31,41 +32,41 @@ Element = ElementTree.Element
 
 
 def read_ipc2581(path: Path) -> Layout:
-    """Read the first step of a board.
+    """Read the first step of an IPC-2581 file.
 
     Raises:
-        EcadError: the file is damaged, is no IPC-2581, declares entities, or has no outline.
+        EcadError: The file is damaged, is not IPC-2581, declares entities, or has no outline.
     """
     root = _root(path)
     step, header = _first(root, "Step"), _first(root, "CadHeader")
     if step is None or header is None:
-        raise EcadError(path, "has no board: a CadHeader and a Step are wanted")
+        raise EcadError(path, "the board is missing; required: a CadHeader and a Step")
     scale = _scale(header, path)
     corners, straight = _outline(_first(step, "Profile"), scale, path)
     layers = {layer.get("name", ""): layer for layer in _all(root, "Layer")}
     low, high = box_around(corners)
     stackup = _first(root, "Stackup")
     thickness = stackup.get("overallThickness") if stackup is not None else None
-    features = [_Feature(found, layers.get(found.get("layerRef", "")), path) for found in _all(step, "LayerFeature")]
+    features = [_Feature(item, layers.get(item.get("layerRef", "")), path) for item in _all(step, "LayerFeature")]
     return Layout(
         path, low, high,
         scale * checked_number(path, "overallThickness", thickness, 1e5) if thickness is not None else None,
         tuple(hole for feature in features for hole in feature.holes(scale)),
-        named(_components(step, features, _shapes(root, path), scale, path), path),
+        components_by_reference(_components(step, features, _shapes(root, path), scale, path), path),
         outline_notes(corners, straight),
     )  # fmt: skip
 
 
 def _root(path: Path) -> Element:
-    text = text_of(path)
+    text = read_text(path)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise EcadError(path, "declares entities, which no IPC-2581 file needs")
+        raise EcadError(path, "the file declares XML entities, which IPC-2581 does not use")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise EcadError(path, f"is damaged: {error}") from error
+        raise EcadError(path, f"the file is damaged: {error}") from error
     if _tag(root) != "IPC-2581":
-        raise EcadError(path, f"is not IPC-2581: its root is {_tag(root)[:40]}")
+        raise EcadError(path, f"the file is not IPC-2581: its root element is {_tag(root)[:40]}")
     return root
 
 
@@ -83,10 +84,10 @@ def _first(element: Element | None, name: str) -> Element | None:
 
 
 def _scale(element: Element, path: Path) -> float:
-    """Return the unit [m] of a header or a dictionary."""
+    """Return the length unit of a header or a dictionary [m]."""
     units = element.get("units", "")
     if units not in UNITS:
-        raise EcadError(path, f"has the unit {units[:20]!r}, allowed: {', '.join(UNITS)}")
+        raise EcadError(path, Problem("units", "unknown unit", units[:20], ", ".join(UNITS)))
     return UNITS[units]
 
 
@@ -99,7 +100,7 @@ def _point(element: Element, scale: float, path: Path) -> Point:
 
 
 def _outline(profile: Element | None, scale: float, path: Path) -> tuple[list[Point], bool]:
-    """Return the points of the outline [m], and whether it is straight; cut-outs are left out."""
+    """Return the points of the outline [m] and whether all its segments are straight; cut-outs are ignored."""
     polygon = _first(profile, "Polygon")
     points: list[Point] = []
     straight = True
@@ -107,30 +108,30 @@ def _outline(profile: Element | None, scale: float, path: Path) -> tuple[list[Po
         if _tag(step) == "PolyStepCurve":
             centre = scale * _number(step, "centerX", path), scale * _number(step, "centerY", path)
             if not points:
-                raise EcadError(path, "has an outline that begins with a curve")
+                raise EcadError(path, "the outline begins with a curve; it must begin with a point")
             points += arc_about(centre, points[-1], _point(step, scale, path), step.get("clockwise") == "true")
             straight = False
         else:
             points.append(_point(step, scale, path))
     if not points:
-        raise EcadError(path, "has no outline: its Step has no Profile with a Polygon")
+        raise EcadError(path, "the outline is missing: the Step has no Profile with a Polygon")
     return points, straight
 
 
 def _shapes(root: Element, path: Path) -> dict[str, float]:
-    """Return the diameters [m] of circles as large as the shapes of the dictionaries, by their names."""
-    found = {}
+    """Return the diameters of circles with the areas of the dictionary shapes [m], by name."""
+    diameters = {}
     for dictionary in _all(root, "DictionaryStandard"):
         scale = _scale(dictionary, path)
         for entry in _all(dictionary, "EntryStandard"):
             diameter = next((size for size in (_size(shape, path) for shape in entry) if size), None)
             if diameter:
-                found[entry.get("id", "")] = scale * diameter
-    return found
+                diameters[entry.get("id", "")] = scale * diameter
+    return diameters
 
 
 def _size(shape: Element, path: Path) -> float | None:
-    """Return the diameter of a circle as large as a shape, in its own unit; none where it has no sizes."""
+    """Return the diameter of the circle with the area of a shape, in the file's unit, or None without dimensions."""
     if shape.get("diameter"):
         return _number(shape, "diameter", path)
     if shape.get("width") and shape.get("height"):
@@ -140,7 +141,7 @@ def _size(shape: Element, path: Path) -> float | None:
 
 
 class _Feature:
-    """What is on a layer."""
+    """Pads and holes of one layer."""
 
     def __init__(self, element: Element, layer: Element | None, path: Path) -> None:
         self.element, self.path = element, path
@@ -148,21 +149,21 @@ class _Feature:
         self.side = layer.get("side", "") if layer is not None else ""
 
     def pads(self, shapes: dict[str, float], scale: float) -> Iterator[tuple[str, str, Point, float]]:
-        """Yield reference, pin, place and diameter of the pads that belong to a pin."""
+        """Yield reference, pin, location [m] and diameter [m] of the pads with a pin."""
         for count, pad in enumerate(_all(self.element, "Pad")):
-            if count > MOST_ITEMS:
-                raise EcadError(self.path, f"has more than {MOST_ITEMS} pads on a layer")
-            place, pin = _first(pad, "Location"), _first(pad, "PinRef")
+            if count > MAX_ITEMS:
+                raise EcadError(self.path, f"a layer has more than {MAX_ITEMS} pads")
+            location, pin = _first(pad, "Location"), _first(pad, "PinRef")
             shape = _first(pad, "StandardPrimitiveRef")
-            if place is None or pin is None or shape is None:
+            if location is None or pin is None or shape is None:
                 continue
             name = shape.get("id", "")
             if name not in shapes:
-                raise EcadError(self.path, f"a pad has the shape {name[:40]!r}, which no dictionary describes")
-            yield pin.get("componentRef", ""), pin.get("pin", ""), _point(place, scale, self.path), shapes[name]
+                raise EcadError(self.path, f"the shape {name[:40]!r} of a pad is in no dictionary")
+            yield pin.get("componentRef", ""), pin.get("pin", ""), _point(location, scale, self.path), shapes[name]
 
     def holes(self, scale: float) -> Iterator[Hole]:
-        """Yield the holes but those of vias."""
+        """Yield the holes except vias."""
         for hole in _all(self.element, "Hole"):
             if hole.get("platingStatus") != "VIA":
                 yield Hole(_point(hole, scale, self.path), scale * _number(hole, "diameter", self.path))
@@ -182,15 +183,15 @@ def _components(
         elif feature.function == "SOLDERMASK":
             openings |= {(reference, pin): size for reference, pin, _, size in feature.pads(shapes, scale)}
     bodies = {package.get("name", ""): _body(package, scale, path) for package in _all(step, "Package")}
-    found = {component.get("refDes", ""): component for component in _all(step, "Component")}
+    placed = {component.get("refDes", ""): component for component in _all(step, "Component")}
     return [
         Component(
             reference,
-            found[reference].get("part", "") if reference in found else "",
+            placed[reference].get("part", "") if reference in placed else "",
             sides[reference],
             tuple(EcadPad(pin, at, diameter, openings.get((reference, pin))) for pin, at, diameter in pads),
-            _turned(bodies.get(found[reference].get("packageRef", "")), found[reference], path)
-            if reference in found
+            _rotated_box(bodies.get(placed[reference].get("packageRef", "")), placed[reference], path)
+            if reference in placed
             else None,
         )
         for reference, pads in copper.items()
@@ -198,7 +199,7 @@ def _components(
 
 
 def _body(package: Element, scale: float, path: Path) -> Point | None:
-    """Return length and width [m] of a package as drawn."""
+    """Return length and width of a package without rotation [m], or None without an outline."""
     outline = _first(package, "Outline")
     if _first(outline, "Polygon") is None:
         return None
@@ -206,8 +207,8 @@ def _body(package: Element, scale: float, path: Path) -> Point | None:
     return x1 - x0, y1 - y0
 
 
-def _turned(body: Point | None, component: Element, path: Path) -> Point | None:
-    """Return length and width [m] along the board's axes of the box around a body as it is placed."""
+def _rotated_box(body: Point | None, component: Element, path: Path) -> Point | None:
+    """Return length and width of the bounding box of a rotated body along the board's axes [m]."""
     turn = _first(component, "Xform")
     angle = math.radians(_number(turn, "rotation", path)) if turn is not None and turn.get("rotation") else 0.0
     if body is None:

@@ -1,35 +1,37 @@
-"""What an ECAD file says of a board, in metres, seen from above: x to the right, y up. Every reader returns this."""
+"""Layout of a board as every ECAD reader returns it, in metres, seen from above with x to the right and y up."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.units import from_si
+from reflowshock.workflow.case.problems import CaseError
 
-LARGEST_FILE = 200_000_000  # bytes
-MOST_ITEMS = 200_000  # pads, holes or lines of an outline
+MAX_FILE_SIZE = 200_000_000  # bytes
+MAX_ITEMS = 200_000  # pads, holes or lines of an outline
 MILLI = 1.0e-3
-SMALLEST, SMALLEST_THICKNESS = 1.0e-3, 1.0e-5  # m: of a board
+MIN_SIDE, MIN_THICKNESS = 1.0e-3, 1.0e-5  # m: of a board
 Point = tuple[float, float]
 
 
-class EcadError(ValueError):
-    """A file is not what it should be, or has not what was asked for."""
+class EcadError(CaseError):
+    """Error in an ECAD file, or missing data in it."""
 
-    def __init__(self, path: Path, message: str) -> None:
-        """Name the file first."""
-        super().__init__(f"{path}: {message}")
+    def __init__(self, path: Path, problem: Problem | str) -> None:
+        """Take the file and its problem, or a message that concerns the file as a whole."""
+        super().__init__(str(path), [Problem("", problem) if isinstance(problem, str) else problem])
 
 
 @dataclass(frozen=True, slots=True)
 class EcadPad:
-    """A pad of a component: its copper and, where the file knows it, the opening of the solder mask above it.
+    """Pad of a component.
 
     Attributes:
-        name: of the pin, e.g. A1.
-        at: centre.
-        diameter: of a circle as large as the copper.
-        mask_opening: the same of the opening; none where the file does not say.
+        name: Name of the pin, e.g. A1.
+        at: Centre [m].
+        diameter: Diameter of a circle with the area of the copper [m].
+        mask_opening: Diameter of a circle with the area of the solder mask opening [m]; None if not in the file.
     """
 
     name: str
@@ -40,7 +42,15 @@ class EcadPad:
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A component: reference, value, side ("top" or "bottom"), pads, length and width of its body, if it is known."""
+    """Component on a board.
+
+    Attributes:
+        reference: Reference designator, e.g. U8.
+        value: Value or part name.
+        side: Side of the board, "top" or "bottom".
+        pads: Pads.
+        body: Length and width of the body along the board's axes [m]; None if not in the file.
+    """
 
     reference: str
     value: str
@@ -50,14 +60,14 @@ class Component:
 
     @property
     def centre(self) -> Point:
-        """Middle of the box around its pads."""
+        """Centre of the box around the pads [m]."""
         (x0, y0), (x1, y1) = box_around([pad.at for pad in self.pads])
         return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """A drilled hole."""
+    """Drilled hole: centre and diameter [m]."""
 
     at: Point
     diameter: float
@@ -65,15 +75,16 @@ class Hole:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A board.
+    """Board with its holes and components.
 
     Attributes:
-        path: the file, or the folder.
-        low, high: corners of the box around its outline.
-        thickness: of the board; none where the file does not say.
-        holes: all but those of vias.
-        components: by reference; those without one are ``_1``, ``_2`` and so on.
-        notes: what of the file cannot be kept, in words.
+        path: File or folder of the board.
+        low: Lower left corner of the box around the outline [m].
+        high: Upper right corner of the box around the outline [m].
+        thickness: Thickness of the board [m]; None if not in the file.
+        holes: All holes except vias.
+        components: Components by reference; those without a reference are called ``_1``, ``_2`` and so on.
+        notes: Simplifications of the file, for the user.
     """
 
     path: Path
@@ -86,62 +97,80 @@ class Layout:
 
 
 def in_mm(length: float, digits: int = 10) -> str:
-    """Write a length [m] in millimetres."""
+    """Format a length [m] in millimetres."""
     return from_si(length, "mm", digits)
 
 
-def checked_size(path: Path) -> Path:
-    """Return the path of a file that can be read and is not too large; raise EcadError."""
+def check_file(path: Path) -> Path:
+    """Return the path of an existing file of acceptable size, or raise ``EcadError``."""
     if not path.is_file():
-        raise EcadError(path, "there is no such file")
-    if path.stat().st_size > LARGEST_FILE:
-        raise EcadError(path, f"is larger than {LARGEST_FILE / 1e6:.0f} MB")
+        raise EcadError(path, "no such file")
+    if path.stat().st_size > MAX_FILE_SIZE:
+        raise EcadError(path, f"is larger than {MAX_FILE_SIZE / 1e6:.0f} MB")
     return path
 
 
-def checked_layout(layout: Layout) -> Layout:
-    """Return a layout that can be a board; raise EcadError where a size of it is not positive."""
+def check_layout(layout: Layout) -> Layout:
+    """Return a layout with positive dimensions unchanged, or raise ``EcadError``."""
     sides = [high - low for low, high in zip(layout.low, layout.high, strict=True)]
-    if min(sides) < SMALLEST:
+    if min(sides) < MIN_SIDE:
         raise EcadError(
-            layout.path, f"has an outline of {in_mm(sides[0], 4)} x {in_mm(sides[1], 4)}, which is no board"
+            layout.path, f"the outline of {in_mm(sides[0], 4)} x {in_mm(sides[1], 4)} is too small for a board"
         )
-    if layout.thickness is not None and not layout.thickness >= SMALLEST_THICKNESS:
-        raise EcadError(layout.path, f"says that the board is {in_mm(layout.thickness, 4)} thick, which cannot be")
+    if layout.thickness is not None and not layout.thickness >= MIN_THICKNESS:
+        raise EcadError(
+            layout.path, f"thickness of {in_mm(layout.thickness, 4)}; allowed: at least {in_mm(MIN_THICKNESS)}"
+        )
     for name, component in layout.components.items():
         sizes = [size for pad in component.pads for size in (pad.diameter, pad.mask_opening) if size is not None]
         if not all(size > 0.0 for size in sizes):
-            raise EcadError(layout.path, f"has a pad of {name} with a size that is not positive")
+            raise EcadError(layout.path, f"the size of a pad of {name} is not positive")
     return layout
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a file; raise EcadError."""
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file, or raise ``EcadError``."""
     try:
-        return checked_size(path).read_text(encoding="utf-8-sig")
+        return check_file(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise EcadError(path, f"cannot be read as text: {error}") from error
 
 
 def checked_number(path: Path, what: str, text: object, largest: float = 10.0) -> float:
-    """Return a finite number whose magnitude is at most ``largest``; raise EcadError."""
+    """Convert text to a finite number.
+
+    Args:
+        path: File, for messages.
+        what: Name of the number, for messages.
+        text: Text, or number of a parsed file.
+        largest: Largest allowed magnitude.
+
+    Raises:
+        EcadError: The text is not a number, or the number is too large.
+    """
     try:
         value = float(text)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise EcadError(path, f"{what} is {str(text)[:40]!r}, which is no number") from None
+        raise EcadError(path, f"{what} = {str(text)[:40]!r} is not a number") from None
     if not abs(value) <= largest:  # also nan
-        raise EcadError(path, f"{what} is {value:g}, allowed: up to {largest:g} in magnitude")
+        raise EcadError(path, f"{what} = {value:g} is out of range; allowed: up to {largest:g} in magnitude")
     return value
 
 
 def box_around(points: list[Point]) -> tuple[Point, Point]:
-    """Return the lowest and the highest corner of a box around points."""
+    """Return the lower left and upper right corners of the bounding box of points."""
     xs, ys = zip(*points, strict=True)
     return (min(xs), min(ys)), (max(xs), max(ys))
 
 
 def round_diameter(shape: str, width: float, height: float) -> float:
-    """Return the diameter of a circle as large as a shape: circle, oval or, for anything else, rectangle."""
+    """Return the diameter of the circle with the area of a shape.
+
+    Args:
+        shape: "circle", "oval", or anything else for a rectangle.
+        width: Width of the shape.
+        height: Height of the shape, in the unit of the width.
+    """
     if shape == "circle":
         return width
     if shape == "oval":
@@ -151,7 +180,7 @@ def round_diameter(shape: str, width: float, height: float) -> float:
 
 
 def arc_about(centre: Point, start: Point, end: Point, clockwise: bool, pieces: int = 64) -> list[Point]:
-    """Return points of an arc, a whole circle where it ends at its start; x to the right, y up."""
+    """Return points along an arc about a centre, a full circle if start and end coincide."""
     (x, y), radius = centre, math.dist(centre, start)
     first, last = (math.atan2(b - y, a - x) for a, b in (start, end))
     sweep = (first - last if clockwise else last - first) % math.tau or math.tau
@@ -160,23 +189,23 @@ def arc_about(centre: Point, start: Point, end: Point, clockwise: bool, pieces: 
 
 
 def outline_notes(points: list[Point], straight: bool) -> tuple[str, ...]:
-    """Say that an outline is not the box around it, where it has other corners or curves."""
+    """Return a note if an outline is not a rectangle along the axes, else nothing."""
     (x0, y0), (x1, y1) = box_around(points)
     margin = 1e-6 + 1e-6 * max(x1 - x0, y1 - y0)
     on_corners = all(
         min(abs(x - x0), abs(x - x1)) < margin and min(abs(y - y0), abs(y - y1)) < margin for x, y in points
     )
-    return () if straight and on_corners else ("the outline is not a rectangle: the box around it is taken",)
+    return () if straight and on_corners else ("the outline is not a rectangle: its bounding box is used",)
 
 
-def named(components: list[Component], path: Path) -> dict[str, Component]:
-    """Return components by reference; several of one reference, or of none, get a number."""
-    if sum(len(component.pads) for component in components) > MOST_ITEMS:
-        raise EcadError(path, f"has more than {MOST_ITEMS} pads")
-    found: dict[str, Component] = {}
+def components_by_reference(components: list[Component], path: Path) -> dict[str, Component]:
+    """Return components by reference; a number is appended to repeated or empty references."""
+    if sum(len(component.pads) for component in components) > MAX_ITEMS:
+        raise EcadError(path, f"the board has more than {MAX_ITEMS} pads")
+    by_reference: dict[str, Component] = {}
     for component in components:
         name, count = component.reference, 1
-        while not name or name in found:
+        while not name or name in by_reference:
             name, count = f"{component.reference}_{count}", count + 1
-        found[name] = component
-    return found
+        by_reference[name] = component
+    return by_reference

@@ -1,4 +1,4 @@
-"""The command ``init``: five questions to a case of a user's own package, written as one from ECAD is."""
+"""Questions of the command ``init``: five answers become a layout, and the layout a case file, as with ``import``."""
 
 import re
 from collections.abc import Callable
@@ -10,41 +10,52 @@ from reflowshock.fem.problem.shock import ServiceCondition
 from reflowshock.meshing.board.pads import joint_name
 from reflowshock.units import UnitError, to_si
 from reflowshock.workflow.case.names import NAMES, is_name
-from reflowshock.workflow.ecad.case_text import BALL, Wanted, case_text
+from reflowshock.workflow.ecad.case_text import BALL_RATIO, CaseRequest, case_text
 from reflowshock.workflow.ecad.layout import Component, EcadPad, Hole, Layout, Point, in_mm
 
 PACKAGE = "U1"
-PAD = 0.8  # of a ball's diameter: copper of a pad that the mask leaves free (0.48 mm for 0.6 mm)
-OPENING = 1.0e-4  # m: by how much wider the mask's opening is
+PAD_RATIO = 0.8  # pad diameter over ball diameter (0.48 mm for a ball of 0.6 mm)
+MASK_CLEARANCE = 1.0e-4  # m: mask opening minus pad diameter
 SCREW, SCREW_INSET = 3.0e-3, 4.0e-3  # m: diameter of a mounting hole, and its distance from the board's edges
-JEDEC_BOARD = ((0.132, 0.077), (0.105, 0.071))  # m: size of the board of JESD22-B111 and distances of its screws
-MOST = 100
+JEDEC_BOARD = ((0.132, 0.077), (0.105, 0.071))  # m: board size and screw distances of JESD22-B111
+MAX_COUNT = 100
 
 
 class AnswerError(ValueError):
-    """An answer that cannot be, and what can."""
+    """Invalid answer; the message gives the problem and the allowed answers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked: key, words, the usual answer, and what reads an answer, which raises AnswerError."""
+    """Question to the user.
+
+    Attributes:
+        key: Name of the answer and of its option.
+        prompt: Text of the question.
+        default: Answer that the user gets by pressing Enter.
+        read: Function that converts an answer and raises ``AnswerError`` if it is not valid.
+    """
 
     key: str
-    words: str
-    usual: str
+    prompt: str
+    default: str
     read: Callable[[str], object]
 
 
-def case_of(answers: dict[str, Any]) -> str:
-    """Return the case file of answers that ``QUESTIONS`` have read."""
+def case_from_answers(answers: dict[str, Any]) -> str:
+    """Return the text of a case file from converted answers.
+
+    Args:
+        answers: Results of ``Question.read`` by ``Question.key``.
+    """
     (rows, columns), pitch = answers["array"]
-    ball, (length, width, thickness) = answers["ball"] or BALL * pitch, answers["board"]
+    ball, (length, width, thickness) = answers["ball"] or BALL_RATIO * pitch, answers["board"]
     pads = [
         EcadPad(
             joint_name(row, column),
             ((column - 0.5 * (columns - 1)) * pitch, (0.5 * (rows - 1) - row) * pitch),
-            PAD * ball,
-            PAD * ball + OPENING,
+            PAD_RATIO * ball,
+            PAD_RATIO * ball + MASK_CLEARANCE,
         )
         for row in range(rows)
         for column in range(columns)
@@ -54,17 +65,21 @@ def case_of(answers: dict[str, Any]) -> str:
     component = Component(PACKAGE, "", "top", tuple(pads))
     name = str(answers["name"])
     layout = Layout(Path(name), (-half[0], -half[1]), half, thickness, holes, {PACKAGE: component})
-    wanted = Wanted(
+    request = CaseRequest(
         name, PACKAGE, ball=ball, condition=str(answers["drop"]), title=f"{rows} x {columns} BGA at {in_mm(pitch)}"
     )
-    return case_text(layout, wanted)
+    return case_text(layout, request)
 
 
 def _screws(half: Point) -> list[Point]:
-    """Return where a board of half the sides ``half`` [m] is screwed on."""
-    size, apart = JEDEC_BOARD
+    """Return the screw positions of a board, in JESD22-B111 positions if it has that size [m].
+
+    Args:
+        half: Half length and half width of the board [m].
+    """
+    size, distances = JEDEC_BOARD
     if max(abs(2.0 * half[0] - size[0]), abs(2.0 * half[1] - size[1])) < 1e-6:
-        x, y = 0.5 * apart[0], 0.5 * apart[1]
+        x, y = 0.5 * distances[0], 0.5 * distances[1]
     else:
         x, y = half[0] - SCREW_INSET, half[1] - SCREW_INSET
     return [(-x, -y), (-x, y), (x, -y), (x, y)]
@@ -77,13 +92,13 @@ def _name(text: str) -> str:
 
 
 def _array(text: str) -> tuple[tuple[int, int], float]:
-    found = re.fullmatch(r"\s*(\d+)\s*[x×*]\s*(\d+)\s*(?:at|@|,)\s*(.+)", text)
-    if found is None:
-        raise AnswerError('is not understood; wanted: rows x columns at pitch, e.g. "6 x 6 at 0.8 mm"')
-    sides = int(found[1]), int(found[2])
-    if not all(2 <= side <= MOST for side in sides):
-        raise AnswerError(f"has {sides[0]} x {sides[1]} joints; allowed: 2 x 2 to {MOST} x {MOST}")
-    return sides, _length(found[3], 5e-5, 5e-3)
+    match = re.fullmatch(r"\s*(\d+)\s*[x×*]\s*(\d+)\s*(?:at|@|,)\s*(.+)", text)
+    if match is None:
+        raise AnswerError('is not valid; allowed: rows x columns at pitch, e.g. "6 x 6 at 0.8 mm"')
+    sides = int(match[1]), int(match[2])
+    if not all(2 <= side <= MAX_COUNT for side in sides):
+        raise AnswerError(f"has {sides[0]} x {sides[1]} joints; allowed: 2 x 2 to {MAX_COUNT} x {MAX_COUNT}")
+    return sides, _length(match[3], 5e-5, 5e-3)
 
 
 def _ball(text: str) -> float | None:
@@ -94,7 +109,7 @@ def _board(text: str) -> tuple[float, float, float]:
     sizes = re.split(r"\s*[x×*]\s*", text.strip())
     unit = re.sub(r"[-+0-9.eE\s]", "", sizes[-1])
     if len(sizes) != 3:
-        raise AnswerError('is not understood; wanted: length x width x thickness, e.g. "132 x 77 x 1 mm"')
+        raise AnswerError('is not valid; allowed: length x width x thickness, e.g. "132 x 77 x 1 mm"')
     length, width, thickness = (
         _length(size if re.search(r"[a-zµ]", size) else f"{size} {unit}", least, most)
         for size, least, most in zip(sizes, (5e-3, 5e-3, 1e-4), (1.0, 1.0, 1e-2), strict=True)
@@ -104,7 +119,9 @@ def _board(text: str) -> tuple[float, float, float]:
 
 def _condition(text: str) -> str:
     if text.strip().upper() not in get_args(ServiceCondition):
-        raise AnswerError(f"is no service condition of JESD22-B110B; allowed: {', '.join(get_args(ServiceCondition))}")
+        raise AnswerError(
+            f"is not a service condition of JESD22-B110B; allowed: {', '.join(get_args(ServiceCondition))}"
+        )
     return text.strip().upper()
 
 

@@ -1,16 +1,17 @@
-"""Boards of a table (CSV): corners of the outline, holes and pads, a line each; for what has no reader of its own.
+"""Reader for boards in CSV tables, for ECAD tools without a supported format: one outline corner, hole or pad per line.
 
-The columns are ``kind`` (outline, hole, pad), ``reference``, ``pin``, ``x``, ``y``, ``diameter`` and ``mask_opening``;
-those that are lengths have their unit in the title, e.g. ``x [mm]``. The last one may be absent, or empty.
+The columns are ``kind`` (outline, hole, pad), ``reference``, ``pin``, ``x``, ``y``, ``diameter`` and ``mask_opening``.
+Titles of lengths contain the unit, e.g. ``x [mm]``. ``mask_opening`` is optional.
 """
 
 import csv
 from collections import defaultdict
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.units import UnitError, to_si
 from reflowshock.workflow.ecad.layout import (
-    MOST_ITEMS,
+    MAX_ITEMS,
     Component,
     EcadError,
     EcadPad,
@@ -19,9 +20,9 @@ from reflowshock.workflow.ecad.layout import (
     Point,
     box_around,
     checked_number,
-    named,
+    components_by_reference,
     outline_notes,
-    text_of,
+    read_text,
 )
 
 KINDS = ("outline", "hole", "pad")
@@ -30,14 +31,14 @@ COLUMNS = ("kind", "reference", "pin", *LENGTHS)
 
 
 def read_table(path: Path) -> Layout:
-    """Read a board.
+    """Read a board from a CSV table.
 
     Raises:
-        EcadError: a column is missing or has no unit, a line is not of a known kind, or there is no outline.
+        EcadError: A column is missing or has no unit, a line is of an unknown kind, or the outline is missing.
     """
-    rows = list(csv.reader(text_of(path).splitlines()))
-    if len(rows) > MOST_ITEMS:
-        raise EcadError(path, f"has {len(rows)} lines, allowed: up to {MOST_ITEMS}")
+    rows = list(csv.reader(read_text(path).splitlines()))
+    if len(rows) > MAX_ITEMS:
+        raise EcadError(path, f"has {len(rows)} lines; allowed: up to {MAX_ITEMS}")
     titles, scales = _titles(rows[0] if rows else [], path)
     corners: list[Point] = []
     holes: list[Hole] = []
@@ -51,12 +52,13 @@ def read_table(path: Path) -> Layout:
             for name in scales
             if cells.get(name)
         }
-        wanted = LENGTHS[:2] if cells.get("kind") == "outline" else LENGTHS
-        missing = [name for name in wanted if name not in lengths]
+        required = LENGTHS[:2] if cells.get("kind") == "outline" else LENGTHS
+        missing = [name for name in required if name not in lengths]
         if cells.get("kind") not in KINDS:
-            raise EcadError(path, f"line {line} is a {cells.get('kind', '')!r}, allowed: {', '.join(KINDS)}")
+            problem = Problem("kind", "unknown kind", cells.get("kind", ""), ", ".join(KINDS), line=line)
+            raise EcadError(path, problem)
         if missing:
-            raise EcadError(path, f"line {line} has no {missing[0]}")
+            raise EcadError(path, Problem(missing[0], "is missing", line=line))
         at = lengths["x"], lengths["y"]
         if cells["kind"] == "outline":
             corners.append(at)
@@ -66,13 +68,20 @@ def read_table(path: Path) -> Layout:
             pad = EcadPad(cells.get("pin", ""), at, lengths["diameter"], lengths.get("mask_opening"))
             pads[cells.get("reference", "")].append(pad)
     if not corners:
-        raise EcadError(path, "has no outline: lines of the kind outline are its corners")
-    components = [Component(reference, "", "top", tuple(found)) for reference, found in pads.items()]
-    return Layout(path, *box_around(corners), None, tuple(holes), named(components, path), outline_notes(corners, True))
+        raise EcadError(path, "the outline is missing; try lines of the kind outline for its corners")
+    components = [Component(reference, "", "top", tuple(pad_list)) for reference, pad_list in pads.items()]
+    return Layout(
+        path,
+        *box_around(corners),
+        None,
+        tuple(holes),
+        components_by_reference(components, path),
+        outline_notes(corners, True),
+    )
 
 
 def _titles(row: list[str], path: Path) -> tuple[list[str], dict[str, float]]:
-    """Return the names of the columns, and the units [m] of those that are lengths."""
+    """Return the names of the columns, and the unit in metres of each column of lengths."""
     titles, scales = [], {}
     for title in row:
         name, _, unit = title.strip().partition("[")
@@ -81,10 +90,10 @@ def _titles(row: list[str], path: Path) -> tuple[list[str], dict[str, float]]:
             try:
                 scales[titles[-1]] = to_si(f"1 {unit.rstrip(' ]')}", "mm")
             except UnitError as error:
-                raise EcadError(path, f"the title {title.strip()!r} has no length: {error}") from error
+                raise EcadError(path, f"the title {title.strip()!r} has no unit of length: {error}") from error
     missing = [name for name in COLUMNS if name not in titles]
     if missing:
         raise EcadError(
-            path, f"has no column {missing[0]}; wanted: {', '.join(COLUMNS)}, and mask_opening if it is known"
+            path, f"the column {missing[0]} is missing; required: {', '.join(COLUMNS)}; optional: mask_opening"
         )
     return titles, scales

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
-from reflowshock.particles.parameters.flows import DamBreak
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.flow_effects import FLOW_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.text import number, short
 from reflowshock.workflow.flows.cost import plane_costs
@@ -22,7 +22,7 @@ from reflowshock.workflow.flows.problems import metres, rheology_problems
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart
 
 ENERGY_RISE = 0.01  # largest allowed increase, relative to the energy at the start
@@ -58,7 +58,7 @@ def dam_problems(case: DamBreakCase) -> list[Problem]:
 
 
 def _solve(scene: DamBreak, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.scenes.dam_break import solve_dam_break
+    from reflowshock.particles.sph_flows.dam_break import solve_dam_break
 
     return solve_dam_break(scene, progress, checkpoint)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reflowshock.arrays import Floats
-from reflowshock.particles.parameters.droplets import LEAST_SOUND_SPEED, Droplet, cap
-from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS
+from reflowshock.particles.flows.droplet import DROPLET_EFFECTS, LEAST_SOUND_SPEED, Droplet, cap
+from reflowshock.particles.flows.flow_effects import FLOW_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.text import number, short
@@ -30,7 +30,7 @@ from reflowshock.workflow.flows.problems import degrees, micrometres, rheology_p
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart, Series
 
 FEWEST_ACROSS = 8.0  # particles across a droplet: fewer resolve no surface
@@ -125,16 +125,16 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
 
 
 def _solve(scene: Droplet, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.scenes.droplet import solve_droplet
+    from reflowshock.particles.sph_flows.droplet import solve_droplet
 
     return solve_droplet(scene, progress, checkpoint)
 
 
 def _limits(scene: Droplet) -> dict[str, float]:
-    from reflowshock.particles.scenes.droplet import rest_metrics
+    from reflowshock.particles.flows.droplet_metrics import rest_metrics
 
-    known = rest_metrics(scene)
-    return LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in known}
+    exact_metrics = rest_metrics(scene)
+    return LIMITS | {name: limit for name, limit in REST_LIMITS.items() if name in exact_metrics}
 
 
 def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":

@@ -14,7 +14,7 @@ from reflowshock.workflow.flows.cost import Cost
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart
 
 STAGE = "particles"

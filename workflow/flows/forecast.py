@@ -7,8 +7,8 @@ from typing import Any
 
 from rich.console import RenderableType
 
-from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.units import from_si
 from reflowshock.workflow.case.forecast import Size
 from reflowshock.workflow.case.text import duration, short
@@ -45,7 +45,7 @@ class FlowForecast:
 
 def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
     """Predict effects, size, time step and cost of a flow."""
-    scene: SphFlow = case.scene
+    scene: FlowScene = case.scene
     effects = decide_flow(scene)
     step = scene.expected_time_step(effects["flow_viscosity"]["on"])
     steps = ceil(scene.until / step)
@@ -63,7 +63,7 @@ def flow_size(flow: FlowKind, case: FlowCase) -> Size:
 
 def flow_tables(flow: FlowKind, case: FlowCase, forecast: FlowForecast) -> Iterator[RenderableType]:
     """Yield the table of particles, speeds, time steps and cost."""
-    scene: SphFlow = case.scene
+    scene: FlowScene = case.scene
     length, spacing = (from_si(size, flow.length_unit, digits=3) for size in (scene.length, forecast.spacing))
     rows: list[Row] = [
         ("particles", f"{forecast.particles}", f"{spacing} initial spacing"),

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
-from reflowshock.particles.parameters.flows import Poiseuille
+from reflowshock.particles.flows.channel import Poiseuille
+from reflowshock.particles.flows.flow_effects import FLOW_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.flows.cost import plane_costs
 from reflowshock.workflow.flows.flow_kind import VOLUME_DRIFT, FlowCase, FlowKind, Measures, flow_pipeline
@@ -15,7 +15,7 @@ from reflowshock.workflow.flows.problems import rheology_problems, viscosity_pro
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart
 
 PROFILE_ERROR = 0.02  # largest allowed error of the velocity profile at the end
@@ -38,14 +38,14 @@ def channel_problems(case: PoiseuilleCase) -> list[Problem]:
 def _solve(
     scene: Poiseuille, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.scenes.viscous_flows import solve_poiseuille
+    from reflowshock.particles.sph_flows.viscous_flows import solve_poiseuille
 
     return solve_poiseuille(scene, progress, checkpoint)
 
 
 def channel_curves(scene: Poiseuille, result: "FlowResult") -> "list[Chart]":
     """Return charts of the final velocity profile next to the exact one, and of the largest speed over time."""
-    from reflowshock.particles.scenes.viscous_flows import exact_speeds
+    from reflowshock.particles.flows.channel import exact_speeds
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import BLUE, RED
 

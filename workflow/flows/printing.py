@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.particles.parameters.flow_effects import DROPLET_EFFECTS, FLOW_EFFECTS, PRINTING_EFFECTS
-from reflowshock.particles.parameters.freezing import Freezing
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.flows.droplet import DROPLET_EFFECTS
+from reflowshock.particles.flows.flow_effects import FLOW_EFFECTS
+from reflowshock.particles.flows.freezing import Freezing
+from reflowshock.particles.flows.printing import PRINTING_EFFECTS, Printing
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 from reflowshock.workflow.case.text import number, short
@@ -20,7 +21,7 @@ from reflowshock.workflow.flows.problems import micrometres, rheology_problems
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart
 
 LEAST_PITCH = 0.25  # over the diameter of a drop: with less, drops pile up in one place

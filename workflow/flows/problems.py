@@ -1,14 +1,14 @@
 """Checks that several flows share: rheology and viscosity; texts of lengths and angles in messages."""
 
-from reflowshock.particles.parameters.flows import SphFlow
-from reflowshock.particles.parameters.rheology import Rheology
+from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.rheology import Rheology
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
 
 LARGEST_REYNOLDS = 1000.0  # of vortices and channels: above it the flow becomes turbulent and leaves the exact solution
 
 
-def rheology_problems(kind: str, scene: SphFlow) -> list[Problem]:
+def rheology_problems(kind: str, scene: FlowScene) -> list[Problem]:
     """Find keys of the other viscosity law, and a viscosity at infinity that is not below the one at rest.
 
     Args:
@@ -30,7 +30,7 @@ def rheology_problems(kind: str, scene: SphFlow) -> list[Problem]:
     return []
 
 
-def viscosity_problems(kind: str, scene: SphFlow) -> list[Problem]:
+def viscosity_problems(kind: str, scene: FlowScene) -> list[Problem]:
     """Find a Reynolds number at which the laminar exact solution is unstable, and viscosity that is switched off.
 
     Args:

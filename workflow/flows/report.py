@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.particles.parameters.flows import SphFlow
+from reflowshock.particles.flows.flow import FlowScene
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.flows.flow_kind import STAGE, FlowCase, FlowKind
 from reflowshock.workflow.report.scene import Field, Group, Scene
 from reflowshock.workflow.report.tables import figures_of, limited_metrics
 
 if TYPE_CHECKING:
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
 
 VIEWS = {2: (0.0, -1.0, 0.0), 3: (0.3, -1.0, 0.25)}  # dimension -> direction towards the viewer
 NO_FACES = np.zeros((0, 3), dtype=int)
@@ -40,7 +40,7 @@ def add_flow(flow: FlowKind, run_folder: Path, case: FlowCase, context: dict, su
     context["scenes"]["flow"] = flow_scene(result, case.scene)
 
 
-def flow_scene(result: "FlowResult", scene: SphFlow) -> Scene:
+def flow_scene(result: "FlowResult", scene: FlowScene) -> Scene:
     """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
     pictures = result.pictures
     frames = [short(picture.time) if scene.dimension == 3 else f"{1e3 * picture.time:.4g} ms" for picture in pictures]

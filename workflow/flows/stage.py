@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from reflowshock.particles.parameters.flow_effects import decide_flow
+from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.workflow.case.run import Findings, Run, at_least, at_most, metric
 from reflowshock.workflow.flows.flow_kind import STAGE, FlowCase, FlowKind
 from reflowshock.workflow.process.terminal import progress_bar

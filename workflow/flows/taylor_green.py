@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.particles.parameters.flow_effects import FLOW_EFFECTS
-from reflowshock.particles.parameters.flows import TaylorGreen
+from reflowshock.particles.flows.flow_effects import FLOW_EFFECTS
+from reflowshock.particles.flows.vortices import TaylorGreen
 from reflowshock.problem import Problem
 from reflowshock.workflow.flows.cost import plane_costs
 from reflowshock.workflow.flows.flow_kind import VOLUME_DRIFT, FlowCase, FlowKind, Measures, Row, flow_pipeline
@@ -13,7 +13,7 @@ from reflowshock.workflow.flows.problems import rheology_problems, viscosity_pro
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.sph.flow import FlowResult
+    from reflowshock.particles.flows.result import FlowResult
     from reflowshock.workflow.report.charts import Chart
 
 DECAY_ERROR = 0.05  # largest allowed error of the decay rate
@@ -41,7 +41,7 @@ def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
 def _solve(
     scene: TaylorGreen, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.scenes.viscous_flows import solve_taylor_green
+    from reflowshock.particles.sph_flows.viscous_flows import solve_taylor_green
 
     return solve_taylor_green(scene, progress, checkpoint)
 

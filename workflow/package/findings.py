@@ -1,4 +1,4 @@
-"""What stages found: metrics and health checks in the form of ``summary.json``, with the limits of health."""
+"""Metrics and health checks of the stages of a package, in the form of ``summary.json``, with their limits."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,30 +8,30 @@ from typing import Any
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE
 from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_continued, metric, worst
 
-WIDTH_ERROR = 0.01  # of a joint's width, against the Young-Laplace shape of its volume, pads and gap
-VOLUME_DRIFT = 1.0e-3  # of a joint's volume during its reflow
-ENERGY_IMBALANCE = 0.02  # of what a joint's surface has at the start
-SURFACE_VOLUME_ERROR = 1.0e-3  # of a closed surface, against the particles' own volume
-VOLUME_ERROR = 0.003  # of a joint's hexahedra, against its closed surface
+WIDTH_ERROR = 0.01  # relative error of joint widths against the Young-Laplace solution
+VOLUME_DRIFT = 1.0e-3  # relative change of a joint's volume during reflow
+ENERGY_IMBALANCE = 0.02  # relative to the initial surface energy of a joint
+SURFACE_VOLUME_ERROR = 1.0e-3  # relative volume error of a closed surface against the particles
+VOLUME_ERROR = 0.003  # relative volume error of the hexahedra against the closed surface
 SCALED_JACOBIAN = 0.2
-STRESS_ERROR = 0.10  # of the critical joint's von Mises history, two-scale against DNS, relative L2
-LEAST_STRESS = 0.1  # of the joint's peak stress: a DNS that ends before it compares what does not matter
-COMPARED = "compared_duration"  # of a DNS that ends before the shock
+STRESS_ERROR = 0.10  # relative L2 error of the critical joint's von Mises history, two-scale against DNS
+LEAST_STRESS = 0.1  # share of the peak stress that a short DNS must reach to be compared
+COMPARED = "compared_duration"  # metric of a DNS that ends before the shock
 
 Records = Mapping[str, Mapping[str, Any]]
 
 
 def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
-    """Judge the assembly: how many joints, how many hexahedra in each part."""
+    """Return the number of joints and of hexahedra in each part."""
     counts = {f"elements_{part}": metric(count) for part, count in elements.items()}
     return Findings(metrics={"joint_count": metric(joints), **counts})
 
 
 def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
-    """Judge the joints' shapes by volume, by the Young-Laplace shape and by their verdicts.
+    """Return metrics and checks of joint shapes: volume drift, width against Young-Laplace, verdicts.
 
-    An open joint has no shape to compare with, nor has one that leans too much for a coaxial reference. Of joints whose
-    surface is given only widths count, and that they touch others.
+    Open joints and joints that lean too much for a coaxial reference are not compared. Joints with a given surface
+    count only by width and bridging.
     """
     flowed = [joint for joint in joints.values() if "given" not in joint]
 
@@ -44,7 +44,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     closed = [joint for joint in flowed if joint["verdict"] != "open" and _has_reference(joint["metrics"])]
     width_error = worst(joint["metrics"]["width_error"]["value"] for joint in closed)
     drift = worst(joint["metrics"]["volume_drift"]["value"] for joint in flowed)
-    of_motion = _of_motion([joint["metrics"] for joint in flowed if "energy_imbalance" in joint["metrics"]])
+    motion = _of_motion([joint["metrics"] for joint in flowed if "energy_imbalance" in joint["metrics"]])
     return Findings(
         metrics={
             "distinct_shapes": metric(len({joint["shape"] for joint in flowed})),
@@ -54,7 +54,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
             "joints_compared_in_width": metric(len(closed)),
             "joint_volume_drift_max": metric(drift),
         }
-        | of_motion.metrics,
+        | motion.metrics,
         health={
             "joint_width_error_max": at_most(width_error, WIDTH_ERROR),
             "joint_volume_drift_max": at_most(drift, VOLUME_DRIFT),
@@ -62,15 +62,15 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
             "joints_open": at_most(count("open"), 0),
             "joints_not_ok": at_most(len(joints) - count("ok") - count("given"), 0),
         }
-        | of_motion.health,
+        | motion.health,
         effects=dict(effects),
     )
 
 
 def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
-    """Judge joints that flowed with an account of their energy, by their metrics; nothing where there are none.
+    """Return metrics and checks of joints that flowed with inertia; empty without any.
 
-    Those that were carried from place to place have no time to rest and no losses on the way.
+    Joints carried through load steps have no time at rest and no losses.
     """
     if not joints:
         return Findings()
@@ -80,7 +80,7 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
 
     imbalance, lost = worst(values("energy_imbalance")), sum(values("particles_lost"))
     resting = int(sum(values("at_rest")))
-    of_way = {
+    losses = {
         "joint_time_at_rest_max": ([time for time in values("time_at_rest") if time == time], "s"),
         "joint_viscous_loss_max": (values("viscous_loss"), ""),
         "joint_smoothing_loss_max": (values("smoothing_loss"), ""),
@@ -92,7 +92,7 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
             "joint_energy_imbalance_max": metric(imbalance),
             "joint_particles_lost": metric(int(lost)),
         }
-        | {name: metric(max(found), unit) for name, (found, unit) in of_way.items() if found},
+        | {name: metric(max(numbers), unit) for name, (numbers, unit) in losses.items() if numbers},
         health={
             "joint_energy_imbalance_max": at_most(imbalance, ENERGY_IMBALANCE),
             "joint_particles_lost": at_most(int(lost), 0),
@@ -102,15 +102,15 @@ def _of_motion(joints: Sequence[Mapping[str, Any]]) -> Findings:
 
 
 def _has_reference(metrics: Mapping[str, dict]) -> bool:
-    """Whether a joint leans so little that the coaxial joint of its gap is a reference for its width."""
+    """Return whether a joint leans so little that a coaxial joint is a reference for its width."""
     return metrics.get("width_reference_error", {"value": 0.0})["value"] <= LARGEST_WIDTH_CHANGE
 
 
 def of_surface(surfaces: Records) -> Findings:
-    """Judge the closed surfaces by the volume that the reflow ended with; tell how those given were stretched."""
+    """Return metrics and checks of closed surfaces: volume error, and volume change of given surfaces."""
     error = worst(surface["volume_error"] for surface in surfaces.values() if "given" not in surface)
-    given = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
-    stretched = {"given_surface_volume_change_max": metric(worst(given))} if given else {}
+    changes = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
+    stretched = {"given_surface_volume_change_max": metric(worst(changes))} if changes else {}
     return Findings(
         metrics={"surface_volume_error_max": metric(error)} | stretched,
         health={"surface_volume_error_max": at_most(error, SURFACE_VOLUME_ERROR)},
@@ -118,7 +118,7 @@ def of_surface(surfaces: Records) -> Findings:
 
 
 def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any]) -> Findings:
-    """Judge the joints' hexahedra; ``qualities`` by kind of joint mesh: prefix of its metrics -> joint -> quality."""
+    """Return metrics and checks of joint meshes; ``qualities`` by kind (prefix of the metrics), then by joint."""
     metrics: dict[str, dict] = {}
     health: dict[str, dict] = {}
     for kind, quality in qualities.items():
@@ -138,12 +138,12 @@ def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any])
 
 
 def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Findings:
-    """Judge the shock: the two-scale run by itself, and by the DNS where both were run.
+    """Return metrics and checks of the shock, and of two-scale against DNS if both were run.
 
     Args:
-        results: ``result.json`` of each mode, the one whose figures count first.
-        folder: where each mode's history is.
-        thickness: of the board [m]; small kinematics hold for deflections well below it.
+        results: ``result.json`` of each mode, the main mode first.
+        folder: Folder of the shock, with a folder for each mode.
+        thickness: Thickness of the board [m]; small kinematics need a much smaller deflection.
     """
     first = next(iter(results))
     metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])
@@ -163,36 +163,36 @@ def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Fin
 
 
 def fine_joints_of(result: Mapping[str, Any]) -> list[str] | None:
-    """Return the fine joints of a run in which some are coarse, else None."""
+    """Return the fine joints of a run with coarse joints; None if all are fine."""
     fine = result.get("coupling", {}).get("fine_joints", "all")
     return None if isinstance(fine, str) else list(fine)
 
 
 def _coupling_metrics(result: Mapping[str, Any]) -> dict:
-    """Return what a two-scale run says of its coupling: shares of elements, and of its ranks' time."""
+    """Return metrics of the coupling of a two-scale run: element share, overhead, load of the ranks."""
     coupling = result.get("coupling", {})
     balance = coupling.get("placement", {})
-    found = {
+    values = {
         "meso_share": coupling.get("meso_share"),
         "coupling_overhead": balance.get("coupling_overhead"),
         "busy_share": balance.get("busy_share"),
     }
-    return {name: metric(value) for name, value in found.items() if value is not None}
+    return {name: metric(value) for name, value in values.items() if value is not None}
 
 
 def ideal_ratio(coupling: Mapping[str, Any], dns: Mapping[str, Any]) -> float | None:
-    """Return the time of a two-scale run over that of a DNS if all element updates cost the same and all else nothing.
+    """Return the ideal time ratio two-scale / DNS: equal cost of all element updates, no overhead.
 
     Args:
-        coupling: of the two-scale run; None is returned where it does not tell its levels.
-        dns: model of the DNS, which takes the smallest step everywhere.
+        coupling: Coupling record of the two-scale run; without levels the result is None.
+        dns: Model record of the DNS, which takes the smallest step everywhere.
     """
     rates = [record["elements"] / record["step"] for record in coupling.get("levels", ())]
     return sum(rates) * dns["step"] / sum(dns["elements"].values()) if rates else None
 
 
 def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
-    """Compare both modes: errors of histories, and the ratio of the wall times of their windows."""
+    """Return metrics of two-scale against DNS: errors of histories and ratios of wall times."""
     from reflowshock.fem.output.compare import compare_histories
 
     files = [folder / mode / "history.npz" for mode in ("two_scale", "dns")]
@@ -214,6 +214,6 @@ def _comparison(results: Mapping[str, dict], folder: Path) -> dict:
 
 
 def _time(result: Mapping[str, Any], metric_name: str) -> float:
-    """Return a time of a run's windows over the time that they simulate: windows of two runs may differ."""
+    """Return the time of a run's windows relative to one window, because windows of two runs may differ."""
     seconds: float = result["metrics"][metric_name]["value"]
     return seconds / result["model"]["window"]

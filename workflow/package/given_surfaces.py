@@ -1,4 +1,4 @@
-"""Joints whose surfaces the user gives, as files: where these are, and what does not fit."""
+"""Joint surfaces given by the user as files: paths, checks, measures."""
 
 import math
 from collections.abc import Container, Iterable, Iterator, Sequence
@@ -17,7 +17,7 @@ KEY = "package.surfaces"
 
 
 def located(table: dict, folder: Path) -> dict:
-    """Take files of surfaces in the table of a case as relative to the folder of the case file."""
+    """Resolve the paths of surface files relative to the folder of the case file."""
     package = table.get("package")
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):
@@ -27,17 +27,17 @@ def located(table: dict, folder: Path) -> dict:
 
 
 def files(package: "Package") -> dict[str, Path]:
-    """Return dotted key -> file."""
+    """Return the surface files by dotted key."""
     return {f"{KEY}.{name}": Path(path) for name, path in package.surfaces.items()}
 
 
 def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Iterator[Problem]:
-    """Find surfaces of joints that there are not, and files that hold no surface that fits its joint.
+    """Yield problems of surfaces for unknown joints, and of files without a surface that fits the joint.
 
     Args:
-        package: names their files, which are there.
-        pads: the pad table, as drawn.
-        heated: whether pads move before the joints freeze: how high a joint is then, only the reflow finds.
+        package: Package with the names of existing files.
+        pads: Pad table as drawn.
+        heated: Whether pads move before solidification, so that only the reflow knows the height of a joint.
     """
     if not package.surfaces:
         return
@@ -64,18 +64,18 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
 
 
 def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Container[str]) -> dict[str, dict]:
-    """Measure the given surfaces in their places.
+    """Return records of the joints with given surfaces, as the reflow writes them.
 
     Args:
-        package: names their files.
-        pads: the pad table.
-        reflowed: joints that have a record already.
+        package: Package with the names of the files.
+        pads: Pad table.
+        reflowed: Joints that already have a record.
 
     Returns:
-        Joint name -> ``given`` (its file), ``place``, ``verdict`` "given", ``metrics`` as those of a reflow.
+        Record of each joint: ``given`` (file), ``place``, ``verdict`` "given", ``metrics``.
 
     Raises:
-        SurfaceError: a surface that does not fit.
+        SurfaceError: A surface does not fit its joint.
     """
     from reflowshock.meshing.surface.closed_surface import measure
     from reflowshock.meshing.surface.user_surface import load_surface
@@ -83,18 +83,18 @@ def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Conta
     records = {}
     for pad in (pad for pad in pads if pad.name in package.surfaces and pad.name not in reflowed):
         path = package.surfaces[pad.name]
-        found = measure(load_surface(Path(path), package.surface_unit, pad))
+        measures = measure(load_surface(Path(path), package.surface_unit, pad))
         records[pad.name] = {
             "given": path,
             "place": {"gap": pad.gap, "offset": pad.offset, "tilt": pad.tilt},
             "verdict": "given",
-            "metrics": {name: _metric(name, value) for name, value in found.items()},
+            "metrics": {name: _metric(name, value) for name, value in measures.items()},
         }
     return records
 
 
 def _metric(name: str, value: float) -> dict:
-    """Return a measure of a surface in the unit that the reflow tells it in."""
+    """Return a measure of a surface as a metric, in the unit of the reflow metrics."""
     if "angle" in name:
         return {"value": math.degrees(value), "unit": "deg"}
     return {"value": value, "unit": "m^3" if name == "volume" else "m"}

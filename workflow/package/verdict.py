@@ -1,4 +1,4 @@
-"""The verdict on a package that is dropped: does each joint hold, by how much, and how many drops will it bear?
+"""Verdict on a dropped package: pass or fail of each joint, margin, and drops to failure.
 
 The report judges the joints from the histories, so that the limits are inputs of the report alone (``Stage.without``).
 No solder of the library has a limit: none of the sources at hand gives one.

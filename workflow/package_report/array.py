@@ -1,4 +1,4 @@
-"""Joints of an array as the reflow left them: their surfaces in 3D, and maps of the array."""
+"""Joint shapes of an array after reflow: surfaces in 3D and maps of the array."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,9 +18,9 @@ MICRO, MILLI = 1e-6, 1e-3
 MAPS = (
     ("standoff", "standoff", "µm", MICRO),
     ("max_width", "maximum width", "µm", MICRO),
-    ("contact_angle_package", "contact angle at the package", "deg", 1.0),
-    ("tilted", "tilt of the package's pad", "mrad", MILLI),
-    ("contact_angle_board", "contact angle at the board", "deg", 1.0),
+    ("contact_angle_package", "contact angle at the package pad", "deg", 1.0),
+    ("tilted", "tilt of the package pad", "mrad", MILLI),
+    ("contact_angle_board", "contact angle at the board pad", "deg", 1.0),
 )
 PANELS = 4
 FREE = 0
@@ -29,34 +29,34 @@ VIEW = (-0.5, -1.6, 0.7)
 
 
 def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene:
-    """Return every joint at its place, coloured by its distance from the truncated sphere of its volume and discs.
+    """Return all joints in the array, coloured by their distance from the truncated sphere of equal volume.
 
     Args:
-        run_folder: of the run, with closed surfaces or else the shapes of the reflow.
-        joints: ``joint_records``.
+        run_folder: Folder of the run; without closed surfaces the shapes of the reflow are shown.
+        joints: Records of the joints, see ``joint_records``.
     """
     kinds: dict[str, list[Group]] = {}
     limit = 0.0
-    for _, alike in by_shape(joints):
-        points, triangles, is_free = joint_surface(run_folder, alike[0])
-        away = deviation(points, alike[0]) / MICRO
-        limit = max(limit, float(np.abs(away[np.unique(triangles[is_free])]).max()))
+    for _, group in by_shape(joints):
+        points, triangles, is_free = joint_surface(run_folder, group[0])
+        distance = deviation(points, group[0]) / MICRO
+        limit = max(limit, float(np.abs(distance[np.unique(triangles[is_free])]).max()))
         part = np.zeros(len(points), int)
-        free = Group("solder", points, triangles[is_free], part, values={DEVIATION: away[None]})
+        free = Group("solder", points, triangles[is_free], part, values={DEVIATION: distance[None]})
         wetted = Group("wetted discs", points, triangles[~is_free], part, "#8a949e")
-        for one in decimated([free, wetted], MOST_TRIANGLES // len(joints)):
-            placed = [_at(one, joint, joints.index(joint)) for joint in alike if len(one.faces)]
-            kinds.setdefault(one.name, []).extend(placed)
-    shown = [_joined(groups) for groups in kinds.values() if groups]
+        for surface in decimated([free, wetted], MOST_TRIANGLES // len(joints)):
+            placed = [_at(surface, joint, joints.index(joint)) for joint in group if len(surface.faces)]
+            kinds.setdefault(surface.name, []).extend(placed)
+    joined = [_joined(groups) for groups in kinds.values() if groups]
     fields = [Field(DEVIATION, "µm", -limit, limit, "diverging")]
-    return Scene(shown, [f"solder@{joint['name']}" for joint in joints], fields, view=VIEW)
+    return Scene(joined, [f"solder@{joint['name']}" for joint in joints], fields, view=VIEW)
 
 
 def joint_surface(run_folder: Path, joint: Mapping[str, Any]) -> tuple[Floats, NDArray[np.integer], NDArray[np.bool_]]:
-    """Read the closed surface of a joint, or where there is none its free surface as the reflow left it.
+    """Read the closed surface of a joint; without one, its free surface after reflow.
 
     Returns:
-        Points ``(n, 3)`` [m], triangles ``(t, 3)``, and which of these are of the free surface ``(t,)``.
+        Points, shape (n, 3) [m]; triangles, shape (t, 3); whether each triangle is on the free surface, shape (t,).
     """
     for name in (joint["name"], joint["shape"]):
         path = run_folder / f"surface/{name}.vtu"
@@ -72,20 +72,20 @@ def joint_surface(run_folder: Path, joint: Mapping[str, Any]) -> tuple[Floats, N
 
 
 def deviation(points: Floats, joint: Mapping[str, Any]) -> Floats:
-    """Return the signed distance ``(n,)`` [m] of points from the truncated sphere of a joint's volume and discs."""
+    """Return the signed distance of points from the truncated sphere of a joint's volume and pads, shape (n,) [m]."""
     discs = joint["wetted_radius_board"], joint["wetted_radius_package"]
     return TruncatedSphere.of_volume(joint["volume"], *discs).signed_distance(np.asarray(points, dtype=float))
 
 
 def _at(group: Group, joint: Mapping[str, Any], number: int) -> Group:
-    """Return a joint's surface at its place in the array."""
-    place = np.array([joint["x"], joint["y"], 0.0])
+    """Return a joint's surface moved to its position in the array."""
+    position = np.array([joint["x"], joint["y"], 0.0])
     part = np.full(len(group.points), number)
-    return replace(group, points=group.points + place, part=part)
+    return replace(group, points=group.points + position, part=part)
 
 
 def _joined(groups: Sequence[Group]) -> Group:
-    """Return groups of triangles as one."""
+    """Merge groups of triangles into one."""
     first = np.cumsum([0, *(len(group.points) for group in groups)])
     return Group(
         groups[0].name,
@@ -99,13 +99,13 @@ def _joined(groups: Sequence[Group]) -> Group:
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """A map of the array: a quantity of every joint at its place.
+    """A map of one quantity over the array.
 
     Attributes:
-        label: what it shows, with its unit.
-        cells: x and y in pitches, y downwards; colour, ink, name, text, and whether the verdict is ok; of each joint.
-        size: width and height in pitches.
-        scale: text and colour of some values, the largest first.
+        label: Quantity and unit.
+        cells: Position x and y (downwards) in pitches, colour, text colour, name, text and verdict of each joint.
+        size: Width and height in pitches.
+        scale: Text and colour of the ticks of the colour scale, the largest value first.
     """
 
     label: str
@@ -115,17 +115,17 @@ class Map:
 
 
 def array_maps(joints: Sequence[Mapping[str, Any]]) -> list[Map]:
-    """Return maps of standoff, width, contact angle and tilt or second contact angle.
+    """Return the first four maps of ``MAPS`` whose quantity the joints have.
 
     Args:
-        joints: records with name, x, y, standoff, max_width [m] and verdict, and what else of ``MAPS`` the joints have.
+        joints: Records with name, x, y [m] and quantities of ``MAPS``, see ``joint_records``.
     """
-    shown = [entry for entry in MAPS if any(entry[0] in joint for joint in joints)][:PANELS]
-    return [_map(joints, *entry) for entry in shown]
+    available = [entry for entry in MAPS if any(entry[0] in joint for joint in joints)][:PANELS]
+    return [_map(joints, *entry) for entry in available]
 
 
 def pitch_of(joints: Sequence[Mapping[str, Any]]) -> float:
-    """Return the smallest distance of two joints along x or y [m]; 1 mm for a single one."""
+    """Return the smallest distance between two joints along x or y [m]; 1 mm for a single joint."""
     steps = [np.diff(np.unique(np.round([joint[axis] for joint in joints], 9))) for axis in ("x", "y")]
     return float(min(np.concatenate(steps), default=MILLI))
 
@@ -139,9 +139,9 @@ def _map(joints: Sequence[Mapping[str, Any]], key: str, label: str, unit: str, f
     for joint, right, up, value in zip(joints, x, y, values, strict=True):
         colour = colour_at((value - low) / ((high - low) or 1.0))
         is_ok = joint.get("verdict", "ok") in ("ok", "given")
-        place = {"x": round(float(right - x.min()) + 0.5, 3), "y": round(float(y.max() - up) + 0.5, 3)}
-        told = {"name": joint["name"], "text": f"{value:.{digits}f}", "full": f"{value:.4g} {unit}"}
-        cells.append(place | told | {"colour": colour, "ink": ink_on(colour), "ok": is_ok})
+        position = {"x": round(float(right - x.min()) + 0.5, 3), "y": round(float(y.max() - up) + 0.5, 3)}
+        text = {"name": joint["name"], "text": f"{value:.{digits}f}", "full": f"{value:.4g} {unit}"}
+        cells.append(position | text | {"colour": colour, "ink": ink_on(colour), "ok": is_ok})
     steps = np.linspace(high, low, 5 if high > low else 1)
     scale = [(f"{step:.4g}", colour_at((step - low) / ((high - low) or 1.0))) for step in steps]
     return Map(f"{label} [{unit}]", cells, (round(float(np.ptp(x)) + 1, 3), round(float(np.ptp(y)) + 1, 3)), scale)

@@ -1,4 +1,4 @@
-"""The board in the report of a drop: watch points, strain gauges, natural modes, response spectrum of the input."""
+"""Report section on the board: watch points, strain gauges, natural modes, response spectrum of the input."""
 
 import json
 from collections.abc import Mapping
@@ -17,14 +17,14 @@ from reflowshock.workflow.report.spectra import mode_table, spectrum_curves
 def add_board(
     shock: Path, case: BoardDropCase, histories: Histories, metrics: Mapping[str, Any], context: dict
 ) -> None:
-    """Add what is known of the board.
+    """Add curves and tables of the board to the context of a report.
 
     Args:
-        shock: folder of the shock.
-        case: the case.
-        histories: of its modes, the one whose figures count first.
-        metrics: of the run.
-        context: of the page.
+        shock: Folder of the shock.
+        case: Case of the run.
+        histories: Histories by mode, the main mode first.
+        metrics: Metrics of the run.
+        context: Context of the report.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
@@ -43,19 +43,25 @@ def add_board(
 
 
 def watch_table(case: BoardDropCase, metrics: Mapping[str, Any]) -> dict:
-    """Return the peaks of every watch point; empty without any."""
+    """Return the table of peaks at the watch points; empty without watch points."""
     rows = []
     for name, point in case.watch.items():
         peaks = [metrics.get(f"{which}_acceleration@{name}") for which in ("peak", "second_peak")]
         deflection = number(metrics[f"peak_displacement@{name}"]["value"] / MILLI)
-        shown = ["–" if peak is None else number(peak["value"]) for peak in peaks]
-        rows.append([name, in_mm(point.at), deflection, *shown])
-    head = ["watch point", "x, y, z [mm]", "peak displacement [mm]", "peak acceleration [G]", "of opposite sign [G]"]
+        accelerations = ["–" if peak is None else number(peak["value"]) for peak in peaks]
+        rows.append([name, in_mm(point.at), deflection, *accelerations])
+    head = [
+        "watch point",
+        "x, y, z [mm]",
+        "peak displacement [mm]",
+        "peak acceleration [G]",
+        "peak of opposite sign [G]",
+    ]
     return {"head": head, "rows": rows} if rows else {}
 
 
 def watch_curves(case: BoardDropCase, histories: Histories) -> list[Chart]:
-    """Return deflection and acceleration of every watch point."""
+    """Return charts of deflection and acceleration of every watch point."""
     from reflowshock.fem.loads.shock_pulse import shock_pulse
     from reflowshock.fem.output.acceleration import drop_accelerations
 
@@ -65,15 +71,15 @@ def watch_curves(case: BoardDropCase, histories: Histories) -> list[Chart]:
     courses = {mode: drop_accelerations(history, pulse, low_pass, case.watch) for mode, history in histories.items()}
     charts = []
     for name in case.watch:
-        moved = [
+        deflections = [
             Series(x=history["time"] / MILLI, y=history[f"displacement@{name}"][:, 2] / MILLI, **MODE_STYLE[mode])
             for mode, history in histories.items()
         ]
-        felt = [
-            Series(x=found[name].time / MILLI, y=found[name].filtered / GRAVITY, **MODE_STYLE[mode])
-            for mode, found in courses.items()
-            if name in found
+        accelerations = [
+            Series(x=points[name].time / MILLI, y=points[name].filtered / GRAVITY, **MODE_STYLE[mode])
+            for mode, points in courses.items()
+            if name in points
         ]
-        charts.append(Chart(TIME, Axis("deflection [mm]"), moved, title=name))
-        charts += [Chart(TIME, Axis("acceleration [G]"), felt, title=name)] if felt else []
+        charts.append(Chart(TIME, Axis("deflection [mm]"), deflections, title=name))
+        charts += [Chart(TIME, Axis("acceleration [G]"), accelerations, title=name)] if accelerations else []
     return charts

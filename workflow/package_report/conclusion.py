@@ -1,4 +1,4 @@
-"""What a run of a drop concludes: the verdict, the errors of its figures, warnings, and the answer in one line."""
+"""Conclusions of a board drop: verdict, discretisation error, warnings and a one-line answer."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,13 +16,13 @@ PEEL = "peel_stress"
 
 
 def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
-    """Add verdict, warnings, answer and discretisation error to a summary, where the shock was run.
+    """Add verdict, warnings, answer and discretisation error to a summary, if the shock was run.
 
     Args:
-        run_folder: of the run.
-        case: with the limits.
-        summary: what its stages found.
-        known: discretisation errors of its figures.
+        run_folder: Folder of the run.
+        case: Case with the failure limits.
+        summary: Summary of all stages.
+        known: Discretisation errors of the metrics.
     """
     histories, results = read_modes(run_folder / "shock")
     critical = summary["metrics"].get("critical_joint")
@@ -43,13 +43,13 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
 
 
 def _warnings(case: BoardDropCase, history: Arrays) -> tuple[str, ...]:
-    """Say that the stress may rise beyond the end of the run."""
+    """Return warnings of a stress that may still rise after the end of the run."""
     if case.shock.duration == "auto":
         return (unsettled(history, longest_duration(case)),)
     return (late_peak(history),)
 
 
 def _coarse(result: Mapping, joints) -> list[str]:
-    """Return the joints that have the coarse mesh."""
+    """Return the names of the joints with the coarse mesh."""
     fine = findings.fine_joints_of(result)
     return [] if fine is None else [str(name) for name in joints if str(name) not in fine]

@@ -1,4 +1,4 @@
-"""The cost table: the time of two scales over that of one, ranks, elements and steps, beside what was published."""
+"""Cost table: core time, ranks, elements and steps of the two-scale run and the DNS, with published values."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -11,23 +11,23 @@ Record = Mapping[str, Any]
 PAPER = "Hu et al., Table 6 and section 4.4: 10 x 10 package, Intel Xeon Silver 4116"
 PUBLISHED = {
     "dns": {
-        "core time over the DNS": "1.0",
+        "core time / DNS": "1.0",
         "simulated time": "1.5 ms",
-        "time of the windows": "137 min",
+        "wall time of windows": "137 min",
         "ranks": "24 cores",
         "hexahedra": "155 878",
     },
     "two_scale": {
-        "core time over the DNS": "0.285",
+        "core time / DNS": "0.285",
         "simulated time": "1.5 ms",
-        "time of the windows": "39 min",
+        "wall time of windows": "39 min",
         "ranks": "8 cores macro + 16 cores meso",
         "hexahedra": "116 664 macro + 39 214 meso",
     },
 }
 ROWS: tuple[tuple[str, Callable[[Record], str]], ...] = (
     ("simulated time", lambda result: f"{1e3 * result['model']['window'] * result['model']['windows']:.3g} ms"),
-    ("time of the windows", lambda result: duration(result["timings"]["windows"])),
+    ("wall time of windows", lambda result: duration(result["timings"]["windows"])),
     ("ranks", lambda result: ranks(result)),
     ("hexahedra", lambda result: by_role(result["model"]["elements"])),
     ("time step", lambda result: steps(result)),
@@ -37,26 +37,26 @@ ROWS: tuple[tuple[str, Callable[[Record], str]], ...] = (
 
 
 def duration(seconds: float) -> str:
-    """Write a time as an engineer does."""
+    """Return a time in seconds or minutes, as text."""
     return f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
 
 
 def by_role(counts_of: Mapping[str, int]) -> str:
-    """Write a number for each model, or the only one."""
+    """Return the number of each model, as text."""
     if len(counts_of) == 1:
         return number(next(iter(counts_of.values())))
     return " + ".join(f"{number(count)} {role}" for role, count in counts_of.items())
 
 
 def ranks(result: Record) -> str:
-    """Say how many ranks there were, and which model was on which."""
+    """Return the number of ranks and their placement on the models, as text."""
     count = f"{result['model']['ranks']} {'rank' if result['model']['ranks'] == 1 else 'ranks'}"
     chosen = result.get("coupling", {}).get("placement", {}).get("chosen", "")
     return count if result["model"]["mode"] == "dns" or not chosen else f"{count}: {chosen}"
 
 
 def steps(result: Record) -> str:
-    """Return the time steps: of a DNS one, of two scales those of all levels, the window first."""
+    """Return the time step of a DNS, or of all levels of a two-scale run, the window first."""
     model = result["model"]
     levels = result.get("coupling", {}).get("levels", ())
     if model["mode"] == "dns":
@@ -65,23 +65,23 @@ def steps(result: Record) -> str:
 
 
 def counts(model: Record) -> str:
-    """Return how many steps were taken: of two scales those of the macro and of the smallest level."""
+    """Return the number of steps of a DNS, or of the macro model and the finest level of a two-scale run."""
     every = number(model["windows"] * model["substeps"])
     return every if model["mode"] == "dns" else f"{number(model['windows'])}, {every}"
 
 
 def memory(result: Record) -> str:
-    """Return the memory of all ranks together, where the run has measured it."""
-    found = result["metrics"].get("peak_memory")
-    return quantity(found) if found else ""
+    """Return the peak memory of all ranks together, as text; empty if it was not measured."""
+    peak = result["metrics"].get("peak_memory")
+    return quantity(peak) if peak else ""
 
 
 def table(results: Mapping[str, dict], metrics: Record) -> dict | None:
-    """Return the table of both modes beside the published one; None where one of both was not run."""
+    """Return the cost table of both modes and the published ones; None unless both modes were run."""
     if "two_scale_dns_core_ratio" not in metrics:
         return None
     ratios = {"dns": "1", "two_scale": f"{metrics['two_scale_dns_core_ratio']['value']:.3f}"}
-    ours = {mode: {"core time over the DNS": ratios[mode]} | _cells(results[mode]) for mode in ("dns", "two_scale")}
+    ours = {mode: {"core time / DNS": ratios[mode]} | _cells(results[mode]) for mode in ("dns", "two_scale")}
     labels = dict.fromkeys(label for cells in ours.values() for label, text in cells.items() if text)
     columns = [*ours.values(), *PUBLISHED.values()]
     rows = [[label, *(cells.get(label, "") or "–" for cells in columns)] for label in labels]

@@ -1,4 +1,4 @@
-"""The first table of the report of a drop: each headline figure with its errors and what is left out."""
+"""First table of a drop report: headline figures with discretisation error, two-scale error, neglected effects."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,44 +9,44 @@ from reflowshock.workflow.report.errors import NOT_KNOWN, Discretisation, left_o
 
 FIGURES = (
     ("critical_joint", "critical joint"),
-    ("peel_stress", "peel stress, mean over its worse pad, peak"),
-    ("layer_von_mises", "von Mises stress of the solder layer there, peak"),
-    ("layer_plastic_work", "plastic work density of the solder layer there"),
-    ("section_axial_force", "axial force of this joint, peak"),
-    ("section_bending_moment", "bending moment of this joint, peak"),
+    ("peel_stress", "peak peel stress, mean over the worse pad"),
+    ("layer_von_mises", "peak von Mises stress, solder layer at this pad"),
+    ("layer_plastic_work", "plastic work density, solder layer at this pad"),
+    ("section_axial_force", "peak axial force of this joint"),
+    ("section_bending_moment", "peak bending moment of this joint"),
     ("peak_acceleration@package", "peak acceleration of the package"),
     ("peak_board_strain", "peak board strain under the package"),
-    ("peak_board_displacement", "peak deflection of the board's centre"),
-    ("peak_element_stress", "largest von Mises stress of an element; grows with a finer mesh, ranks nothing"),
+    ("peak_board_displacement", "peak deflection of the board centre"),
+    ("peak_element_stress", "largest von Mises stress of an element (mesh-dependent, not for ranking)"),
 )
-HEAD = ("", "value", "discretisation error", "error of two scales", "left out, expected influence")
+HEAD = ("", "value", "discretisation error", "two-scale error", "neglected effects, expected influence")
 NOTE = (
     "Discretisation error: grid convergence index (Roache 1994), 1.25 times the difference from the Richardson limit of"
-    " three meshes, 3 times that from the finest mesh where they show no order. Error of two scales: difference from"
-    " one model on the same mesh."
+    " three meshes, or 3 times the difference from the finest mesh if they show no order. Two-scale error: difference"
+    " from one model on the same mesh."
 )
 
 
 def later_swings(shock: Shock, end: float) -> str:
-    """Say that swings after the end of a run [s] may bring more, where it ended by itself and nothing damps it."""
+    """Return a note that later swings may be larger, for an undamped run that ended automatically at ``end`` [s]."""
     if shock.duration != "auto" or any(shock.damping.coefficients):
         return ""
     return (
-        f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. Nothing damps the board: later"
-        " swings may bring more (shock.damping damps it, shock.duration follows it further)."
+        f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. The board is undamped, so later"
+        " swings may be larger; set shock.damping, or a longer shock.duration."
     )
 
 
 def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mapping, results: Mapping[str, Any]) -> dict:
-    """Return rows of figure, value and errors; what is left out is the same for all of them.
+    """Return the table of headline figures with value and errors, the common neglected effects, and a note.
 
     Args:
-        metrics: of the run.
-        known: discretisation errors.
-        summary: of the run, with its effects.
-        results: ``result.json`` of the modes, the one whose figures count first.
+        metrics: Metrics of the run.
+        known: Discretisation errors of the metrics.
+        summary: Summary of the run, with its effects.
+        results: ``result.json`` of each mode, the main mode first.
     """
-    found = {name: label for name, label in FIGURES if name in metrics}
+    figures = {name: label for name, label in FIGURES if name in metrics}
     rows = [
         [
             label,
@@ -54,11 +54,11 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
             "–" if isinstance(metrics[name]["value"], str) else known.text(name),
             scheme_error(name, results),
         ]
-        for name, label in found.items()
+        for name, label in figures.items()
     ]
     note = NOTE
     if any(row[2] == NOT_KNOWN for row in rows):
-        note += f" Discretisation error not known: {known.unknown}."
+        note += f" Discretisation error unknown: {known.unknown}."
     if any(row[3] == NOT_KNOWN for row in rows) and len(results) == 1:
-        note += ' Error of two scales not known: shock.numerics.modes has no "dns", one model at the small step.'
+        note += ' Two-scale error unknown: add "dns" (one model at the small step) to shock.numerics.modes.'
     return {"head": HEAD, "rows": rows, "left_out": left_out(summary["effects"]), "note": note}

@@ -1,4 +1,4 @@
-"""Von Mises stress of all joints where they meet the package, two-scale beside DNS, at given times."""
+"""Von Mises stress of all joints at the package pads, two-scale and DNS, at the picture times."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,47 +15,47 @@ Arrays = Mapping[str, NDArray]
 
 MEGA = 1e6
 STRESS = "von Mises stress"
-APART = 1.15  # of the array's width, between the modes
+MODE_SPACING = 1.15  # in widths of the array
 FROM_ABOVE = (0.0, -0.01, 1.0)
-SAME_TIME = 1e-6  # s: modes write a time at the end of their own window that is next to it
+SAME_TIME = 1e-6  # [s] modes write a picture at the end of their nearest window
 
 
 def read_interfaces(shock: Path, modes: Sequence[str]) -> dict[str, dict[str, NDArray]]:
-    """Read ``interface.npz`` of the modes that have it."""
-    found = {}
+    """Read ``interface.npz`` of the modes that wrote one."""
+    interfaces = {}
     for mode in modes:
         path = shock / mode / "interface.npz"
         if path.exists():
             with np.load(path) as arrays:
-                found[mode] = dict(arrays)
-    return found
+                interfaces[mode] = dict(arrays)
+    return interfaces
 
 
 def joints_of(interface: Arrays) -> list[str]:
-    """Return the joints that an interface has, in its order."""
+    """Return the joint names of an interface, in its order."""
     return [name.split("@")[1] for name in interface if name.startswith("von_mises@")]
 
 
 def areas(interface: Arrays, joint: str) -> NDArray[np.float64]:
-    """Return the areas ``(q,)`` [m^2] of the faces of a joint, from their diagonals."""
+    """Return the areas of the faces of a joint, from their diagonals, shape (q,) [m^2]."""
     corners = interface[f"points@{joint}"][interface[f"quads@{joint}"]]
     diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
 
 
 def times_of(interfaces: Mapping[str, Arrays]) -> NDArray[np.float64]:
-    """Return all times [s] that a mode has; one that ends early has fewer."""
+    """Return the picture times [s] of the mode with most; a mode that ended early has fewer."""
     return max((interface["times"] for interface in interfaces.values()), key=len)
 
 
 def row_at(interface: Arrays, time: float) -> int | None:
-    """Return the row of the time next to ``time`` [s]; None where a mode that ends early has none."""
-    away = np.abs(interface["times"] - time)
-    return int(away.argmin()) if away.min(initial=np.inf) <= SAME_TIME else None
+    """Return the row nearest to ``time`` [s]; None if the mode ended before."""
+    distance = np.abs(interface["times"] - time)
+    return int(distance.argmin()) if distance.min(initial=np.inf) <= SAME_TIME else None
 
 
 def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], time: float) -> float | None:
-    """Return the relative L2 difference of two stress fields over the faces of joints; None unless both have it."""
+    """Return the relative L2 difference of two stress fields at a time [s]; None unless both have that time."""
     row, row_of_reference = row_at(ours, time), row_at(reference, time)
     if row is None or row_of_reference is None:
         return None
@@ -68,7 +68,7 @@ def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], time: flo
 
 
 def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
-    """Return the joints that both modes have with the same faces; none where only one mode was run."""
+    """Return the joints with the same faces in both modes; empty if only one mode was run."""
     if len(interfaces) < 2:
         return []
     first, second = interfaces.values()
@@ -77,25 +77,25 @@ def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
 
 
 def table(interfaces: Mapping[str, Arrays]) -> dict:
-    """Largest and mean stress of both modes at each time, the joint that has the largest, and how far they differ."""
+    """Return the table of largest stress, its joint and mean stress of each mode at each time, and their difference."""
     shared = comparable(interfaces)
     rows = []
     for time in times_of(interfaces):
-        here = [(interface, row_at(interface, time)) for interface in interfaces.values()]
-        extremes = [_extremes(one, row) if row is not None else 3 * ("–",) for one, row in here]
+        rows_now = [(interface, row_at(interface, time)) for interface in interfaces.values()]
+        extremes = [3 * ("–",) if row is None else _extremes(interface, row) for interface, row in rows_now]
         cells = [cell for cells_of_mode in extremes for cell in cells_of_mode]
         if shared:
             first, second = interfaces.values()
             differs = difference(first, second, shared, time)
             cells.append("–" if differs is None else percent(differs))
         rows.append([f"{time / MILLI:.4g}", *cells])
-    heads = [head for mode in interfaces for head in (f"{mode_name(mode)}: largest [MPa]", "in joint", "mean [MPa]")]
-    last = [f"relative L2 difference of {len(shared)} joints"] if shared else []
+    heads = [head for mode in interfaces for head in (f"{mode_name(mode)}: largest [MPa]", "joint", "mean [MPa]")]
+    last = [f"relative L2 difference ({len(shared)} joints)"] if shared else []
     return {"head": ["time [ms]", *heads, *last], "rows": rows}
 
 
 def interface_scene(interfaces: Mapping[str, Arrays]) -> Scene:
-    """Return the faces of all joints seen from above at all times, the modes beside each other."""
+    """Return a top view of the pad faces of all joints at all times, the modes side by side."""
     times, first = times_of(interfaces), next(iter(interfaces.values()))
     corners = np.concatenate([first[f"points@{joint}"] for joint in joints_of(first)])
     width, top_edge = float(np.ptp(corners[:, 0])), float(corners[:, 1].max())
@@ -103,18 +103,18 @@ def interface_scene(interfaces: Mapping[str, Arrays]) -> Scene:
     parts: list[str] = []
     labels = []
     for column, (mode, interface) in enumerate(interfaces.items()):
-        shift = np.array([APART * width * column, 0.0, 0.0])
+        shift = np.array([MODE_SPACING * width * column, 0.0, 0.0])
         groups.append(_group(interface, times, shift, len(parts)))
         parts += [f"{joint}, {mode_name(mode)}" for joint in joints_of(interface)]
-        place = (float(corners[:, 0].mean() + shift[0]), top_edge + 0.06 * width, float(corners[:, 2].mean()))
-        labels.append((mode_name(mode), place))
+        position = (float(corners[:, 0].mean() + shift[0]), top_edge + 0.06 * width, float(corners[:, 2].mean()))
+        labels.append((mode_name(mode), position))
     top = max(float(np.nanmax(group.values[STRESS])) for group in groups)
     frames = [f"{time / MILLI:.4g} ms" for time in times]
     return Scene(groups, parts, [Field(STRESS, "MPa", 0.0, top)], frames, view=FROM_ABOVE, labels=labels)
 
 
 def _group(interface: Arrays, times: NDArray[np.float64], shift: NDArray[np.float64], first_part: int) -> Group:
-    """Return the faces of a mode's joints with the stress [MPa] of each at all times; nan after the mode's end."""
+    """Return the faces of a mode with the stress [MPa] of each at all times; NaN after the end of the mode."""
     rows, joints = [row_at(interface, time) for time in times], joints_of(interface)
     corners = [interface[f"points@{joint}"][interface[f"quads@{joint}"]].reshape(-1, 3) + shift for joint in joints]
     values = []
@@ -124,12 +124,12 @@ def _group(interface: Arrays, times: NDArray[np.float64], shift: NDArray[np.floa
         values.append(np.repeat(of_faces, 4, axis=1))
     points = np.concatenate(corners)
     part = np.repeat(first_part + np.arange(len(joints)), [len(places) for places in corners])
-    shown = {STRESS: np.concatenate(values, axis=1)}
-    return Group("solder", points, np.arange(len(points)).reshape(-1, 4), part, values=shown)
+    stresses = {STRESS: np.concatenate(values, axis=1)}
+    return Group("solder", points, np.arange(len(points)).reshape(-1, 4), part, values=stresses)
 
 
 def _extremes(interface: Arrays, row: int) -> tuple[str, str, str]:
-    """Return the largest stress at a time, the joint that has it, and the mean over all faces."""
+    """Return the largest stress in a row, its joint, and the mean over all faces, as text."""
     joints = joints_of(interface)
     peaks = [float(interface[f"von_mises@{joint}"][row].max()) for joint in joints]
     worst = int(np.argmax(peaks))

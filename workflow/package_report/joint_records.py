@@ -1,4 +1,4 @@
-"""What products say of the joints, one flat record each, and tables of such records."""
+"""Flat records of the joints, read from the products of all stages, and tables of such records."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,17 +13,17 @@ Column = tuple[str, str, Callable[[Any], str]]  # head, key of the record, text 
 
 
 def joint_records(run_folder: Path) -> list[dict]:
-    """Join pad table, reflow metrics, measures of the surface and mesh quality: one flat record a joint, SI units.
+    """Return one flat record for each joint: pad, reflow metrics, surface measures and mesh quality, in SI units.
 
-    Of a joint whose surface was given that counts, not its reflow; angles are in degrees. Stages that have not run
-    contribute nothing.
+    Angles are in degrees. A surface given by the user replaces the reflow metrics. Stages that have not run contribute
+    nothing.
     """
-    found = (
+    products = (
         read_json(run_folder / "reflow/joints.json"),
         _optional(run_folder / "surface/surfaces.json"),
         _optional(run_folder / "solder_mesh/quality.json"),
     )
-    return [_record(pad, *found) for pad in read_json(run_folder / "reflow/pads.json")]
+    return [_record(pad, *products) for pad in read_json(run_folder / "reflow/pads.json")]
 
 
 def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) -> dict:
@@ -43,7 +43,7 @@ def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) 
 
 
 def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
-    """Return names and records of the joints of each distinct shape, by increasing standoff of the first of them."""
+    """Return names and records of the joints of each distinct shape, by increasing standoff of the first joint."""
     groups: dict[str, list[Record]] = {}
     for joint in joints:
         groups.setdefault(joint["shape"], []).append(joint)
@@ -52,9 +52,9 @@ def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
 
 
 def bridge_records(run_folder: Path) -> list[dict]:
-    """Return name and mesh quality of joints that became one body."""
+    """Return name and mesh quality of bridged joints."""
     quality = _optional(run_folder / "solder_mesh/bridged_quality.json")
-    return [{"name": name, "shape": name, "standoff": 0.0} | found for name, found in quality.items()]
+    return [{"name": name, "shape": name, "standoff": 0.0} | measures for name, measures in quality.items()]
 
 
 def _optional(path: Path) -> dict:
@@ -62,10 +62,10 @@ def _optional(path: Path) -> dict:
 
 
 def record_table(columns: Iterable[Column], groups: list, chosen: Callable[[str, list], Any]) -> dict:
-    """Return a table of the columns that any record has."""
-    known = [column for column in columns if any(column[1] in joint for _, group in groups for joint in group)]
-    rows = [[" ".join(names), *(_text(column, group, chosen) for column in known)] for names, group in groups]
-    return {"head": ["joints", *(head for head, _, _ in known)], "rows": rows}
+    """Return a table of the columns that occur in the records; ``chosen`` picks one value of a group."""
+    present = [column for column in columns if any(column[1] in joint for _, group in groups for joint in group)]
+    rows = [[" ".join(names), *(_text(column, group, chosen) for column in present)] for names, group in groups]
+    return {"head": ["joints", *(head for head, _, _ in present)], "rows": rows}
 
 
 def _text(column: Column, group: Sequence[Record], chosen: Callable[[str, list], Any]) -> str:

@@ -1,4 +1,4 @@
-"""Tables of joints: their shape after reflow, their meshes, their stress in the shock."""
+"""Tables of joints: shape after reflow, mesh quality, stress in the shock."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -19,10 +19,10 @@ MESH_COLUMNS: tuple[Column, ...] = (
     ("contact area error", "contact_area_error", percent),
     ("largest deviation [µm]", "shape_deviation", micro),
     ("min. scaled Jacobian", "minimum_scaled_jacobian", lambda value: f"{value:.2f}"),
-    ("critical step", "critical_time_step", nano),
+    ("critical time step", "critical_time_step", nano),
     ("tetrahedra", "tetrahedra", number),
-    ("their scaled Jacobian", "tetrahedra_quality", lambda value: f"{value:.2f}"),
-    ("tries", "tries", number),
+    ("min. scaled Jacobian of tetrahedra", "tetrahedra_quality", lambda value: f"{value:.2f}"),
+    ("attempts", "tries", number),
 )
 SMALLEST_OF = ("minimum_scaled_jacobian", "critical_time_step", "tetrahedra_quality")
 
@@ -30,24 +30,24 @@ SMALLEST_OF = ("minimum_scaled_jacobian", "critical_time_step", "tetrahedra_qual
 SHAPE_COLUMNS: tuple[Column, ...] = (
     ("standoff [µm]", "standoff", micro),
     ("max. width [µm]", "max_width", micro),
-    ("angle board / package [deg]", "angles", str),
+    ("contact angle board / package [deg]", "angles", str),
     ("tilt [mrad]", "tilted", lambda value: f"{1e3 * value:.2f}"),
     ("width error", "width_error", percent),
-    ("axial force on the package, upwards [mN]", "axial_force", lambda value: f"{1e3 * value:+.3f}"),
+    ("upward force on the package [mN]", "axial_force", lambda value: f"{1e3 * value:+.3f}"),
     ("volume drift", "volume_drift", percent),
-    ("smoothing takes", "smoothing_loss", percent),
-    ("viscosity takes", "viscous_loss", percent),
+    ("smoothing loss", "smoothing_loss", percent),
+    ("viscous loss", "viscous_loss", percent),
     ("energy imbalance", "energy_imbalance", percent),
 )
 
 
 def shapes(joints: Sequence[Record]) -> dict:
-    """One row a distinct shape, by increasing standoff."""
+    """Return the table of distinct joint shapes, by increasing standoff."""
     return record_table(SHAPE_COLUMNS, by_shape(joints), lambda key, values: values[0])
 
 
 def verdicts(run_folder: Path) -> dict:
-    """Verdict of the reflow on every joint, those that are not ok first."""
+    """Return the table of reflow verdicts, joints that are not ok first."""
     joints = read_json(run_folder / "reflow/joints.json")
     rows = [
         [
@@ -59,7 +59,7 @@ def verdicts(run_folder: Path) -> dict:
         ]
         for name, joint in sorted(joints.items(), key=lambda item: item[1]["verdict"] == "ok")
     ]
-    return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width alone [µm]"], "rows": rows}
+    return {"head": ["joint", "verdict", "touches", "standoff [µm]", "max. width without bridge [µm]"], "rows": rows}
 
 
 def ranked_joints(
@@ -68,13 +68,13 @@ def ranked_joints(
     judged: Mapping[str, dict],
     fine: Collection[str] | None = None,
 ) -> dict:
-    """Joints ranked by peel stress, or by plastic work where solder yields; what depends on the mesh comes last.
+    """Return the table of joints ranked by peel stress, or by plastic work if the solder yields.
 
     Args:
-        history: of one mode.
-        joints: ``joint_records``.
-        judged: joint -> verdict, margin.
-        fine: names of the fine joints, where some are coarse.
+        history: History of one mode.
+        joints: Records of the joints, see ``joint_records``.
+        judged: Verdict and margin of each joint.
+        fine: Names of the fine joints; None if all are fine.
     """
     shape = {joint["name"]: joint for joint in joints}
     measure = ranking_measure(history)
@@ -107,8 +107,8 @@ def ranked_joints(
         "verdict",
         "margin",
         "peel stress [MPa]",
-        f"von Mises of the {layer} at the pad [MPa]",
-        *([f"plastic work of the {layer} [kJ/m³]"] if "plastic_work_board" in history else []),
+        f"von Mises, {layer} layer at the pad [MPa]",
+        *([f"plastic work, {layer} layer [kJ/m³]"] if "plastic_work_board" in history else []),
         "pad",
         "time of peel stress [ms]",
         "axial force [N]",
@@ -117,48 +117,50 @@ def ranked_joints(
         "standoff [µm]",
         "width [µm]",
         *([] if fine is None else ["mesh"]),
-        "largest element value [MPa], depends on the mesh",
+        "largest element value [MPa] (mesh-dependent)",
     ]
     return {"head": head, "rows": rows}
 
 
 def work_cells(history: Mapping[str, np.ndarray], column: int) -> list[str]:
-    """Plastic work at the worse pad of the joint in a column of the history, where solder yields."""
+    """Return the plastic work at the worse pad of a joint, as a list of one cell; empty if the solder is elastic."""
     if "plastic_work_board" not in history:
         return []
     return [number(1e-3 * float(PLASTIC_WORK.peaks(history)[column]))]
 
 
 def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
-    """Verdict and margin of a joint, with the criterion of least margin."""
+    """Return verdict and smallest margin of a joint, with its criterion."""
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
     return [judged["verdict"], f"{judged['margin']:.3g} by {WORDS[judged['criterion']]}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:
-    """How the joints were meshed, the worst of each shape; None where none is."""
+    """Return the table of mesh quality, the worst of each shape; None before the joints are meshed."""
     if not any("minimum_scaled_jacobian" in joint for joint in joints):
         return None
     return record_table(MESH_COLUMNS, by_shape([_counted(joint) for joint in joints]), _worst)
 
 
 def missed_tries(joints: Sequence[Record]) -> dict | None:
-    """What tries to mesh a joint have missed before one succeeded; None where none has."""
-    rows = [[joint["name"], way["method"], way["missed"]] for joint in joints for way in joint.get("tries", ())]
-    return {"head": ["joint", "method", "missed"], "rows": rows, "prose": True} if rows else None
+    """Return the table of failed meshing attempts; None if every first attempt succeeded."""
+    rows = [
+        [joint["name"], attempt["method"], attempt["missed"]] for joint in joints for attempt in joint.get("tries", ())
+    ]
+    return {"head": ["joint", "method", "unmet criterion"], "rows": rows, "prose": True} if rows else None
 
 
 def fine_instead(run_folder: Path) -> dict | None:
-    """Why joints of which few hexahedra cannot follow the shape are as fine where they were to be coarse."""
+    """Return the table of joints that stay fine because a coarse mesh cannot follow their shape; None without any."""
     path = run_folder / "solder_mesh/coarse_quality.json"
     coarse = read_json(path) if path.exists() else {}
     rows = [[name, joint["fine_instead"]] for name, joint in coarse.items() if "fine_instead" in joint]
-    return {"head": ["joint", "why"], "rows": rows, "prose": True} if rows else None
+    return {"head": ["joint", "reason"], "rows": rows, "prose": True} if rows else None
 
 
 def _counted(joint: Record) -> dict[str, Any]:
-    """Return a record with the number of its tries, and of the tetrahedra that its hexahedra were made of."""
+    """Return a record with the number of meshing attempts and of the tetrahedra split into hexahedra."""
     counted = dict(joint)
     if "tries" in joint:
         counted["tries"] = len(joint["tries"]) + 1
@@ -168,7 +170,7 @@ def _counted(joint: Record) -> dict[str, Any]:
 
 
 def _worst(key: str, values: list) -> Any:
-    """Return the worst of the values of a column."""
+    """Return the worst value of a column, or all texts."""
     if isinstance(values[0], str):
         return " ".join(dict.fromkeys(values))
     return min(values) if key in SMALLEST_OF else max(values, key=abs)

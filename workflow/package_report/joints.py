@@ -1,4 +1,4 @@
-"""Section "Joints" of the report: what the reflow made of them, and how they were meshed."""
+"""Report section on the joints: shapes after reflow, verdicts, meshes, warpage."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,11 +9,11 @@ from reflowshock.workflow.package_report import joint_tables as mesh_tables
 from reflowshock.workflow.package_report.joint_records import bridge_records, joint_records
 from reflowshock.workflow.process.products import read_json
 
-BRIDGE_CAPTION = "as one body: particles and free surface; at the end coloured by pressure above ambient."
+BRIDGE_CAPTION = "bridged: particles and free surface; the last frame is coloured by pressure above ambient."
 
 
 def add_joints(run_folder: Path, context: dict) -> None:
-    """Add shapes, maps, verdicts and meshes of the joints of an array, as far as the run has gone."""
+    """Add shapes, maps, verdicts and meshes of all joints, as far as the run has gone."""
     if not (run_folder / "reflow/joints.json").exists():
         return
     from reflowshock.workflow.package_report.array import array_maps, shapes_scene
@@ -37,7 +37,7 @@ def add_joints(run_folder: Path, context: dict) -> None:
 
 
 def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
-    """The figures of the joints at the top of the page."""
+    """Return the figures of the joints at the top of the page."""
     standoffs = sorted({f"{1e6 * joint['standoff']:.0f}" for joint in joints}, key=float)
     shapes = len({joint["shape"] for joint in joints})
     return [
@@ -47,7 +47,7 @@ def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
 
 
 def _add_bridge(run_folder: Path, context: dict) -> None:
-    """Add the picture of two joints that became one, the only shape under two names."""
+    """Add a scene of the first bridged pair of joints, whose shape has two names joined by "+"."""
     if not any(joint["verdict"] == "bridged" for joint in read_json(run_folder / "reflow/joints.json").values()):
         return
     from reflowshock.particles.scenes.products import read_shapes
@@ -61,7 +61,7 @@ def _add_bridge(run_folder: Path, context: dict) -> None:
 
 
 def _add_warpage(run_folder: Path, joints: Sequence[Mapping[str, Any]], context: dict) -> None:
-    """Add how package and board have warped, where they did."""
+    """Add the warpage of package and board, if the reflow computed it."""
     from reflowshock.workflow.package_report import warpage
 
     structure = warpage.read_structure(run_folder)

@@ -1,4 +1,4 @@
-"""Scenes of a package in 3D: joints, board and package in the shock, and what cooling left before it."""
+"""3D scenes of a package: joints, board and package in the shock, and residual stress before it."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from reflowshock.workflow.report.field_series import FieldSeries
 from reflowshock.workflow.report.scene import Field, Group, Scene
 
 MEGA, MILLI = 1e6, 1e-3
-TALL = 4.0  # heights of the joints, of which displacements are drawn as a share
+JOINT_HEIGHTS = 4.0  # length scale of drawn displacements, in heights of a joint
 STRESS, PLASTIC, LIFT = "von Mises stress", "plastic strain", "displacement along z"
 ROLES = ("solder", "copper", "board", "substrate", "die")
 GHOSTS = ("board", "substrate", "die", "other packages")
@@ -25,24 +25,24 @@ def drop_scene(folder: Path, history: Arrays, result: Mapping[str, Any]) -> tupl
     """Return joints, board and package at all stored times of a shock, and a caption.
 
     Args:
-        folder: of the mode.
-        history: of the mode.
+        folder: Folder of the mode.
+        history: History of the mode.
         result: ``result.json`` of the mode.
     """
     stress = VON_MISES.worse(history)
-    own = stress[:, critical_joint(history)]
-    time = float(history["time"][np.argmax(own)])
-    found = [FieldSeries.read(paths, CELL_FIELDS, time) for paths in _models(folder, result)]
-    joints, whole = found[0], found[-1].at(found[0].times)
+    critical = stress[:, critical_joint(history)]
+    time = float(history["time"][np.argmax(critical)])
+    series = [FieldSeries.read(paths, CELL_FIELDS, time) for paths in _models(folder, result)]
+    joints, whole = series[0], series[-1].at(series[0].times)
     scene = _scene(joints, whole, result["parts"], float(stress.max()), time)
     return scene, (
-        "The scale of the stress ends at the largest average over a joint's layer at a pad; single elements reach more,"
-        " the more so the finer they are. Displacements are relative to the drop table."
+        "The stress scale ends at the largest average over a solder layer; single elements exceed it, and more so on"
+        " finer meshes. Displacements are relative to the drop table."
     )
 
 
 def residual_scene(path: Path, parts: Sequence[str], top: float) -> Scene:
-    """Return what cooling left before the shock, the colours ending at a stress [Pa]."""
+    """Return the residual stress before the shock on a colour scale up to ``top`` [Pa]."""
     import meshio
 
     mesh = meshio.read(path)
@@ -54,12 +54,12 @@ def residual_scene(path: Path, parts: Sequence[str], top: float) -> Scene:
 
 
 def is_neighbour(part: str) -> bool:
-    """Whether a part belongs to a package whose joints are not meshed: `<role>_<name>`, of no joint."""
+    """Return whether a part ``<role>_<name>`` belongs to a neighbouring package, whose joints are not meshed."""
     return part.startswith(("solder_", "substrate_", "die_")) and "@" not in part
 
 
 def _models(folder: Path, result: Mapping[str, Any]) -> list[list[Path]]:
-    """Return the series of the models that have the joints, then those that have the board."""
+    """Return the files of the models with the joints, then of the models with the board."""
     whole = {name: path for name in ("dns", "macro", "meso") if (path := folder / f"{name}.pvd").exists()}
     if result.get("coupling", {}).get("direction") == "one_way":
         return [[whole["meso"]], [whole["macro"]]]
@@ -74,7 +74,7 @@ def _scene(joints: FieldSeries, whole: FieldSeries, parts: Sequence[str], top: f
         chosen = np.isin(series.fields["part"][0].astype(int), numbers)
         if chosen.any():
             style = {"is_ghost": role in GHOSTS}
-            groups.append(body_group(role, series, chosen, _shown(role, series), **style))
+            groups.append(body_group(role, series, chosen, _coloured_by(role, series), **style))
     return Scene(
         groups,
         parts,
@@ -87,18 +87,18 @@ def _scene(joints: FieldSeries, whole: FieldSeries, parts: Sequence[str], top: f
 
 
 def role_of(part: str) -> str:
-    """Return the group that a part belongs to."""
+    """Return the group of a part: a material role or ``other packages``."""
     return OTHERS if is_neighbour(part) else next((role for role in ROLES if part.startswith(role)), OTHERS)
 
 
-def _shown(role: str, series: FieldSeries) -> dict[str, np.ndarray]:
-    """Return the fields that colour a group: stresses of solder and copper."""
+def _coloured_by(role: str, series: FieldSeries) -> dict[str, np.ndarray]:
+    """Return the fields that colour solder and copper; empty for other roles."""
     if role not in ("solder", "copper"):
         return {}
-    shown = {STRESS: series.fields["von_mises"] / MEGA}
+    fields = {STRESS: series.fields["von_mises"] / MEGA}
     if "plastic_strain" in series.fields:
-        shown[PLASTIC] = 100.0 * series.fields["plastic_strain"]
-    return shown
+        fields[PLASTIC] = 100.0 * series.fields["plastic_strain"]
+    return fields
 
 
 def _fields(groups: Sequence[Group], top: float) -> list[Field]:
@@ -114,8 +114,8 @@ def _fields(groups: Sequence[Group], top: float) -> list[Field]:
 
 
 def _exaggeration(joints: Group) -> float:
-    """Return how many times as large displacements are drawn: so that those of the joints differ visibly."""
+    """Return the scale factor of displacements at which differences between joints are visible."""
     if joints.displacement is None:
         return 1.0
     differs = float(np.ptp(joints.displacement[:, :, 2], axis=1).max())
-    return exaggeration(TALL * float(np.ptp(joints.points[:, 2])), differs)
+    return exaggeration(JOINT_HEIGHTS * float(np.ptp(joints.points[:, 2])), differs)

@@ -1,4 +1,4 @@
-"""What the real shapes of the joints change: the shock beside one in which all joints are identical."""
+"""Effect of the real joint shapes: comparison with a shock on identical joints."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,53 +15,53 @@ from reflowshock.workflow.report.histories import joint_stress, peel_peaks
 Arrays = Mapping[str, NDArray]
 
 MEGA = 1e6
-SHOWN = 30  # joints of the chart, the critical one first
+MOST_JOINTS = 30  # joints of the chart, the critical one first
 
 
 def in_words(real: Arrays, identical: Arrays) -> str:
-    """Say what the real shapes change in the critical joint, and whether another one becomes critical."""
-    found, flat = peel_peaks(real), peel_peaks(identical)
-    critical, other = next(iter(found)), next(iter(flat))
-    effect = shape_effect(found[critical], flat[critical])
-    word = "raise" if found[critical] >= flat[critical] else "lower"
+    """Return a sentence on how the real shapes change the peel stress of the critical joint."""
+    peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
+    critical, other = next(iter(peaks)), next(iter(identical_peaks))
+    effect = shape_effect(peaks[critical], identical_peaks[critical])
+    word = "raise" if peaks[critical] >= identical_peaks[critical] else "lower"
     by = "" if effect is None else f" by {percent(abs(effect))}"
-    same = "it is the critical one in both" if critical == other else f"there {other} would be the critical one"
-    real_text, flat_text = (f"{number(stress[critical] / MEGA)} MPa" for stress in (found, flat))
+    same = "it is critical in both" if critical == other else f"with these, {other} would be critical"
+    real_text, flat_text = (f"{number(stress[critical] / MEGA)} MPa" for stress in (peaks, identical_peaks))
     return (
         f"The real shapes {word} the peak peel stress of {critical}{by}: {real_text} instead of"
-        f" {flat_text} under a flat package on identical truncated spheres; {same}."
+        f" {flat_text} with identical truncated spheres under a flat package; {same}."
     )
 
 
 def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
-    """Peak peel stress of every joint with its real shape and as one of identical joints, the critical one first."""
-    found, flat = peel_peaks(real), peel_peaks(identical)
+    """Return the table of peak peel stress with real and with identical joints, the critical joint first."""
+    peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     standoff = {joint["name"]: joint["standoff"] for joint in joints}
     rows = []
-    for name in found:
-        effect = shape_effect(found[name], flat[name])
-        told = "–" if effect is None else f"{100.0 * effect:+.2f} %"
-        rows.append([name, mega(found[name]), mega(flat[name]), told, f"{1e6 * standoff[name]:.1f}"])
+    for name in peaks:
+        effect = shape_effect(peaks[name], identical_peaks[name])
+        change = "–" if effect is None else f"{100.0 * effect:+.2f} %"
+        rows.append([name, mega(peaks[name]), mega(identical_peaks[name]), change, f"{1e6 * standoff[name]:.1f}"])
     return {
-        "head": ["joint", "real, peel [MPa]", "identical, peel [MPa]", "change", "real standoff [µm]"],
+        "head": ["joint", "peel stress, real [MPa]", "peel stress, identical [MPa]", "change", "real standoff [µm]"],
         "rows": rows,
     }
 
 
 def curves(real: Arrays, identical: Arrays) -> list[Chart]:
-    """Return the critical joint's peel stress with real and identical joints, and the peaks of all joints."""
-    found, flat = peel_peaks(real), peel_peaks(identical)
-    critical, names = next(iter(found)), list(found)[:SHOWN]
-    kinds = ((real, found, "real shapes", BLUE), (identical, flat, "identical joints", ORANGE))
+    """Return charts of the critical joint's peel stress and of the peaks of all joints, real and identical."""
+    peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
+    critical, names = next(iter(peaks)), list(peaks)[:MOST_JOINTS]
+    kinds = ((real, peaks, "real shapes", BLUE), (identical, identical_peaks, "identical joints", ORANGE))
     lines = [
         Series(label, history["time"] / MILLI, joint_stress(history, critical, PEEL) / MEGA, colour)
         for history, _, label, colour in kinds
     ]
-    peaks = [
+    points = [
         Series(label, range(len(names)), [of[name] / MEGA for name in names], colour, line="none", marks=True)
         for _, of, label, colour in kinds
     ]
     return [
         Chart(TIME, Axis(f"peel stress of {critical} [MPa]"), lines),
-        Chart(Axis("joint, the critical one first", names=names), Axis("peak peel stress [MPa]"), peaks),
+        Chart(Axis("joint, critical first", names=names), Axis("peak peel stress [MPa]"), points),
     ]

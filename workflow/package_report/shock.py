@@ -1,4 +1,4 @@
-"""Sections of the report on the shock of a package: stresses, what the shapes change, two scales, energies, cost."""
+"""Report sections on the shock of a package: stresses, effect of joint shapes, two scales, energies, cost."""
 
 import json
 from collections.abc import Mapping
@@ -18,12 +18,12 @@ from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.histories import MODES, read_modes
 
-FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # of modes with fine joints of their own, or of all modes
+FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # one mode each, or common to all modes
 SIDES = ("von_mises_board", "von_mises_package")
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
-    """Add the sections on the shock, where it was run."""
+    """Add the sections on the shock to the context of a report, if the shock was run."""
     shock = run_folder / "shock"
     histories, results = read_modes(shock)
     if not histories:
@@ -57,8 +57,14 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     )
     context["published_source"] = cost.PAPER
     add_board(shock, case, histories, metrics, context)
-    _add_ranks(histories, results, (joints, summary["verdict"]["joints"]), context)
-    _add_shape_effect(shock, histories[main], (joints, metrics), context)
+    ranked = ranking_mode(histories, results)
+    context["joint_order"] = joint_order(histories[ranked], ranked if ranked != main else "")
+    context["tables"]["joints"] = joint_tables.ranked_joints(
+        histories[ranked], joints, summary["verdict"]["joints"], findings.fine_joints_of(results[ranked])
+    )
+    _add_shape_effect(shock, histories[main], joints, context)
+    if context.get("shape_effect") and "identical_joint_standoff" in metrics:
+        context["shape_effect"] += standoff_sentence(metrics)
     _add_interface(shock, context)
     add_residual(shock, results[main]["parts"], context)
     _add_two_scales(run_folder, case, context, results)
@@ -66,18 +72,18 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
 
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
-    """Say what small kinematics leave out, where that matters; else nothing."""
+    """Return a note on the strain that small kinematics neglect; empty where it is negligible."""
     from reflowshock.fem.problem.kinematics import NEGLIGIBLE_STRAIN
 
-    left_out = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
-    if kinematics != "small" or left_out <= NEGLIGIBLE_STRAIN:
+    neglected = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
+    if kinematics != "small" or neglected <= NEGLIGIBLE_STRAIN:
         return ""
     ratio = metrics["deflection_over_thickness"]["value"]
     strain = tables.named_quantity(metrics, "peak_board_strain")
     return (
-        f"The board deflects by {ratio:.3g} times its thickness. Small kinematics leave out the strain that goes with"
-        f" its rotation, up to {1e6 * left_out:.0f} µm/m; the largest board strain under the package is {strain}."
-        ' A real board stiffens and deflects less: shock.numerics.kinematics = "auto" takes that into account.'
+        f"The board deflects by {ratio:.3g} times its thickness. Small kinematics neglect the membrane strain of its"
+        f" rotation, up to {1e6 * neglected:.0f} µm/m; the largest board strain under the package is {strain}."
+        ' A real board stiffens and deflects less: use shock.numerics.kinematics = "auto".'
     )
 
 
@@ -88,31 +94,29 @@ def ranking_mode(histories: dict, results: dict) -> str:
     return "dns" if is_whole and findings.fine_joints_of(results[main]) else main
 
 
-def _add_ranks(histories: dict, results: dict, joints: tuple[list[dict], dict], context: dict) -> None:
-    """Rank the joints by ``ranking_mode``; ``joints`` are their records and their verdicts."""
-    main, ranked = next(iter(histories)), ranking_mode(histories, results)
-    whose = f" (of the {tables.mode_name(ranked)}, whose joints are all fine)" if ranked != main else ""
-    context["joint_order"] = f"Largest {ranking_measure(histories[ranked]).name} first{whose}"
-    result = results[ranked]
-    context["tables"]["joints"] = joint_tables.ranked_joints(
-        histories[ranked], *joints, findings.fine_joints_of(result)
-    )
+def joint_order(history: dict, mode: str) -> str:
+    """Return how the joints are sorted, naming the mode of their history unless it is the main one (empty)."""
+    remark = f" (from the {tables.mode_name(mode)}, in which all joints are fine)" if mode else ""
+    return f"Largest {ranking_measure(history).name} first{remark}"
 
 
-def _add_shape_effect(shock: Path, history: dict, text: tuple[list[dict], dict], context: dict) -> None:
-    """Add the shock of identical joints, where it was run; ``text`` of the real ones: records, and metrics of all."""
+def _add_shape_effect(shock: Path, history: dict, joints: list[dict], context: dict) -> None:
+    """Compare the joints with identical ones, if their shock was run."""
     from reflowshock.workflow.package_report import shape_effect
 
     histories, _ = read_modes(shock, ("identical",))
     if not histories:
         return
-    (joints, metrics), identical = text, histories["identical"]
+    identical = histories["identical"]
     context["shape_effect"] = shape_effect.in_words(history, identical)
-    if "identical_joint_standoff" in metrics:
-        real, flat = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
-        context["shape_effect"] += f" Its standoff is {real} µm, that of identical joints {flat} µm."
     context["curves"]["shape_effect"] = shape_effect.curves(history, identical)
     context["tables"]["shape_effect"] = shape_effect.table(history, identical, joints)
+
+
+def standoff_sentence(metrics: Mapping[str, Any]) -> str:
+    """Return a sentence with the standoff of the critical joint and of the identical joints."""
+    critical, identical = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
+    return f" Its standoff is {critical} µm; identical joints have {identical} µm."
 
 
 def _add_interface(shock: Path, context: dict) -> None:
@@ -125,7 +129,7 @@ def _add_interface(shock: Path, context: dict) -> None:
 
 
 def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, results: dict[str, dict]) -> None:
-    """Add how the models are coupled, where they are."""
+    """Add the tables on the coupling of the two models, if the two-scale run exists."""
     from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
     from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
     from reflowshock.workflow.report import two_scales as scales
@@ -147,12 +151,12 @@ def _add_two_scales(run_folder: Path, case: BoardDropCase, context: dict, result
 
 
 def add_residual(shock: Path, parts: list[str], context: dict) -> None:
-    """Add what cooling left, where the shock begins with it.
+    """Add the residual stress of cooling, if the shock starts with it.
 
     Args:
-        shock: folder of the shock.
-        parts: names of the parts of its mesh.
-        context: of the page.
+        shock: Folder of the shock.
+        parts: Names of the parts of its mesh.
+        context: Context of the report.
     """
     from reflowshock.workflow.package_report.scenes import residual_scene
 
@@ -168,21 +172,21 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
 
 
 def in_words(metrics: Mapping[str, Any]) -> str:
-    """Say what stress cooling leaves in the joints, and how the package's warpage changes."""
-    lifts = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
-    warped, cold = (f"{micro(lift)} µm" for lift in lifts)
-    text = f"Cooling from solidification changes the warpage of the package from {warped} to {cold}"
+    """Return sentences on the residual stress of the joints and the change of the package's warpage."""
+    warpages = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
+    hot, cold = (f"{micro(warpage)} µm" for warpage in warpages)
+    text = f"Cooling from solidification changes the warpage of the package from {hot} to {cold}"
     if "residual_stress_joint" in metrics:
         joint, stress = metrics["residual_stress_joint"]["value"], quantity(metrics["residual_stress_largest"])
         text += f" and leaves {stress} at the pads of {joint}, the largest of all joints"
-    return f"{text}. The shock begins with it: an upper bound, since solder that relaxes afterwards is not modelled."
+    return f"{text}. The shock starts from this stress; it is an upper bound, because creep of the solder is neglected."
 
 
 def table(joints: Mapping[str, list]) -> dict:
-    """Stress of every joint before the shock, the largest first."""
+    """Return the table of residual stress of every joint before the shock, the largest first."""
     columns = [joints[name] for name in (*SIDES, "von_mises_max")]
     strains = joints.get("plastic_strain_max")
-    heads = ["at the board's pad [MPa]", "at the package's pad [MPa]", "largest element value [MPa]"]
+    heads = ["board pad [MPa]", "package pad [MPa]", "largest element value [MPa]"]
     order = sorted(range(len(joints["joints"])), key=lambda k: -max(joints[side][k] for side in SIDES))
     rows = [
         [

@@ -1,4 +1,4 @@
-"""Warpage of package and board when the solder froze: maps, a profile along the diagonal, and how it came about."""
+"""Warpage of package and board at solidification: map, profile along the diagonal, load steps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ from reflowshock.workflow.report.colours import BLUE, ORANGE, RED
 from reflowshock.workflow.report.curves import MICRO, MILLI
 from reflowshock.workflow.report.scene import Field, Group, Scene
 
-SAME_HEIGHT = 1e-8  # m; nodes of a flat face lie within it
-SAMPLES = 121  # of the profile
+SAME_HEIGHT = 1e-8  # [m] tolerance for nodes of a flat face
+SAMPLES = 121  # points of a profile
 VIEW = (-0.8, -1.8, 0.5)
-FACES = ("package, underside", "board, top face")
+FACES = ("package underside", "board top face")
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A face that was flat at the reference temperature.
+    """A face that is flat at the reference temperature.
 
     Attributes:
-        points: ``(n, 3)`` its nodes [m].
-        lift: ``(n,)`` their displacement along z [m].
+        points: Nodes, shape (n, 3) [m].
+        lift: Displacement of the nodes along z, shape (n,) [m].
     """
 
     points: Floats
@@ -37,38 +37,38 @@ class Face:
 
     @classmethod
     def of_nodes(cls, points: Floats, displacement: Floats) -> "Face":
-        """Return the face through nodes ``(n, 3)`` [m]; those of the same place once."""
+        """Return the face through nodes, shape (n, 3) [m], without duplicates."""
         _, first = np.unique(np.round(points[:, :2], 9), axis=0, return_index=True)
         return cls(points[first], displacement[first, 2])
 
     def at(self, x: Floats, y: Floats) -> Floats:
-        """Return the lift at places of the face [m]; nan beside it."""
+        """Return the interpolated lift at points of the face [m]; NaN outside it."""
         from scipy.interpolate import LinearNDInterpolator
 
         return np.asarray(LinearNDInterpolator(self.points[:, :2], self.lift)(x, y))
 
     def triangles(self) -> NDArray[np.integer]:
-        """Return triangles ``(t, 3)`` of its nodes."""
+        """Return the Delaunay triangles of the nodes, shape (t, 3)."""
         from scipy.spatial import Delaunay
 
         return Delaunay(self.points[:, :2]).simplices
 
     @property
     def over_centre(self) -> Floats:
-        """Lift over that of the node next to the axis ``(n,)`` [m]."""
+        """Lift relative to the node nearest to the axis, shape (n,) [m]."""
         return self.lift - self.lift[np.argmin(np.hypot(*self.points[:, :2].T))]
 
     @property
     def warpage(self) -> float:
-        """Highest minus lowest lift [m]."""
+        """Difference between highest and lowest lift [m]."""
         return float(np.ptp(self.lift))
 
 
 def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
-    """Return the package's underside, and the board's top face below it.
+    """Return the underside of the package and the top face of the board below it.
 
     Args:
-        structure: arrays of ``reflow/structure.npz``.
+        structure: Arrays of ``reflow/structure.npz``.
     """
     points, displacement, package = (structure[name] for name in ("points", "displacement", "package"))
     under = package & (points[:, 2] <= points[package, 2].min() + SAME_HEIGHT)
@@ -78,32 +78,32 @@ def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
 
 
 def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str, Any]]) -> Scene:
-    """Return both faces, each with its lift over its own centre, and the places of the joints between them."""
-    found = faces(structure)
-    largest = max(float(np.abs(face.over_centre).max()) for face in found)
+    """Return both faces with their lift relative to the centre, and the positions of the joints between them."""
+    warped = faces(structure)
+    largest = max(float(np.abs(face.over_centre).max()) for face in warped)
     groups = []
-    for place, (face, name) in enumerate(zip(found, FACES, strict=True)):
+    for index, (face, name) in enumerate(zip(warped, FACES, strict=True)):
         moved = np.zeros((1, len(face.points), 3))
         moved[0, :, 2] = face.over_centre
-        part = np.full(len(face.points), place)
+        part = np.full(len(face.points), index)
         groups.append(Group(name, face.points, face.triangles(), part, displacement=moved))
-    height = 0.5 * sum(float(face.points[:, 2].mean()) for face in found)
+    height = 0.5 * sum(float(face.points[:, 2].mean()) for face in warped)
     places = np.array([[joint["x"], joint["y"], height] for joint in joints])
     numbers = len(FACES) + np.arange(len(joints))
-    size = 0.03 * float(np.ptp(found[0].points[:, 0]))
+    size = 0.03 * float(np.ptp(warped[0].points[:, 0]))
     groups.append(Group("joints", places, np.zeros((0, 3), int), numbers, size=size))
     return Scene(
         groups,
-        [*(f"{name}: {face.warpage / MICRO:.1f} µm" for face, name in zip(found, FACES, strict=True)),
+        [*(f"{name}: {face.warpage / MICRO:.1f} µm" for face, name in zip(warped, FACES, strict=True)),
          *(joint.get("name", "joint") for joint in joints)],
-        [Field("lift over the centre", "µm", -largest / MICRO, largest / MICRO, "diverging", "lift", 1 / MICRO)],
-        exaggeration=exaggeration(float(np.ptp(found[0].points[:, 0])), largest),
+        [Field("lift relative to the centre", "µm", -largest / MICRO, largest / MICRO, "diverging", "lift", 1 / MICRO)],
+        exaggeration=exaggeration(float(np.ptp(warped[0].points[:, 0])), largest),
         view=VIEW,
     )  # fmt: skip
 
 
 def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
-    """Return the lift of both faces along the package's diagonal, and the gaps over the temperature of each step."""
+    """Return charts of the lift along the package diagonal, and of the joint gaps over temperature."""
     package, board = faces(structure)
     x, y, along = _diagonal(package)
     lines = []
@@ -117,20 +117,22 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
         for (name, change), colour in zip(_extremes(structure), (BLUE, RED), strict=False)
     ]
     return [
-        Chart(Axis("distance from the centre along the diagonal [mm]"), Axis("lift over the centre [µm]"), lines),
+        Chart(
+            Axis("distance from the centre along the diagonal [mm]"), Axis("lift relative to the centre [µm]"), lines
+        ),
         Chart(Axis("temperature [°C]"), Axis("change of the gap [µm]"), gaps),
     ]
 
 
 def load_steps(structure: Mapping[str, NDArray]) -> dict:
-    """One row a load step: temperature, corner motion, gaps, iterations, residual."""
+    """Return the table of load steps: temperature, corner motion, gaps, iterations, residuals."""
     columns = [
-        ("temperature [degC]", structure["temperature"] - KELVIN, ".1f"),
+        ("temperature [°C]", structure["temperature"] - KELVIN, ".1f"),
         ("corner motion [µm]", structure["corner_displacement"] / MICRO, "+.2f"),
         *((f"gap change, {name} [µm]", change / MICRO, "+.2f") for name, change in _extremes(structure)),
-        ("exchanges", structure["iterations"], ".0f"),
-        ("forces change by", structure["force_residual"], ".2e"),
-        ("package out of balance by", structure["rigid_residual"], ".2e"),
+        ("coupling iterations", structure["iterations"], ".0f"),
+        ("relative force change", structure["force_residual"], ".2e"),
+        ("force imbalance of the package", structure["rigid_residual"], ".2e"),
     ]
     used = [column for column in columns if np.any(column[1])]
     rows = [
@@ -141,25 +143,25 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
 
 
 def in_words(structure: Mapping[str, NDArray]) -> str:
-    """Say how far package and board have warped, and by how much the gaps differ for it."""
+    """Return a sentence on the warpage of package and board and the change of the gaps at solidification."""
     package, board = faces(structure)
     gaps = relative_lift(structure)[-1] / MICRO
     above, below = package.warpage / MICRO, board.warpage / MICRO
     return (
-        f"When the solder freezes, at {number(structure['temperature'][-1] - KELVIN)} °C, the package's underside is"
-        f" warped by {above:.1f} µm, the board below it by {below:.1f} µm; the gaps of the joints are {gaps.min():+.1f}"
-        f" to {gaps.max():+.1f} µm from those as drawn."
+        f"At solidification ({number(structure['temperature'][-1] - KELVIN)} °C) the warpage is {above:.1f} µm for the"
+        f" package underside and {below:.1f} µm for the board below it; the gaps of the joints differ from the drawing"
+        f" by {gaps.min():+.1f} to {gaps.max():+.1f} µm."
     )
 
 
 def relative_lift(structure: Mapping[str, NDArray]) -> Floats:
-    """Return by how much the gap of each joint has changed, ``(steps, joints)`` [m]."""
+    """Return the change of the gap of each joint, shape (steps, joints) [m]."""
     motion = structure["pad_motion"]
     return motion[:, :, 1, 2] - motion[:, :, 0, 2]
 
 
 def read_structure(run_folder: Path) -> dict[str, NDArray] | None:
-    """Read what the reflow left of the structure; None where it had none."""
+    """Return the arrays of ``reflow/structure.npz``; None if the reflow had no structure."""
     path = run_folder / "reflow/structure.npz"
     if not path.exists():
         return None
@@ -168,14 +170,14 @@ def read_structure(run_folder: Path) -> dict[str, NDArray] | None:
 
 
 def _extremes(structure: Mapping[str, NDArray]) -> list[tuple[str, Floats]]:
-    """Return name and change of the gap, per load step, of the joints whose gaps change least and most [m]."""
+    """Return the joints with the smallest and the largest change of the gap: name and change per load step [m]."""
     change, names = relative_lift(structure), structure["joints"]
     ends = dict.fromkeys((int(np.argmin(change[-1])), int(np.argmax(change[-1]))))
     return [(str(names[column]), change[:, column]) for column in ends]
 
 
 def _diagonal(face: Face) -> tuple[Floats, Floats, Floats]:
-    """Return places x, y along the diagonal of a face, and their distance from the centre, signed [m]."""
+    """Return x, y and the signed distance from the centre of points along the diagonal of a face [m]."""
     lower = np.minimum([*face.points[:, :2].min(axis=0)], 0.0)
     upper = face.points[:, :2].max(axis=0)
     share = np.linspace(-1.0 if lower.any() else 0.0, 1.0, SAMPLES)

@@ -9,8 +9,8 @@ from reflowshock.workflow.case.run import Run, StageError, StageFunction
 from reflowshock.workflow.case.stage import Stage
 from reflowshock.workflow.convergence.accuracy_file import this_host
 from reflowshock.workflow.kinds import stage_seconds
-from reflowshock.workflow.process.kernel_cache import compilation
-from reflowshock.workflow.process.last_word import in_words, is_interrupt
+from reflowshock.workflow.process.error_exit import describe_error, is_interrupt
+from reflowshock.workflow.process.kernel_folder import compilation_time
 from reflowshock.workflow.process.terminal import console, health_line
 from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
 from reflowshock.workflow.store.product import discard, publish, read_record, seal
@@ -39,7 +39,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     _check_key(run, stage, before["inputs"], key)
     discard(partial)
     partial.mkdir(parents=True)
-    forecast = stage_seconds(run.case).get(name, 0.0) + compilation([name])
+    forecast = stage_seconds(run.case).get(name, 0.0) + compilation_time([name])
     start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
     record = {
@@ -112,7 +112,7 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
 
 def _write_message(name: str, folder: Path, error: Exception) -> None:
     """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
-    message = in_words(error, folder)
+    message = describe_error(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")

@@ -1,1 +1,4 @@
-"""What surrounds a computation: terminal, launched programs, environment, last words."""
+"""Environment of a computation: terminal, launched programs, resource limits, error exit.
+
+Start with ``launch.py`` for MPI runs and ``error_exit.py`` for how a command ends.
+"""

@@ -15,8 +15,8 @@ from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 
-from reflowshock.fem.parallel.own_job import own_environment
-from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
+from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 
 UTF8 = "PYTHONUTF8"
 OUTPUT_ENCODING = "PYTHONIOENCODING"
@@ -99,7 +99,7 @@ def complete(environment: MutableMapping[str, str]) -> None:
     Raises:
         EnvironmentProblem: nowhere can a temporary file be written.
     """
-    own = own_environment(environment)
+    own = without_mpi_job(environment)
     for name in set(environment) - set(own):
         del environment[name]
     environment[UTF8] = "1"
@@ -109,7 +109,7 @@ def complete(environment: MutableMapping[str, str]) -> None:
         # VTK would look for an X server first, and complain.
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     give_places(environment)
-    keep_kernels_by_source(environment)
+    choose_kernel_folder(environment)
 
 
 def check_ranks(environment: Mapping[str, str]) -> None:

@@ -11,9 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from reflowshock.fem.parallel.own_job import own_environment
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.parallel.status_board import ERROR
-from reflowshock.workflow.process.last_word import words_of
+from reflowshock.workflow.process.error_exit import describe_text
 
 PATIENCE = 60.0  # [s] that a process may be stopped
 TICK = 1.0  # [s] between two looks
@@ -159,7 +159,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
     # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
-    environment = own_environment(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
+    environment = without_mpi_job(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
             [*END_WITH_PARENT, *command],
@@ -204,7 +204,7 @@ def without_traceback(text: str, log: Path) -> str:
         return text
     last = after.strip().splitlines()[-1]
     what, semicolon, checkpoint = last.partition("; last checkpoint")
-    return f"{before.strip()} {words_of(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
+    return f"{before.strip()} {describe_text(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
 
 
 def ending(code: int) -> str:

@@ -7,13 +7,13 @@ import os
 import sys
 from pathlib import Path
 
-from reflowshock.fem.parallel.own_job import own_environment
-from reflowshock.workflow.process.kernel_cache import keep_kernels_by_source
+from reflowshock.fem.parallel.mpi_environment import without_mpi_job
+from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 from reflowshock.workflow.reflow.rank import find, main
 
 if __name__ == "__main__":
-    own = own_environment(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
+    own = without_mpi_job(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
     os.environ.clear()
     os.environ.update(own | {"NUMBA_NUM_THREADS": "1"})
-    keep_kernels_by_source()
+    choose_kernel_folder()
     sys.exit(main(Path(sys.argv[1]), find(sys.argv[2])))

@@ -1,4 +1,4 @@
-"""Surfaces of the cells of a run, with their fields, as groups of a scene."""
+"""Surfaces of the cells of a run, with their fields, as groups of a 3D scene."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from reflowshock.arrays import Floats
 from reflowshock.workflow.report.field_series import FieldSeries
 from reflowshock.workflow.report.scene import Group, boundary
 
-SHARE = 0.12  # of a body's size, that its displacement is drawn as
+SHARE = 0.12  # drawn displacement, as a share of the body's size
 COLOURS = {
     "solder": "#98a2af", "copper": "#b5622d", "board": "#62a876", "substrate": "#c2971c", "die": "#56626e",
     "other packages": "#7a5ea8",
@@ -21,41 +21,43 @@ LAYER_COLOURS = ("#62a876", "#c2971c", "#56626e", "#b5622d", "#98a2af", "#7a5ea8
 def body_group(
     name: str, series: FieldSeries, chosen: NDArray[np.bool_], values: Mapping[str, Floats], **style: Any
 ) -> Group:
-    """Return the surface of some cells of a run.
+    """Return the surface of selected cells of a run.
 
     Args:
-        name: of the group.
-        series: cells, displacements and parts (``fields["part"]``) of the run.
-        chosen: ``(c,)`` which cells.
-        values: name of a field -> ``(k, c)``; at a vertex the mean over the body's faces there.
-        style: further attributes of the group.
+        name: Name of the group.
+        series: Cells, displacements and parts (``fields["part"]``) of the run.
+        chosen: Mask of the selected cells, shape (c,).
+        values: Cell values of each field, shape (k, c); a vertex gets the mean over its faces.
+        style: Further attributes of the group.
     """
     faces, cell = boundary(series.cells[chosen])
     part = series.fields["part"][0][chosen].astype(np.int64)[cell]
     span = len(series.points)
-    keys, place = np.unique(part[:, None] * span + faces, return_inverse=True)
-    place = place.reshape(faces.shape)
+    keys, vertices = np.unique(part[:, None] * span + faces, return_inverse=True)
+    vertices = vertices.reshape(faces.shape)
     nodes = keys % span
     return Group(
         name,
         series.points[nodes],
-        place,
+        vertices,
         keys // span,
         displacement=series.displacement[:, nodes],
-        values={key: _at_vertices(of_cells[:, chosen][:, cell], place, len(keys)) for key, of_cells in values.items()},
+        values={
+            key: _at_vertices(of_cells[:, chosen][:, cell], vertices, len(keys)) for key, of_cells in values.items()
+        },
         **({"colour": COLOURS.get(name, LAYER_COLOURS[0])} | style),
     )
 
 
 def _at_vertices(values: Floats, faces: NDArray[np.int64], count: int) -> Floats:
-    """Return the mean ``(k, count)`` of values ``(k, f)`` on faces ``(f, m)`` at each of their vertices."""
+    """Return the mean of face values, shape (k, f), at each vertex, shape (k, count)."""
     weight = np.bincount(faces.ravel(), minlength=count)
     repeated = (np.repeat(row, faces.shape[1]) for row in values)
-    return np.array([np.bincount(faces.ravel(), one, count) for one in repeated]) / weight
+    return np.array([np.bincount(faces.ravel(), row, count) for row in repeated]) / weight
 
 
 def exaggeration(length: float, deflection: float) -> float:
-    """Return how many times as large a deflection is drawn; once where a body is still at rest."""
+    """Return the scale factor of a drawn deflection; 1 for a body at rest."""
     return max(round_down(SHARE * length / deflection), 1.0) if deflection > 0.0 else 1.0
 
 

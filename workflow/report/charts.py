@@ -1,4 +1,4 @@
-"""Charts of a page: lines and marks that the browser draws, to be zoomed and read under the pointer."""
+"""Interactive charts of a report page: lines and markers, drawn by the browser."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,24 +13,24 @@ from reflowshock.workflow.report.colours import BLUE
 if TYPE_CHECKING:
     from reflowshock.workflow.report.page_data import PageData
 
-MOST_POINTS = 2400  # of a line: two for each pixel of a wide screen
+MOST_POINTS = 2400  # points of a line: two for each pixel of a wide screen
 DASHES = {"solid": [], "dashed": [7, 4], "dotted": [2, 3]}
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A line, marks, or both.
+    """A line, markers, or both.
 
     Attributes:
-        name: in the legend.
-        x: ``(n,)``, ascending.
-        y: ``(n,)``; nan leaves a gap.
-        colour: ``#rrggbb``.
-        line: one of ``DASHES``, "step", or "none" for marks alone.
-        marks: whether each value has a mark.
-        fill: whether the area below is tinted.
-        is_right: whether the values belong to the axis on the right.
-        labels: name of each value, to be read under the pointer; or none.
+        name: Name in the legend.
+        x: Ascending abscissae, shape (n,).
+        y: Ordinates, shape (n,); NaN leaves a gap.
+        colour: Colour as ``#rrggbb``.
+        line: Line style of ``DASHES``, "step", or "none" for markers alone.
+        marks: Whether each value has a marker.
+        fill: Whether the area below the line is tinted.
+        is_right: Whether the values belong to the right axis.
+        labels: Name of each value, shown at the pointer; empty for none.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Series:
     labels: Sequence[str] = ()
 
     def record(self, page: "PageData") -> dict:
-        """Return what the script draws."""
+        """Return the record that the script reads."""
         x, y = np.asarray(self.x, dtype=float), np.asarray(self.y, dtype=float)
         if not self.labels:
             x, y = thinned(x, y)
@@ -65,14 +65,14 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """An axis: what it shows with its unit, whether it is logarithmic, and the names that stand for 0, 1, 2, ..."""
+    """An axis: label with unit, logarithmic scale, and the names of categories 0, 1, 2, ..."""
 
     label: str
     log: bool = False
     names: Sequence[str] = ()
 
     def record(self) -> dict:
-        """Return what the script draws."""
+        """Return the record that the script reads."""
         return {"label": self.label, "log": self.log, "names": list(self.names)}
 
 
@@ -81,12 +81,13 @@ class Chart:
     """A chart.
 
     Attributes:
-        x, y: its axes.
-        series: what is drawn.
-        title: above it.
-        right: label of the axis on the right, where a series needs one.
-        is_upright: whether x points upwards.
-        is_wide: whether it takes the whole width of the page.
+        x: Horizontal axis.
+        y: Vertical axis.
+        series: Lines and markers.
+        title: Title above the chart.
+        right: Label of the right axis; empty for none.
+        is_upright: Whether x points upwards.
+        is_wide: Whether the chart takes the whole width of the page.
     """
 
     x: Axis
@@ -98,11 +99,11 @@ class Chart:
     is_wide: bool = False
 
     def record(self, page: "PageData") -> dict:
-        """Return what the script draws."""
+        """Return the record that the script reads."""
         return {
             "x": self.x.record(),
             "y": self.y.record(),
-            "series": [one.record(page) for one in self.series],
+            "series": [series.record(page) for series in self.series],
             "title": self.title,
             "right": self.right,
             "upright": self.is_upright,
@@ -111,16 +112,16 @@ class Chart:
 
 
 def thinned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a line of at most ``MOST_POINTS`` points with the least and the largest value of each short stretch.
+    """Reduce a line to ``MOST_POINTS`` points, the minimum and the maximum of each short interval.
 
     Args:
-        x: ``(n,)``, ascending.
-        y: ``(n,)``; where values are missing nothing is left out.
+        x: Ascending abscissae, shape (n,).
+        y: Ordinates, shape (n,); a line with missing values is not reduced.
     """
     if len(x) <= MOST_POINTS or not np.isfinite(y).all():
         return x, y
     edges = np.linspace(0, len(x), MOST_POINTS // 2 - 1).astype(int)
     low = [first + int(np.argmin(y[first:last])) for first, last in pairwise(edges)]
     high = [first + int(np.argmax(y[first:last])) for first, last in pairwise(edges)]
-    kept = np.unique([0, *low, *high, len(x) - 1])
-    return x[kept], y[kept]
+    extremes = np.unique([0, *low, *high, len(x) - 1])
+    return x[extremes], y[extremes]

@@ -1,4 +1,4 @@
-"""Colours that readers with any colour vision tell apart: of curves, and scales of values."""
+"""Colours of curves and colour scales, distinguishable with colour vision deficiency."""
 
 from collections.abc import Sequence
 
@@ -16,16 +16,16 @@ SCALES = {
 
 
 def colour_at(share: float, scale: Sequence[str] = tuple(SCALES["sequential"])) -> str:
-    """Return the colour at a share of a scale, from 0 to 1, as ``#rrggbb``."""
-    place = min(max(share, 0.0), 1.0) * (len(scale) - 1)
-    index = min(int(place), len(scale) - 2)
+    """Return the colour at a position 0 to 1 of a scale, as ``#rrggbb``."""
+    position = min(max(share, 0.0), 1.0) * (len(scale) - 1)
+    index = min(int(position), len(scale) - 2)
     low, high = _channels(scale[index]), _channels(scale[index + 1])
-    mixed = [round(a + (place - index) * (b - a)) for a, b in zip(low, high, strict=True)]
+    mixed = [round(a + (position - index) * (b - a)) for a, b in zip(low, high, strict=True)]
     return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
 
 def ink_on(colour: str) -> str:
-    """Return the colour, black or white, that reads better on another."""
+    """Return black or white, whichever is more legible on a colour."""
     red, green, blue = _channels(colour)
     return "#000000" if 0.3 * red + 0.6 * green + 0.1 * blue > 127.0 else "#ffffff"
 

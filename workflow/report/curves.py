@@ -1,4 +1,4 @@
-"""Charts of a drop: histories, how far both modes differ, energies."""
+"""Charts of a drop: histories, difference of the modes, energies."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -25,45 +25,44 @@ Histories = Mapping[str, Mapping[str, NDArray]]
 
 
 def history_curves(histories: Histories, critical_joint: str) -> list[Chart]:
-    """Return pulse, board and die displacement, board strain and the critical joint's stress of every mode.
+    """Return charts of pulse, board and die displacement, board strain and stress of the critical joint.
 
     Args:
-        histories: mode -> arrays of ``history.npz``.
-        critical_joint: name of the joint whose stress is drawn.
+        histories: Arrays of ``history.npz`` by mode.
+        critical_joint: Name of the joint whose stress is drawn.
     """
-    shown = (
+    quantities = (
         ("board centre, relative to table [mm]", lambda history: history["board_centre"][:, 2] / MILLI),
         ("die centre, relative to table [mm]", lambda history: history["die_centre"][:, 2] / MILLI),
         ("largest board strain under the package [1e-3]", lambda history: 1e3 * history["board_strain"]),
-        (f"von Mises, layers of {critical_joint} [MPa]", lambda history: joint_stress(history, critical_joint) / MEGA),
+        (
+            f"von Mises stress, solder layer of {critical_joint} [MPa]",
+            lambda history: joint_stress(history, critical_joint) / MEGA,
+        ),
     )
     lines = [[Series(x=_time(history), y=of(history), **MODE_STYLE[mode]) for mode, history in histories.items()]
-             for _, of in shown]  # fmt: skip
+             for _, of in quantities]  # fmt: skip
     first = next(iter(histories.values()))
     acceleration = first["base_acceleration"] / GRAVITY
     lines[0].append(Series("input", _time(first), acceleration, LIGHT, fill=True, is_right=True))
     rights = ("input acceleration [G]", "", "", "")
     return [
         Chart(TIME, Axis(label), series, right=right)
-        for (label, _), series, right in zip(shown, lines, rights, strict=True)
+        for (label, _), series, right in zip(quantities, lines, rights, strict=True)
     ]
 
 
 def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
-    """Return by how much two scales differ from the DNS: die displacement and the critical joint's stress.
-
-    Returns:
-        Nothing unless both were run.
-    """
+    """Return charts of two-scale minus DNS, die displacement and critical stress; empty unless both were run."""
     if len(histories) < 2:
         return []
     ours, reference = histories["two_scale"], histories["dns"]
     count = min(len(ours["time"]), len(reference["time"]))  # a DNS may end early
     time = _time(ours)[:count]
-    moved = (ours["die_centre"][:count] - reference["die_centre"][:count])[:, 2] / MICRO
+    displacement = (ours["die_centre"][:count] - reference["die_centre"][:count])[:, 2] / MICRO
     stresses = [joint_stress(history, critical_joint)[:count] / MEGA for history in (ours, reference)]
     return [
-        Chart(TIME, Axis("die centre, difference [µm]"), [Series("two-scale minus DNS", time, moved)]),
+        Chart(TIME, Axis("die centre, difference [µm]"), [Series("two-scale minus DNS", time, displacement)]),
         Chart(
             TIME,
             Axis(f"von Mises of {critical_joint}, difference [MPa]"),
@@ -73,7 +72,7 @@ def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
 
 
 def energy_curves(history: Mapping[str, NDArray]) -> list[Chart]:
-    """Return the energy balance of one run: its terms, and the balance relative to the largest energy."""
+    """Return charts of the energies of one run and of its balance relative to the largest energy."""
     time = _time(history)
     terms = [
         Series(name, time, history[name] / MILLI, colour)

@@ -1,4 +1,4 @@
-"""Pictures by matplotlib, for pages and files that are no report of a run."""
+"""Matplotlib figures of pages other than run reports."""
 
 import matplotlib
 
@@ -14,12 +14,12 @@ STYLE = {
     "axes.spines.right": False,
     "font.family": "sans-serif",
     "text.usetex": False,
-    "text.parse_math": False,  # a dollar sign in a title or a name is no formula
+    "text.parse_math": False,  # a dollar sign in a name does not start a formula
 }
 
 
 def plain_ticks(axis) -> None:
-    """Write plain numbers at a logarithmic axis, 1, 2 and 5 of each decade: formulas are not set (``STYLE``)."""
+    """Label a logarithmic axis with plain numbers at 1, 2 and 5 of each decade."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

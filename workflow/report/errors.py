@@ -1,4 +1,4 @@
-"""Errors beside the figures of a run: of its mesh, of two scales against one model, and what is left out."""
+"""Errors of the headline figures: discretisation, two scales, neglected effects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Any
 from reflowshock.workflow.case.text import percent
 from reflowshock.workflow.report.tables import mode_name
 
-NEGLIGIBLE = 0.01  # expected influence of what is left out, below which it is not told
+NEGLIGIBLE = 0.01  # smallest expected influence of a neglected effect that is reported
 NOT_KNOWN = "not known"
 UNMEASURED = "reflowshock accuracy measures it"
 
@@ -17,9 +17,9 @@ class Discretisation:
     """Discretisation errors of a run's figures.
 
     Attributes:
-        errors: name of a metric -> error as a share of it.
-        how: name of a metric -> from what it follows, in words.
-        unknown: why that of any other figure is not known, or what is to be done.
+        errors: Relative error of each metric.
+        how: Origin of each error, in words.
+        unknown: Reason why other errors are unknown, or how to obtain them.
     """
 
     errors: Mapping[str, float] = field(default_factory=dict)
@@ -27,12 +27,12 @@ class Discretisation:
     unknown: str = UNMEASURED
 
     def text(self, name: str) -> str:
-        """Write the error of a figure."""
+        """Return the error of a figure, as text."""
         return f"±{percent(self.errors[name])} ({self.how[name]})" if name in self.errors else NOT_KNOWN
 
 
 def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
-    """Write by how much a figure of the first mode differs from that of one model on the same mesh."""
+    """Return the difference of a figure between the first mode and one model on the same mesh, as text."""
     first, *others = results
     if not others:
         return "none: one model" if first == "dns" else NOT_KNOWN
@@ -46,8 +46,10 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def left_out(effects: Mapping[str, Mapping[str, Any]]) -> str:
-    """Write which effects a run has left out and their expected influence, the largest first; the small ones not."""
-    known = {name: found["influence"] for name, found in effects.items() if not found["on"] and "influence" in found}
-    large = sorted((name for name in known if known[name] >= NEGLIGIBLE), key=known.__getitem__, reverse=True)
-    told = ", ".join(f"{name.replace('_', ' ')} {percent(known[name])}" for name in large)
-    return told or f"nothing whose expected influence is above {percent(NEGLIGIBLE)}"
+    """Return the neglected effects with their expected influence, the largest first, as text."""
+    influence = {name: item["influence"] for name, item in effects.items() if not item["on"] and "influence" in item}
+    large = sorted(
+        (name for name in influence if influence[name] >= NEGLIGIBLE), key=influence.__getitem__, reverse=True
+    )
+    text = ", ".join(f"{name.replace('_', ' ')} {percent(influence[name])}" for name in large)
+    return text or f"none with an expected influence above {percent(NEGLIGIBLE)}"

@@ -1,4 +1,4 @@
-"""Fields of a run at its stored times, from the ``.pvd`` series of its models: all models as one."""
+"""Fields of a run at its stored times, merged from the ``.pvd`` series of all models."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats
 from reflowshock.workflow.report.scene import kept_frames
 
-SAME_PLACE = 1e-9  # m; ranks write their nodes each
-CORNERS = {8: 8, 4: 4, 10: 4}  # of a cell with so many nodes
+SAME_POINT = 1e-9  # [m] tolerance for nodes that several ranks write
+CORNERS = {8: 8, 4: 4, 10: 4}  # corners of a cell by its number of nodes
 DISPLACEMENT = "displacement"
-MOST_BYTES = 400_000_000  # of files that are read
+MOST_BYTES = 400_000_000  # limit of the files that are read
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class FieldSeries:
     """Cells and fields of all models of a run.
 
     Attributes:
-        points: ``(n, 3)`` at rest [m].
-        cells: ``(c, 8)`` or ``(c, 4)`` corners.
-        times: ``(k,)`` [s], or numbers of natural modes.
-        displacement: ``(k, n, 3)`` [m].
-        fields: name -> ``(k, c)``.
+        points: Nodes at rest, shape (n, 3) [m].
+        cells: Corner nodes of the cells, shape (c, 8) or (c, 4).
+        times: Stored times, shape (k,) [s], or numbers of natural modes.
+        displacement: Displacement of the nodes, shape (k, n, 3) [m].
+        fields: Cell fields, shape (k, c).
     """
 
     points: Floats
@@ -37,42 +37,42 @@ class FieldSeries:
 
     @classmethod
     def read(cls, paths: Sequence[Path], names: Sequence[str] = (), shown: float = 0.0) -> "FieldSeries":
-        """Read the series of the models of a run: all times, or of large files as many as take some seconds to read.
+        """Read the series of all models of a run; of large files only some times.
 
         Args:
-            paths: ``.pvd`` file of each model; of the others the states next to the times of the first.
-            names: of the cell fields that are read, where they are there.
-            shown: time [s] whose state is read in any case.
+            paths: ``.pvd`` file of each model; the times are those of the first model.
+            names: Cell fields to read, if present.
+            shown: Time [s] whose state is always read.
         """
         stored = [_steps(path) for path in paths]
         times = np.array([time for time, _ in stored[0]])
         files = [[file for series in stored for file in _next_to(time, series)] for time in times]
         size = max(sum(file.stat().st_size for file in here) for here in files)
-        kept = kept_frames(len(times), MOST_BYTES // size, int(np.argmin(np.abs(times - shown))))
-        times, files = times[kept], [files[step] for step in kept]
+        steps = kept_frames(len(times), MOST_BYTES // size, int(np.argmin(np.abs(times - shown))))
+        times, files = times[steps], [files[step] for step in steps]
         pieces = [_Piece.read(file) for file in files[0]]
         counts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
         points = np.concatenate([piece.points for piece in pieces])
-        own = [piece.cells[piece.is_own] + count for piece, count in zip(pieces, counts, strict=False)]
-        _, first, place = np.unique(np.rint(points / SAME_PLACE), axis=0, return_index=True, return_inverse=True)
+        cells = [piece.cells[piece.is_own] + count for piece, count in zip(pieces, counts, strict=False)]
+        _, first, number = np.unique(np.rint(points / SAME_POINT), axis=0, return_index=True, return_inverse=True)
         displacement = np.empty((len(times), len(first), 3))
         fields: dict[str, list[Floats]] = {name: [] for name in names}
         for step, here in enumerate(files):
-            found = [_arrays(file, (DISPLACEMENT, *names)) for file in here]
-            displacement[step] = np.concatenate([one[DISPLACEMENT].reshape(-1, 3) for one in found])[first]
+            arrays = [_arrays(file, (DISPLACEMENT, *names)) for file in here]
+            displacement[step] = np.concatenate([table[DISPLACEMENT].reshape(-1, 3) for table in arrays])[first]
             for name, values in fields.items():
-                if all(name in one for one in found):
-                    cells = [one[name][piece.is_own] for one, piece in zip(found, pieces, strict=True)]
-                    values.append(np.concatenate(cells))
+                if all(name in table for table in arrays):
+                    owned = [table[name][piece.is_own] for table, piece in zip(arrays, pieces, strict=True)]
+                    values.append(np.concatenate(owned))
         whole = {name: np.array(values) for name, values in fields.items() if len(values) == len(times)}
-        return cls(points[first], place.ravel()[np.concatenate(own)], times, displacement, whole)
+        return cls(points[first], number.ravel()[np.concatenate(cells)], times, displacement, whole)
 
     def nearest(self, time: float) -> int:
-        """Return the number of the stored time next to a time [s]."""
+        """Return the index of the stored time nearest to a time [s]."""
         return int(np.argmin(np.abs(self.times - time)))
 
     def at(self, times: Floats) -> "FieldSeries":
-        """Return the states next to other times ``(m,)`` [s]."""
+        """Return the states nearest to other times, shape (m,) [s]."""
         rows = [self.nearest(time) for time in times]
         fields = {name: values[rows] for name, values in self.fields.items()}
         return FieldSeries(self.points, self.cells, times, self.displacement[rows], fields)
@@ -80,7 +80,7 @@ class FieldSeries:
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """What one rank has written: points, corners of its cells, and which of these are not those of another rank."""
+    """Points and cells written by one rank, and whether it owns each cell."""
 
     points: Floats
     cells: NDArray[np.int64]
@@ -101,11 +101,11 @@ class _Piece:
 def _steps(path: Path) -> list[tuple[float, list[Path]]]:
     """Return the times of a series, and the files of all ranks at each."""
     sets = ElementTree.parse(path).getroot().iter("DataSet")
-    return [(float(one.attrib["timestep"]), _pieces(path.with_name(one.attrib["file"]))) for one in sets]
+    return [(float(item.attrib["timestep"]), _pieces(path.with_name(item.attrib["file"]))) for item in sets]
 
 
 def _next_to(time: float, series: Sequence[tuple[float, list[Path]]]) -> list[Path]:
-    """Return the files of the state of a series next to a time [s]."""
+    """Return the files of the state of a series nearest to a time [s]."""
     return min(series, key=lambda step: abs(step[0] - time))[1]
 
 
@@ -116,14 +116,14 @@ def _pieces(path: Path) -> list[Path]:
 
 
 def _arrays(path: Path, names: Sequence[str]) -> dict[str, Floats]:
-    """Read arrays on points and cells, those that are there."""
+    """Read the named arrays on points and cells that the file contains."""
     root = ElementTree.parse(path).getroot()
-    found = {name: root.find(f".//DataArray[@Name='{name}']") for name in names}
-    return {name: _numbers(element) for name, element in found.items() if element is not None}
+    elements = {name: root.find(f".//DataArray[@Name='{name}']") for name in names}
+    return {name: _numbers(element) for name, element in elements.items() if element is not None}
 
 
 def _numbers(element: ElementTree.Element | None) -> Floats:
-    """Return the numbers that an element holds as text."""
+    """Return the numbers in the text of an XML element."""
     if element is None or element.get("format", "ascii") != "ascii":
-        raise ValueError("a series of fields has arrays that are not written as text")
+        raise ValueError("arrays of a field series must be in format ascii")
     return np.fromstring(element.text or "", dtype=float, sep=" ")

@@ -1,4 +1,4 @@
-"""Strain gauges in a report: what they read, and when."""
+"""Tables and charts of strain gauges."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -16,12 +16,12 @@ Histories = Mapping[str, Mapping[str, "NDArray"]]
 
 
 def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any], lengths: Mapping[str, float]) -> dict:
-    """Return what each gauge reads at most; empty without any.
+    """Return the table of peak strain and strain rate of each gauge; empty without gauges.
 
     Args:
-        gauges: name -> gauge.
-        metrics: of the run.
-        lengths: of the gauges in the model [m].
+        gauges: Gauges by name.
+        metrics: Metrics of the run.
+        lengths: Length of each gauge in the model [m].
     """
     rows = []
     for name, gauge in gauges.items():
@@ -41,13 +41,13 @@ def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any],
     return {"head": head, "rows": rows} if rows else {}
 
 
-def in_mm(place: tuple[float, ...]) -> str:
-    """Write a place in millimetres."""
-    return ", ".join(number(value / MILLI) for value in place)
+def in_mm(position: tuple[float, ...]) -> str:
+    """Return a position [m] as text in millimetres."""
+    return ", ".join(number(value / MILLI) for value in position)
 
 
 def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styles: Mapping[str, dict]) -> list[Chart]:
-    """Return the strain of every gauge."""
+    """Return a chart of the strain of every gauge."""
     return [
         Chart(
             TIME,

@@ -1,4 +1,4 @@
-"""Histories of the modes of a shock, and what the report takes from them."""
+"""Histories of the modes of a shock: reading, joint stress, peaks, warnings."""
 
 import json
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, ranked
-from reflowshock.fem.output.settled import is_settled, judged
+from reflowshock.fem.output.settled import is_settled, settling_measures
 
 Arrays = Mapping[str, NDArray]
 
@@ -16,7 +16,7 @@ MODES = ("two_scale", "dns")
 
 
 def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, dict], dict[str, dict]]:
-    """Read histories and results of those modes that were run, by mode."""
+    """Read histories and results of the modes that were run, by mode."""
     histories, results = {}, {}
     for mode in modes:
         folder = shock / mode
@@ -28,18 +28,18 @@ def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, d
 
 
 def joint_stress(history: Arrays, joint: str, measure: Measure = VON_MISES) -> NDArray[np.float64]:
-    """Stress of a joint `(k,)` [Pa] at the worse of its pads."""
+    """Return the stress of a joint at its worse pad, shape (k,) [Pa]."""
     return measure.worse(history)[:, list(map(str, history["joints"])).index(joint)]
 
 
 def peel_peaks(history: Arrays) -> dict[str, float]:
-    """Peak peel stress by joint [Pa], the critical joint first."""
+    """Return the peak peel stress [Pa] by joint, the critical joint first."""
     peaks = PEEL.peaks(history)
     return {str(history["joints"][column]): float(peaks[column]) for column in ranked(history)}
 
 
 def unsettled(history: Arrays, longest: float) -> str:
-    """A warning if a shock of automatic duration ended at its longest time [s] before it had settled; else empty."""
+    """Return a warning if a shock of automatic duration ended at its longest time [s] unsettled; else empty."""
     if is_settled(history):
         return ""
     return (
@@ -49,9 +49,9 @@ def unsettled(history: Arrays, longest: float) -> str:
 
 
 def late_peak(history: Arrays) -> str:
-    """A warning if the largest peel, or von Mises stress of what has not yielded, stands at the run's end; or empty."""
+    """Return a warning if the peel or elastic von Mises stress peaks at the end of the run; else empty."""
     names = {PEEL: "peel", VON_MISES: "von Mises"}
-    largest = {names[measure]: measure.worse(history).max(axis=1) for measure in judged(history)}
+    largest = {names[measure]: measure.worse(history).max(axis=1) for measure in settling_measures(history)}
     late = [name for name, stress in largest.items() if np.argmax(stress) >= len(stress) - max(2, len(stress) // 50)]
     if not late:
         return ""

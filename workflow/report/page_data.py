@@ -1,4 +1,4 @@
-"""What a page's script draws: arrays, charts and scenes, as data that no browser takes for code."""
+"""Data of a page for its script: arrays, charts and scenes, as JSON that cannot be executed."""
 
 import base64
 import hashlib
@@ -15,32 +15,35 @@ from numpy.typing import NDArray
 from reflowshock.workflow.process.terminal import visible
 from reflowshock.workflow.report.colours import SCALES
 
-TYPES = {"f4", "u1", "u2", "u4", "i2"}  # of arrays: the script has a typed array for each
+TYPES = {"f4", "u1", "u2", "u4", "i2"}  # array types with a typed array in the script
 
 
 class Drawable(Protocol):
     """A chart or a scene."""
 
     def record(self, page: "PageData") -> dict:
-        """Return what the script draws, its arrays kept by the page."""
+        """Return the record that the script reads; its arrays are stored in the page."""
 
 
 class PageData:
-    """All that a page's script draws; equal arrays are kept once."""
+    """Arrays, charts and scenes of a page; equal arrays are stored once."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Create an empty page."""
         self._arrays: list[dict[str, str]] = []
         self._places: dict[bytes, int] = {}
         self._figures: list[list[dict]] = []
         self._scenes: list[dict] = []
 
     def array(self, values: NDArray, kind: str) -> int:
-        """Keep an array, little-endian and deflated; return its number.
+        """Store an array, little-endian and deflated, and return its number.
 
         Args:
-            values: of any shape.
-            kind: one of ``TYPES``.
+            values: Array of any shape.
+            kind: Type of ``TYPES``.
+
+        Raises:
+            ValueError: The type is not in ``TYPES``.
         """
         if kind not in TYPES:
             raise ValueError(f"arrays of type {kind} cannot be drawn; allowed: {', '.join(sorted(TYPES))}")
@@ -52,27 +55,27 @@ class PageData:
         return self._places[digest]
 
     def charts(self, charts: Sequence[Drawable]) -> Markup:
-        """Return the place of some charts beside each other."""
+        """Store charts and return the HTML element that shows them side by side."""
         self._figures.append([chart.record(self) for chart in charts])
         return Markup('<div class="charts" data-figure="{}"></div>').format(len(self._figures) - 1)
 
     def scene(self, scene: Drawable) -> Markup:
-        """Return the place of a scene."""
+        """Store a scene and return the HTML element that shows it."""
         self._scenes.append(scene.record(self))
         return Markup('<div class="scene" data-scene="{}"></div>').format(len(self._scenes) - 1)
 
     def script_data(self) -> Markup:
-        """Return everything as JSON that holds no markup."""
+        """Return all data as JSON without markup."""
         data = {"arrays": self._arrays, "figures": self._figures, "scenes": self._scenes, "scales": SCALES}
-        return htmlsafe_json_dumps(_shown(data), dumps=json.dumps, separators=(",", ":"))
+        return htmlsafe_json_dumps(_with_visible_controls(data), dumps=json.dumps, separators=(",", ":"))
 
 
-def _shown(value: Any) -> Any:
-    """Return a record whose texts show their control characters."""
+def _with_visible_controls(value: Any) -> Any:
+    """Return a record with visible control characters in its texts."""
     if isinstance(value, str):
         return visible(value)
     if isinstance(value, Mapping):
-        return {key: _shown(one) for key, one in value.items()}
+        return {key: _with_visible_controls(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_shown(one) for one in value]
+        return [_with_visible_controls(item) for item in value]
     return value

@@ -1,4 +1,4 @@
-"""Scene of liquid solder: particles and free surface at the stored times, and at the end."""
+"""3D scene of liquid solder: particles and free surface at the stored times and at the end."""
 
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,15 @@ from reflowshock.workflow.report.scene import Field, Group, Scene
 if TYPE_CHECKING:
     from reflowshock.particles.steps.shape import JointShape
 
-SMALLEST_RANGE = 0.01  # of colours, about the mean
+SMALLEST_RANGE = 0.01  # of the colour scale, relative to the mean
 PRESSURE = "pressure above ambient"
 NO_FACES = np.zeros((0, 3), dtype=int)
 
 
 def particle_scene(shape: "JointShape") -> Scene:
-    """Return a body of solder: a frame for each stored state, then the end, coloured by pressure."""
-    states = [*((one.points, one.triangles) for one in shape.snapshots[:-1]), (shape.points, shape.triangles)]
-    frames = [f"{1e3 * one.time:.4g} ms" for one in shape.snapshots[:-1]] + ["end"]
+    """Return the scene of a solder body: the stored states, then the final state coloured by pressure."""
+    states = [*((state.points, state.triangles) for state in shape.snapshots[:-1]), (shape.points, shape.triangles)]
+    frames = [f"{1e3 * state.time:.4g} ms" for state in shape.snapshots[:-1]] + ["end"]
     size = 0.8 * float(np.cbrt(np.prod(np.ptp(shape.points, axis=0)) / len(shape.points)))
     groups = []
     for frame, (points, triangles) in enumerate(states):
@@ -35,7 +35,7 @@ def particle_scene(shape: "JointShape") -> Scene:
 
 
 def _limits(pressure: Floats) -> tuple[float, float]:
-    """Range of the colours: that of the values, at least one per cent about the mean, so that equal ones look equal."""
+    """Return the limits of the colour scale, at least 1 % around the mean so that equal values look equal."""
     mean = float(pressure.mean())
     low, high = float(pressure.min()), float(pressure.max())
     return min(low, mean - SMALLEST_RANGE * abs(mean)), max(high, mean + SMALLEST_RANGE * abs(mean))

@@ -1,4 +1,4 @@
-"""Scenes of a page: bodies in 3D that the browser turns, with fields at some times."""
+"""Interactive 3D scenes of a report page: bodies with fields at stored times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,10 +12,10 @@ from reflowshock.arrays import Floats
 if TYPE_CHECKING:
     from reflowshock.workflow.report.page_data import PageData
 
-MOST_TRIANGLES = 100_000  # of a scene
-MOST_VALUES = 1_200_000  # vertices times frames: what keeps a page below 12 MB
-FINEST = 65_535  # steps of a value or a coordinate
-COARSER = 1.3  # by which the cells grow that merge vertices
+MOST_TRIANGLES = 100_000  # triangles of a scene
+MOST_VALUES = 1_200_000  # vertices times frames; keeps a page below 12 MB
+FINEST = 65_535  # quantisation steps of a value
+COARSER = 1.3  # growth factor of the cells that merge vertices
 HEXAHEDRON = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 MILLI = 1e-3
@@ -23,14 +23,16 @@ MILLI = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """What colours show.
+    """A field that colours the groups.
 
     Attributes:
-        name, unit: of the values.
-        low, high: values at the ends of the scale; what is beyond has the colour of its end.
-        scale: one of ``SCALES``.
-        source: "values" of the groups, or "lift" or "length" of their displacement.
-        factor: from metres to the unit, for what the displacement gives.
+        name: Name of the quantity.
+        unit: Unit of the values.
+        low: Value at the lower end of the colour scale.
+        high: Value at the upper end of the colour scale.
+        scale: Colour scale of ``SCALES``.
+        source: "values" of the groups, or "lift" (z) or "length" of their displacement.
+        factor: Conversion from metres to the unit, for values derived from the displacement.
     """
 
     name: str
@@ -42,7 +44,7 @@ class Field:
     factor: float = 1.0
 
     def record(self) -> dict:
-        """Return what the script draws."""
+        """Return the record that the script reads."""
         return {
             "label": f"{self.name} [{self.unit}]",
             "unit": self.unit,
@@ -56,19 +58,19 @@ class Field:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
-    """Bodies that are shown, or not, together.
+    """Bodies whose visibility is switched together.
 
     Attributes:
-        name: of the group.
-        points: ``(n, 3)`` [m].
-        faces: ``(f, 3)`` or ``(f, 4)`` vertices; ``(0, 3)`` draws the points as small balls.
-        part: ``(n,)`` number of the body in ``Scene.parts`` that a vertex belongs to.
-        colour: without a field.
-        displacement: ``(frames, n, 3)`` [m]; None for none.
-        values: name of a field -> ``(frames, n)`` or, the same in all frames, ``(1, n)``; nan where there is none.
-        is_ghost: whether it begins as one sees through it.
-        only: the frame in which alone it is shown; None for all.
-        size: of the balls [m].
+        name: Name of the group.
+        points: Vertices, shape (n, 3) [m].
+        faces: Vertex numbers of the faces, shape (f, 3) or (f, 4); shape (0, 3) draws the points as spheres.
+        part: Index of each vertex's body in ``Scene.parts``, shape (n,).
+        colour: Colour without a field.
+        displacement: Displacement of the vertices, shape (frames, n, 3) [m]; None for a fixed group.
+        values: Values of each field, shape (frames, n), or (1, n) if constant; NaN for missing values.
+        is_ghost: Whether the group is transparent at first.
+        only: The only frame that shows the group; None for all frames.
+        size: Diameter of the spheres [m].
     """
 
     name: str
@@ -84,7 +86,7 @@ class Group:
 
     @property
     def triangles(self) -> int:
-        """How many triangles it takes."""
+        """Number of triangles of the faces."""
         return len(self.faces) * (self.faces.shape[1] - 2)
 
 
@@ -93,14 +95,14 @@ class Scene:
     """Bodies in 3D.
 
     Attributes:
-        groups: the bodies.
-        parts: name of each body.
-        fields: what colours may show, the first one at the beginning.
-        frames: label of each frame.
-        start: the frame that is shown first.
-        exaggeration: how many times as large displacements are drawn at first.
-        view: direction towards the eye.
-        labels: text and place [m] of what is written.
+        groups: Groups of bodies.
+        parts: Name of each body.
+        fields: Selectable fields, the initial one first.
+        frames: Label of each frame.
+        start: Initial frame.
+        exaggeration: Initial scale factor of displacements.
+        view: Direction towards the camera.
+        labels: Texts with their positions [m].
     """
 
     groups: Sequence[Group]
@@ -113,14 +115,14 @@ class Scene:
     labels: Sequence[tuple[str, tuple[float, float, float]]] = ()
 
     def record(self, page: "PageData") -> dict:
-        """Return what the script draws, lengths in mm."""
+        """Return the record that the script reads, lengths in mm."""
         groups = [group for group in decimated(self.groups) if len(group.points)]
         always = sum(len(group.points) for group in groups if group.only is None)
         frames = kept_frames(len(self.frames), MOST_VALUES // max(always, 1), self.start)
         return {
             "groups": [_record(group, self.fields, frames, page) for group in groups],
             "parts": list(self.parts),
-            "fields": [one.record() for one in self.fields],
+            "fields": [item.record() for item in self.fields],
             "frames": [self.frames[frame] for frame in frames],
             "start": frames.index(self.start),
             "exaggeration": self.exaggeration,
@@ -130,26 +132,26 @@ class Scene:
 
 
 def boundary(cells: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the faces that only one of some cells has.
+    """Return the boundary faces of cells.
 
     Args:
-        cells: ``(c, 8)`` hexahedra or ``(c, 4)`` tetrahedra.
+        cells: Hexahedra, shape (c, 8), or tetrahedra, shape (c, 4).
 
     Returns:
-        The faces ``(f, 4)`` or ``(f, 3)``, and the cell of each.
+        Faces, shape (f, 4) or (f, 3), and the cell of each face, shape (f,).
     """
     local = HEXAHEDRON if cells.shape[1] == 8 else TETRAHEDRON
     faces = cells[:, local].reshape(-1, local.shape[1]).astype(np.int64)
     ordered = np.sort(faces, axis=1)
     span = int(ordered.max(initial=0)) + 1
-    keys = ordered[:, 0] * span * span + ordered[:, 1] * span + ordered[:, 2]  # three vertices tell a face
+    keys = ordered[:, 0] * span * span + ordered[:, 1] * span + ordered[:, 2]  # three vertices identify a face
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     chosen = np.sort(first[count == 1])
     return faces[chosen], chosen // len(local)
 
 
 def decimated(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group]:
-    """Return groups of at most so many triangles: the finest ones are made coarser, each by the same share."""
+    """Reduce groups to at most ``most`` triangles, coarsening all but small groups by the same share."""
     total = sum(group.triangles for group in groups)
     if total <= most:
         return list(groups)
@@ -160,28 +162,28 @@ def decimated(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group
 
 
 def _coarser(group: Group, most: int) -> Group:
-    """Merge the vertices of a group that lie in the same cell of a grid, the grid as fine as the count allows."""
+    """Merge the vertices of a group in each cell of a grid that is as fine as the limit allows (vertex clustering)."""
     size = float(np.ptp(group.points, axis=0).max()) / np.sqrt(max(most, 4))
     while True:
         grid = np.floor((group.points - group.points.min(axis=0)) / size).astype(np.int64)
         keys = np.column_stack([grid, group.part])
-        _, kept, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        faces = _proper(place.ravel()[_as_triangles(group.faces)])
+        _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        faces = _proper(number.ravel()[_as_triangles(group.faces)])
         if len(faces) <= most:
             break
         size *= COARSER
     return replace(
         group,
-        points=group.points[kept],
+        points=group.points[first],
         faces=faces,
-        part=group.part[kept],
-        displacement=None if group.displacement is None else group.displacement[:, kept],
-        values={name: values[:, kept] for name, values in group.values.items()},
+        part=group.part[first],
+        displacement=None if group.displacement is None else group.displacement[:, first],
+        values={name: values[:, first] for name, values in group.values.items()},
     )
 
 
 def _proper(triangles: NDArray[np.integer]) -> NDArray[np.integer]:
-    """Leave out triangles that have become lines or points, and all but one of those that have become the same."""
+    """Remove degenerate and duplicate triangles."""
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
@@ -193,10 +195,10 @@ def _as_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
 
 
 def kept_frames(frames: int, most: int, start: int) -> list[int]:
-    """Return at most so many of the frames, but one at least, evenly spread, the one that is shown first among them."""
-    kept = sorted({round(place) for place in np.linspace(0, frames - 1, min(frames, max(most, 1)))})
-    nearest = min(range(len(kept)), key=lambda k: abs(kept[k] - start))
-    return sorted({*kept[:nearest], start, *kept[nearest + 1 :]})
+    """Return at most ``most`` evenly spaced frames, at least one, that include the initial frame ``start``."""
+    frames_kept = sorted({round(position) for position in np.linspace(0, frames - 1, min(frames, max(most, 1)))})
+    nearest = min(range(len(frames_kept)), key=lambda k: abs(frames_kept[k] - start))
+    return sorted({*frames_kept[:nearest], start, *frames_kept[nearest + 1 :]})
 
 
 def _record(group: Group, fields: Sequence[Field], frames: list[int], page: "PageData") -> dict:
@@ -210,7 +212,7 @@ def _record(group: Group, fields: Sequence[Field], frames: list[int], page: "Pag
         "ghost": group.is_ghost,
         "only": None if group.only is None else frames.index(group.only),
         "size": group.size / MILLI,
-        "values": [_values(group, one, frames, page) for one in fields],
+        "values": [_values(group, item, frames, page) for item in fields],
     }
     if group.displacement is not None and np.any(group.displacement):
         moved = group.displacement[frames] / MILLI
@@ -219,11 +221,11 @@ def _record(group: Group, fields: Sequence[Field], frames: list[int], page: "Pag
     return record
 
 
-def _values(group: Group, shown: Field, frames: list[int], page: "PageData") -> int | None:
-    """Keep the values of a field as steps from the lower to the upper end of its scale, 1 to ``FINEST``; 0: none."""
-    values = group.values.get(shown.name)
+def _values(group: Group, field_shown: Field, frames: list[int], page: "PageData") -> int | None:
+    """Store the values of a field, quantised from 1 to ``FINEST`` over its colour scale; 0 means missing."""
+    values = group.values.get(field_shown.name)
     if values is None:
         return None
     values = values[frames] if len(values) > 1 else values
-    share = np.clip((values - shown.low) / ((shown.high - shown.low) or 1.0), 0.0, 1.0)
+    share = np.clip((values - field_shown.low) / ((field_shown.high - field_shown.low) or 1.0), 0.0, 1.0)
     return page.array(np.where(np.isnan(share), 0.0, 1.0 + np.rint(share * (FINEST - 1))), "u2")

@@ -1,4 +1,4 @@
-"""Response spectra of what shakes a body, and its natural modes."""
+"""Response spectra of the input, and tables of natural modes."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
     from reflowshock.fem.loads.pulse import Pulse
 
-SAMPLES = 4000  # of an input, for its spectrum
-LOWEST = 0.1  # periods of the spectrum's lowest frequency in that time, since boards swing more slowly than the pulse
-LEAST = 20.0  # samples in a period of the spectrum's highest frequency
+SAMPLES = 4000  # samples of an input
+LOWEST = 0.1  # periods of the lowest frequency in the duration; boards may be slower than the pulse
+LEAST = 20.0  # samples in a period of the highest frequency
 
 
 def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Chart]:
-    """Return the response spectrum of inputs over the duration [s] of a run; nothing without any."""
+    """Return a chart of the response spectra of inputs over the duration [s] of a run; empty without inputs."""
     from reflowshock.fem.output.response_spectrum import QUALITY, spectrum_frequencies
 
     if not pulses:
@@ -36,7 +36,7 @@ def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Char
 
 
 def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """Return the response `(k,)` [G] of masses with some frequencies `(k,)` [Hz] to the first part [s] of a pulse."""
+    """Return the response spectrum of a pulse over ``duration`` [s] at frequencies [Hz], both shape (k,) [G]."""
     from reflowshock.fem.output.response_spectrum import response_spectrum
 
     step = duration / SAMPLES
@@ -45,7 +45,7 @@ def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]"
 
 
 def mode_table(modes: Sequence[Mapping]) -> dict:
-    """Natural frequencies, and how much of the mass moves with each mode when the supports are shaken."""
+    """Return the table of natural frequencies and effective mass fractions of the modes."""
     rows = [
         [
             f"{mode['mode']}",
@@ -54,4 +54,4 @@ def mode_table(modes: Sequence[Mapping]) -> dict:
         ]
         for mode in modes
     ]
-    return {"head": ["mode", "frequency [Hz]", "mass along x", "along y", "along z"], "rows": rows}
+    return {"head": ["mode", "frequency [Hz]", "effective mass, x", "y", "z"], "rows": rows}

@@ -1,4 +1,4 @@
-"""Tables of the report: products turned into rows of text with units."""
+"""Tables of the report: products as rows of text with units."""
 
 from collections.abc import Callable, Sequence
 from importlib import metadata
@@ -12,24 +12,24 @@ SHAPE_EFFECT = "shape_effect_on_peak_stress"
 HEADLINE = (
     (SHAPE_EFFECT, "change of the peak peel stress due to the real joint shapes"),
     ("critical_joint_stress_error", "stress history, two-scale against DNS"),
-    ("two_scale_dns_core_ratio", "core time, two-scale over DNS"),
+    ("two_scale_dns_core_ratio", "core time, two-scale / DNS"),
     ("energy_balance_error", "largest energy imbalance"),
     ("joint_width_error_max", "joint width against Young-Laplace, worst"),
     ("joint_volume_error_max", "joint volume lost in meshing, worst"),
 )
 COMPARISON = (
-    ("compared_duration", "time covered by both; the DNS ends before the shock"),
-    ("compared_stress", "largest stress of the critical joint in that time, over that of the whole shock"),
-    ("critical_joint", "critical joint (of the DNS where it covers the whole shock)"),
-    ("critical_joint_stress_error", "von Mises history of its layers, relative L2"),
-    ("worst_joint_stress_error", "the same, worst joint that is fine in both"),
+    ("compared_duration", "compared duration (the DNS ends before the shock)"),
+    ("compared_stress", "largest stress of the critical joint in this duration / whole shock"),
+    ("critical_joint", "critical joint (from the DNS if it covers the whole shock)"),
+    ("critical_joint_stress_error", "von Mises history of its solder layer, relative L2"),
+    ("worst_joint_stress_error", "von Mises history, worst joint that is fine in both, relative L2"),
     ("critical_joint_peel_error", "peel history of the critical joint, relative L2"),
     ("critical_joint_work_error", "plastic work history of the critical joint, relative L2"),
     ("die_displacement_error", "die centre displacement, relative L2"),
     ("board_displacement_error", "board centre displacement, relative L2"),
-    ("two_scale_dns_core_ratio", "core time of the windows, two-scale over DNS"),
+    ("two_scale_dns_core_ratio", "core time of the windows, two-scale / DNS"),
     ("two_scale_ideal_ratio", "ideal ratio: equal cost per element update, no overhead"),
-    ("coarse_run_dns_time_ratio", "wall time, coarse run that finds the critical joints over DNS"),
+    ("coarse_run_dns_time_ratio", "wall time, coarse run / DNS"),
 )
 PACKAGES = (
     "numpy",
@@ -51,9 +51,9 @@ MODEL_ROWS = (
     ("hexahedra", lambda model: " + ".join(f"{number(count)} {role}" for role, count in model["elements"].items())),
     ("nodes", lambda model: " + ".join(f"{number(count)} {role}" for role, count in model["nodes"].items())),
     ("MPI ranks", lambda model: number(model["ranks"])),
-    ("joint nodes tied to facets that do not match", lambda model: number(model["tied_nodes"])),
+    ("joint nodes tied to non-matching facets", lambda model: number(model["tied_nodes"])),
     ("time step of the macro model", lambda model: nano(model["window"]) if model["mode"] == "two_scale" else "–"),
-    ("time step of the meso model (DNS: of all)", lambda model: nano(model["step"])),
+    ("time step of the meso model or DNS", lambda model: nano(model["step"])),
     ("step ratio m", lambda model: number(model["substeps"]) if model["mode"] == "two_scale" else "–"),
     ("steps", lambda model: number(model["windows"] * model["substeps"])),
     ("mass of the model", lambda model: quantity({"value": model["model_mass"], "unit": "kg"})),
@@ -62,17 +62,17 @@ MODEL_ROWS = (
 
 
 def headline(metrics: dict) -> list[dict]:
-    """The figures below the first table: those of ``HEADLINE`` that the run has."""
+    """Return the figures of ``HEADLINE`` that the run has."""
     return [{"label": label, "value": named_quantity(metrics, name)} for name, label in HEADLINE if name in metrics]
 
 
 def figures_of(names: Sequence[str], metrics: dict, text: Text) -> list[dict]:
-    """The figures at the top of the page: those of some metrics that the run has."""
+    """Return figures of the named metrics that the run has; ``text`` formats name and record."""
     return [{"label": name.replace("_", " "), "value": text(name, metrics[name])} for name in names if name in metrics]
 
 
 def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
-    """All metrics, those with a limit beside it; ``text`` writes one by its name and record."""
+    """Return the table of all metrics with their limits; ``text`` formats a metric by name and record."""
     rows = []
     for name, metric in metrics.items():
         limit = text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
@@ -81,7 +81,7 @@ def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
 
 
 def health_rows(health: dict) -> list[dict]:
-    """One record a check: name, value, limit (texts) and ok."""
+    """Return one record for each health check: name, value and limit as text, and ok."""
     texts = {name: against_limit(name, check) for name, check in health.items()}
     return [
         {"name": name.replace("_", " "), "value": value, "limit": limit, "ok": health[name]["ok"]}
@@ -90,7 +90,7 @@ def health_rows(health: dict) -> list[dict]:
 
 
 def versions() -> dict:
-    """Installed versions of the libraries that the results depend on."""
+    """Return the table of installed versions of the numerical libraries."""
     rows = []
     for name in PACKAGES:
         try:
@@ -101,7 +101,7 @@ def versions() -> dict:
 
 
 def comparison(metrics: dict) -> dict | None:
-    """Two-scale against DNS, if both were run."""
+    """Return the table of two-scale against DNS; None unless both were run."""
     if "two_scale_dns_core_ratio" not in metrics:
         return None
     rows = [[label, named_quantity(metrics, name)] for name, label in COMPARISON if name in metrics]
@@ -109,7 +109,7 @@ def comparison(metrics: dict) -> dict | None:
 
 
 def energies(histories: dict[str, dict]) -> dict:
-    """Largest value of every term of the energy balance, each mode a column."""
+    """Return the table of the largest value of every energy, one column for each mode."""
     terms = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance")
     largest = {
         term: [float(np.max(np.abs(history[term]))) for history in histories.values()]
@@ -126,7 +126,7 @@ def energies(histories: dict[str, dict]) -> dict:
 
 
 def models(results: dict[str, dict]) -> dict:
-    """What was computed, each mode a column."""
+    """Return the table of model sizes and time steps, one column for each mode."""
     records = [result["model"] for result in results.values()]
     rows = [[label, *(text(record) for record in records)] for label, text in MODEL_ROWS]
     roles = dict.fromkeys(role for record in records for role in record["critical_steps"])
@@ -138,7 +138,7 @@ def models(results: dict[str, dict]) -> dict:
 
 
 def costs(results: dict[str, dict]) -> dict:
-    """Where the time of each shock run went."""
+    """Return the table of timings of each shock run."""
     return _side_by_side(results, "timings", "seconds")
 
 
@@ -166,12 +166,12 @@ def _cell(value) -> str:
 
 
 def mode_name(mode: str) -> str:
-    """Name of a mode for people."""
+    """Return the display name of a mode."""
     return {"two_scale": "two-scale", "dns": "DNS"}.get(mode, mode)
 
 
 def named_quantity(metrics: dict, name: str) -> str:
-    """Text of a metric: errors as per cent, strains in microstrain, others as ``quantity``."""
+    """Return a metric as text: errors in per cent, strains in microstrain, others as ``quantity``."""
     if name == SHAPE_EFFECT:
         return f"{100.0 * metrics[name]['value']:+.3g} %"
     if "_error" in name:

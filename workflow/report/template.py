@@ -1,7 +1,7 @@
-"""How pages are made from templates: nothing that a case, a file or an error says becomes a part of the page's code.
+"""Rendering of pages from templates, safe against markup in cases, files and error messages.
 
-Texts are escaped. A content security policy in each page allows its own script and style, by their digests, and
-pictures that are in the page; nothing else, and nothing from elsewhere.
+Texts are escaped. The content security policy of each page allows only its own script and style, by their digests, and
+embedded pictures.
 """
 
 import base64
@@ -25,7 +25,7 @@ STYLES = ("uplot.min.css", "style.css")
 
 
 def write_page(path: Path, template: str, context: dict) -> None:
-    """Write a page from one of the templates, under a temporary name, then rename it."""
+    """Render a page from a template, write it under a temporary name and rename it."""
     environment = template_environment(TEMPLATES)
     environment.globals |= {"data": PageData(), "script": script(), "style": style(), "policy": policy()}
     partial = path.with_name(f".{path.name}.partial")
@@ -34,11 +34,11 @@ def write_page(path: Path, template: str, context: dict) -> None:
 
 
 def template_environment(folder: Path) -> jinja2.Environment:
-    """Return what renders the templates of a folder: texts are escaped, their control characters visible."""
+    """Return the environment of the templates of a folder, which escapes texts and shows control characters."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         autoescape=True,
-        finalize=_shown,
+        finalize=_with_visible_controls,
         undefined=jinja2.ChainableUndefined,
         trim_blocks=True,
         extensions=["jinja2.ext.do"],
@@ -66,5 +66,5 @@ def _digest(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _shown(value: object) -> object:
+def _with_visible_controls(value: object) -> object:
     return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value

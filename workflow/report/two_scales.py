@@ -1,4 +1,4 @@
-"""Section "Two scales" of the report: how the models are coupled, what that costs, and what else would cost."""
+"""Report section "Two scales": coupling of the models, step levels, placement, cost of an implicit run."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,8 +10,8 @@ Record = Mapping[str, Any]
 SCHEMES = {
     "held_velocity": "held velocity, coupling interface inside the board",
     "local_steps": "local time steps (LTS-leapfrog)",
-    "impulse": "impulses at a coupling interface inside the board, carried by the meso model",
-    "gravouil_combescure": "Gravouil-Combescure, at the joints' own facets",
+    "impulse": "impulses at a coupling interface inside the board",
+    "gravouil_combescure": "Gravouil-Combescure, interface at the joints",
 }
 DIRECTIONS = {"two_way": "two-way", "one_way": "one-way: no feedback to the macro model"}
 SELF_CHECK = {
@@ -27,21 +27,21 @@ SELF_CHECK = {
 
 
 def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
-    """Return how the models are coupled: what the run recorded of it.
+    """Return the table of the coupling of a two-scale run.
 
     Args:
-        coupling: ``coupling`` of the result of a two-scale run.
-        model: its ``model``.
-        found_by: how its fine joints were found, where a coarse run did; else empty.
+        coupling: Entry ``coupling`` of its ``result.json``.
+        model: Entry ``model`` of its ``result.json``.
+        found_by: How a coarse run selected the fine joints; empty without one.
     """
     scheme, joints = coupling.get("scheme"), coupling.get("fine_joints")
     rows = [
         ("scheme", scheme and SCHEMES.get(scheme, scheme)),
-        ("why", coupling.get("why")),
+        ("reason", coupling.get("why")),
         ("direction", DIRECTIONS.get(coupling.get("direction", ""))),
         ("fine joints", " ".join(joints) if joints is not None and not isinstance(joints, str) else joints),
         ("fine layers", " ".join(coupling.get("fine_layers", ()))),
-        ("how they were chosen", found_by),
+        ("selection of fine joints", found_by),
         ("window", nano(model["window"])),
         ("step ratio m", number(model["substeps"])),
         ("meso share f of the elements", _share(coupling.get("meso_share"))),
@@ -52,7 +52,7 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
 
 
 def levels(coupling: Record) -> dict | None:
-    """Return the levels of time steps: level 0 is the window."""
+    """Return the table of step levels, level 0 being the window; None without levels."""
     rows = [
         [str(level), nano(record["step"]), number(record["elements"]), _share(record.get("cost_share")) or "–"]
         for level, record in enumerate(coupling.get("levels", ()))
@@ -61,14 +61,14 @@ def levels(coupling: Record) -> dict | None:
 
 
 def placement(coupling: Record) -> dict | None:
-    """Return the predicted window of every placement, what was measured, and how busy the ranks were."""
+    """Return the table of predicted and measured window times and the load of the ranks; None without them."""
     record = coupling.get("placement", {})
     rows = [
         (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", short(seconds))
         for name, seconds in _numbers(record, "alternatives")
     ]
     rows += [("window, measured", short(record["window_seconds"]))] if "window_seconds" in record else []
-    rows += [(f"rank {rank} computes", _share(share)) for rank, share in enumerate(record.get("busy_shares", ()))]
+    rows += [(f"rank {rank}, computing", _share(share)) for rank, share in enumerate(record.get("busy_shares", ()))]
     rows += (
         [("coupling, share of a window", _share(record["coupling_overhead"]))] if "coupling_overhead" in record else []
     )
@@ -76,18 +76,18 @@ def placement(coupling: Record) -> dict | None:
 
 
 def oracle(seconds: float, results: Sequence[Record]) -> str:
-    """Say what one model in implicit steps would cost beside the two-scale run, and which of both wins.
+    """Return sentences that compare the cost of the two-scale run with one implicit model.
 
     Args:
-        seconds: predicted for the implicit run on one rank.
-        results: of the two-scale run, and of the preceding coarse run.
+        seconds: Predicted time of the implicit run on one rank [s].
+        results: ``result.json`` of the two-scale run and of a preceding coarse run.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
     runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"
     winner = "implicit steps are cheaper" if seconds < core_seconds else "two scales are cheaper"
     return (
-        f"All is linear elastic here, so {winner}: one model in implicit steps (MUMPS, factored once) is predicted to"
-        f" take {seconds:.0f} core seconds, {runs} took {core_seconds:.0f}. Solder that yields, finite"
+        f"All materials are linear elastic, so {winner}: one model with implicit steps (MUMPS, one factorisation) is"
+        f" predicted to take {seconds:.0f} core seconds; {runs} took {core_seconds:.0f}. Plastic solder, finite"
         " rotations and failure need explicit steps."
     )
 

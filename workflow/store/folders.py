@@ -10,7 +10,7 @@ from pathlib import Path
 from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.process.last_word import LOG, LOGS
+from reflowshock.workflow.process.error_exit import LOG, LOGS
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import HOME
 

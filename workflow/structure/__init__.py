@@ -1,1 +1,1 @@
-"""Structures as a kind of case: stages, forecast, what their motion is compared with, report."""
+"""Structures of layers as a kind of case: model (``case.py``), stages, forecast, comparison with references, report."""

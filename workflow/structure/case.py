@@ -1,4 +1,4 @@
-"""The case of a structure: a box of layers, held and loaded, whose motion is computed."""
+"""Case of a structure: a box of layers with supports and loads, whose motion is computed."""
 
 from pathlib import Path
 
@@ -12,17 +12,17 @@ from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import beside
 from reflowshock.workflow.structure.references import AnyReference, Record
 
-MESHED = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
-MOVED = ("structure", "materials", *Fittings.model_fields, "loads", "dynamics")
+MESH_KEYS = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
+MOTION_KEYS = ("structure", "materials", *Fittings.model_fields, "loads", "dynamics")
 STRUCTURE = Pipeline(
     (
         Stage(
             "geometry",
-            tuple(f"structure.{name}" for name in MESHED),
+            tuple(f"structure.{name}" for name in MESH_KEYS),
             (),
             ("geometry/structure.msh", "geometry/preview.png"),
         ),
-        Stage("shock", MOVED, ("geometry",), ()),
+        Stage("shock", MOTION_KEYS, ("geometry",), ()),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
         report_of("geometry", "shock", "comparison"),
     )
@@ -30,7 +30,7 @@ STRUCTURE = Pipeline(
 
 
 class StructureCase(StructureProblem, Case):
-    """A box of layers under supports and loads."""
+    """Box of layers with supports, loads and references."""
 
     kind = "structure"
     stages = STRUCTURE
@@ -40,7 +40,7 @@ class StructureCase(StructureProblem, Case):
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take the tables of loads and records as relative to the folder of the case file."""
+        """Resolve the tables of loads and records relative to the folder of the case file."""
         named = [group for key in ("loads", "references") if isinstance(group := table.get(key), dict)]
         for item in (item for group in named for item in group.values()):
             if isinstance(item, dict) and isinstance(item.get("table"), str):
@@ -49,7 +49,7 @@ class StructureCase(StructureProblem, Case):
 
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
-        """Tables of loads and records."""
+        """Tables of loads and records by key: file, quantity, column."""
         loads = {
             f"loads.{name}.table": (Path(load.table), load.quantity, load.table_column)
             for name, load in self.loads.items()
@@ -63,17 +63,17 @@ class StructureCase(StructureProblem, Case):
 
     @property
     def files(self) -> dict[str, Path]:
-        """Tables of loads and records."""
+        """Files of the tables of loads and records by key."""
         return {key: path for key, (path, *_) in self.pulse_tables.items()}
 
     @property
     def problem(self) -> StructureProblem:
-        """All of it as the solver takes it."""
+        """Problem for the solvers."""
         return StructureProblem(**{name: getattr(self, name) for name in StructureProblem.model_fields})
 
     @property
     def box(self) -> Box:
-        """The body as the mesher takes it."""
+        """Geometry for the mesher, refined."""
         body = self.structure.refined
         layers = tuple(
             BoxLayer(name, layer.thickness, layer.cells, layer.in_plane) for name, layer in body.layers.items()

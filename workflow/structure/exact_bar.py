@@ -1,22 +1,22 @@
-"""Plane waves in two joined bars: exact speeds and amplitudes, and what a run has of them."""
+"""Plane waves in two joined bars: exact speed and amplitudes (Graff 1975, 2.2), and their values in a run."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-MARGIN = 0.25  # of the pulse: how far from its exact time a peak is looked for
+PEAK_WINDOW = 0.25  # half width of the search for a peak about its exact time, over the pulse duration
 
 
 @dataclass(frozen=True, slots=True)
 class Bars:
-    """Two bars along z, the lower one loaded at z = 0 by a half-sine pressure.
+    """Two bars along z with a half-sine pressure at z = 0.
 
     Attributes:
-        lengths: of both [m].
-        moduli: of uniaxial strain, C_33 [Pa].
-        densities: [kg/m^3].
-        pulse: duration of the pressure [s].
+        lengths: Lengths of the lower and the upper bar [m].
+        moduli: Moduli of uniaxial strain C_33 [Pa].
+        densities: Densities [kg/m^3].
+        pulse: Duration of the pressure [s].
     """
 
     lengths: tuple[float, float]
@@ -38,37 +38,45 @@ class Bars:
 
     @property
     def transmitted(self) -> float:
-        """Velocity that passes the joint over the incident one, 2 Z1 / (Z1 + Z2) (Graff 1975, 2.2; Achenbach 1973)."""
+        """Transmitted over incident velocity at the joint, 2 Z1 / (Z1 + Z2) (Graff 1975, 2.2; Achenbach 1973)."""
         lower, upper = self.impedances
         return 2.0 * lower / (lower + upper)
 
     @property
     def reflected(self) -> float:
-        """Velocity that comes back from the joint over the incident one, (Z1 - Z2) / (Z1 + Z2)."""
+        """Reflected over incident velocity at the joint, (Z1 - Z2) / (Z1 + Z2)."""
         lower, upper = self.impedances
         return (lower - upper) / (lower + upper)
 
     def arrival(self, height: float) -> float:
-        """Time [s] at which the middle of the pulse passes a height [m] for the first time."""
+        """Return the time at which the middle of the pulse first passes a height [s].
+
+        Args:
+            height: Height above the loaded end [m].
+        """
         below, above = min(height, self.lengths[0]), max(height - self.lengths[0], 0.0)
         return 0.5 * self.pulse + below / self.speeds[0] + above / self.speeds[1]
 
     def return_time(self, height: float) -> float:
-        """Time [s] at which the middle of the pulse comes back from the joint to a height [m] in the lower bar."""
+        """Return the time at which the middle of the reflected pulse passes a height in the lower bar [s].
+
+        Args:
+            height: Height above the loaded end [m].
+        """
         return self.arrival(self.lengths[0]) + (self.lengths[0] - height) / self.speeds[0]
 
 
 def peak(time: NDArray[np.float64], value: NDArray[np.float64], about: float, width: float) -> tuple[float, float]:
-    """Find the largest magnitude near a time, between the samples by the parabola through three of them.
+    """Return the largest magnitude near a time, interpolated by a parabola through three samples.
 
     Args:
-        time: (s,) [s], evenly spaced.
-        value: (s,).
-        about: where it is expected [s].
-        width: how far from there at most [s].
+        time: Evenly spaced times, shape (n,) [s].
+        value: Samples, shape (n,).
+        about: Centre of the search [s].
+        width: Half width of the search [s].
 
     Returns:
-        Time [s] and value; nan where the samples do not reach so far.
+        Time [s] and value of the peak; nan if the samples end before the search window.
     """
     inside = np.flatnonzero(np.abs(time - about) <= width)
     if about + width > time[-1] or len(inside) < 3:
@@ -84,12 +92,19 @@ def peak(time: NDArray[np.float64], value: NDArray[np.float64], about: float, wi
 def measure(
     bars: Bars, time: NDArray[np.float64], velocity: list[NDArray[np.float64]], heights: list[float]
 ) -> dict[str, float]:
-    """Measure speed and amplitudes in the velocities of two points of the lower bar and one of the upper bar.
+    """Measure wave speed and amplitudes from the velocities at three points.
+
+    Args:
+        bars: Bars with their exact solution.
+        time: Evenly spaced times, shape (n,) [s].
+        velocity: Velocities at two points of the lower bar and one of the upper bar, each of shape (n,) [m/s].
+        heights: Heights of the points [m].
 
     Returns:
-        wave_speed [m/s]; transmitted and reflected velocity over the incident one; exact values and errors.
+        ``wave_speed`` [m/s], ``transmitted_velocity`` and ``reflected_velocity`` over the incident velocity, each with
+        ``_exact`` and ``_error``.
     """
-    width = MARGIN * bars.pulse
+    width = PEAK_WINDOW * bars.pulse
     near, far, beyond = (peak(time, v, bars.arrival(z), width) for v, z in zip(velocity, heights, strict=True))
     back = peak(time, velocity[1], bars.return_time(heights[1]), width)
     speed = (heights[1] - heights[0]) / (far[0] - near[0])
@@ -104,6 +119,6 @@ def measure(
 
 
 def with_errors(measured: dict[str, float], exact: dict[str, float]) -> dict[str, float]:
-    """Return what was measured, ``<name>_exact``, and ``<name>_error`` relative to the exact value."""
+    """Return measured values with their exact values ``<name>_exact`` and relative errors ``<name>_error``."""
     errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in measured.items()}
     return measured | {f"{name}_exact": value for name, value in exact.items()} | errors

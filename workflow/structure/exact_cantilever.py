@@ -1,4 +1,4 @@
-"""A clamped strip under sudden pressure: Euler-Bernoulli theory in plane strain, and what a run has of it."""
+"""Clamped strip under a sudden pressure: Euler-Bernoulli theory in plane strain, and its values in a run."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 from reflowshock.workflow.structure.exact_bar import with_errors
 
 ROOTS = np.array([1.8751040687, 4.6940911330, 7.8547574382])  # of cos x cosh x = -1 (Blevins 1979, table 8-1)
-SEARCHED = 0.25  # of the exact frequency: how far from it that of the run is looked for
+FREQUENCY_MARGIN = 0.25  # half width of the search, over the exact frequency
 
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """A strip clamped at one end, its sides held.
+    """Strip in plane strain, clamped at one end.
 
     Attributes:
-        length: [m].
-        thickness: [m].
-        elasticity: (6, 6) [Pa].
-        density: [kg/m^3].
-        pressure: [Pa].
+        length: Length L [m].
+        thickness: Thickness t [m].
+        elasticity: Elasticity matrix C, shape (6, 6) [Pa].
+        density: Density [kg/m^3].
+        pressure: Pressure p [Pa].
     """
 
     length: float
@@ -49,13 +49,18 @@ class Strip:
 
 
 def measure(strip: Strip, time: NDArray[np.float64], tip: NDArray[np.float64]) -> dict[str, float]:
-    """Measure deflection and first frequency in the motion of the tip (s,) [m], which swings about its static place.
+    """Measure static deflection and first frequency from the motion of the tip.
 
-    Fits sum_n A_n (1 - cos(omega_n t)) with the ratios omega_n / omega_1 of the theory; the sum of A_n is the static
+    Fits sum_n A_n (1 - cos(omega_n t)) with the ratios omega_n / omega_1 of the theory. The sum of A_n is the static
     deflection.
 
+    Args:
+        strip: Strip with its exact solution.
+        time: Times, shape (n,) [s].
+        tip: Deflection of the tip, shape (n,) [m].
+
     Returns:
-        tip_deflection [m], swing_frequency [Hz], exact values and errors.
+        ``tip_deflection`` [m] and ``swing_frequency`` [Hz], each with ``_exact`` and ``_error``.
     """
     from scipy.optimize import minimize_scalar
 
@@ -68,7 +73,7 @@ def measure(strip: Strip, time: NDArray[np.float64], tip: NDArray[np.float64]) -
         columns = swings(frequency)
         return float(np.linalg.norm(columns @ np.linalg.lstsq(columns, tip, rcond=None)[0] - tip))
 
-    bounds = ((1.0 - SEARCHED) * strip.frequency, (1.0 + SEARCHED) * strip.frequency)
+    bounds = ((1.0 - FREQUENCY_MARGIN) * strip.frequency, (1.0 + FREQUENCY_MARGIN) * strip.frequency)
     frequency = float(minimize_scalar(misfit, bounds=bounds, method="bounded").x)
     deflection = abs(float(np.linalg.lstsq(swings(frequency), tip, rcond=None)[0].sum()))
     measured = {"tip_deflection": deflection, "swing_frequency": frequency}

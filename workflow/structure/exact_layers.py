@@ -1,4 +1,4 @@
-"""Plane waves in a bar of layers: every ray that a pressure sends through them, and what a run has of it."""
+"""Plane waves in a layered bar: exact solution by tracing all rays, and its values in a run (Graff 1975, 2.2)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 
 from reflowshock.workflow.structure.exact_bar import peak
 
-FAINTEST = 1e-9  # of the incident velocity: a weaker ray is not followed
-SAME = 1e-9  # of the duration: rays closer than that arrive together
-MARGIN = 0.25  # of the pulse: how far from its exact time a peak is looked for
+MIN_AMPLITUDE = 1e-9  # over the incident velocity: weaker rays are dropped
+TIME_RESOLUTION = 1e-9  # over the duration: closer arrivals are merged
+PEAK_WINDOW = 0.25  # half width of the search for a peak about its exact time, over the pulse duration
 
 Arrivals = list[tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """Layers upon each other, loaded by a pressure at the lower end, free at the upper one.
+    """Stack of layers with a pressure at the lower end and a free upper end.
 
     Attributes:
-        lengths: of each, bottom first [m].
-        moduli: of uniaxial strain, C_33 [Pa].
-        densities: [kg/m^3].
+        lengths: Thicknesses, bottom first [m].
+        moduli: Moduli of uniaxial strain C_33 [Pa].
+        densities: Densities [kg/m^3].
     """
 
     lengths: tuple[float, ...]
@@ -41,31 +41,35 @@ class Layers:
         return tuple(d * c for d, c in zip(self.densities, self.speeds, strict=True))
 
     def travel(self, low: float, high: float) -> float:
-        """Time [s] that a wave takes from one height [m] to another, straight through."""
+        """Return the travel time of a wave between two heights without reflection [s]."""
         ends = np.concatenate([[0.0], np.cumsum(self.lengths)])
         inside = np.clip([low, high], ends[:-1, None], ends[1:, None])
         return float(np.sum((inside[:, 1] - inside[:, 0]) / np.array(self.speeds)))
 
     def arrivals(self, height: float, duration: float) -> Arrivals:
-        """Follow a front of velocity one that starts at the lower end, until a time [s].
+        """Trace a front of unit velocity that starts at the lower end at time zero.
 
-        Velocities pass a joint with 2 Z1 / (Z1 + Z2) and come back with (Z1 - Z2) / (Z1 + Z2); free ends send all back
-        (Graff 1975, 2.2; Achenbach 1973).
+        An interface transmits the velocity 2 Z1 / (Z1 + Z2) and reflects (Z1 - Z2) / (Z1 + Z2); free ends reflect all
+        of it (Graff 1975, 2.2; Achenbach 1973).
+
+        Args:
+            height: Height at which rays are recorded [m].
+            duration: End of the tracing [s].
 
         Returns:
-            Time [s] and amplitude of every ray that passes the height [m].
+            Time [s] and amplitude of every ray that passes the height.
         """
-        layer, offset = self._place(height)
-        found: Arrivals = []
-        waiting = {(0, 0, True): 1.0}  # (rounded time, layer that is entered, upwards) -> amplitude
+        layer, offset = self._layer_at(height)
+        passing: Arrivals = []
+        waiting = {(0, 0, True): 1.0}  # (rounded time, entered layer, upwards) -> amplitude
         queue = [(0, 0, True)]
-        tick = SAME * duration
+        tick = TIME_RESOLUTION * duration
         while queue:
             key = heappop(queue)
             amplitude, (ticks, here, upwards) = waiting.pop(key), key
             if layer == here:
-                way = offset if upwards else self.lengths[here] - offset
-                found.append((ticks * tick + way / self.speeds[here], amplitude))
+                distance = offset if upwards else self.lengths[here] - offset
+                passing.append((ticks * tick + distance / self.speeds[here], amplitude))
             leaving = ticks + round(self.lengths[here] / self.speeds[here] / tick)
             if leaving * tick > duration:
                 continue
@@ -73,30 +77,36 @@ class Layers:
                 ray, passed = (leaving, entered, direction), amplitude * share
                 if ray in waiting:
                     waiting[ray] += passed
-                elif abs(passed) > FAINTEST:
+                elif abs(passed) > MIN_AMPLITUDE:
                     waiting[ray] = passed
                     heappush(queue, ray)
-        return found
+        return passing
 
-    def _place(self, height: float) -> tuple[int, float]:
-        """Return the layer of a height [m], and the height above its lower end [m]."""
+    def _layer_at(self, height: float) -> tuple[int, float]:
+        """Return the layer that contains a height, and the height above its lower end [m]."""
         bottoms = np.concatenate([[0.0], np.cumsum(self.lengths)[:-1]])
         layer = int(np.searchsorted(bottoms, height, side="right")) - 1
         return layer, height - float(bottoms[layer])
 
     def _split(self, layer: int, upwards: bool) -> list[tuple[int, bool, float]]:
-        """Return what becomes of a ray at the end of a layer: layer that is entered, whether upwards, share."""
+        """Split a ray at the end of a layer into parts: entered layer, whether upwards, share of the amplitude."""
         beyond = layer + (1 if upwards else -1)
         if not 0 <= beyond < len(self.lengths):
             return [(layer, not upwards, 1.0)]
-        own, other = self.impedances[layer], self.impedances[beyond]
-        total = own + other
-        return [(beyond, upwards, 2.0 * own / total), (layer, not upwards, (own - other) / total)]
+        incident, other = self.impedances[layer], self.impedances[beyond]
+        total = incident + other
+        return [(beyond, upwards, 2.0 * incident / total), (layer, not upwards, (incident - other) / total)]
 
     def velocity(
         self, height: float, time: NDArray[np.float64], pressure: Callable[[float], float]
     ) -> NDArray[np.float64]:
-        """Return the velocity (s,) [m/s] at a height [m] and times (s,) [s] under a pressure [Pa] from time zero."""
+        """Return the exact velocity at a height, shape (n,) [m/s].
+
+        Args:
+            height: Height above the loaded end [m].
+            time: Times, shape (n,) [s].
+            pressure: Pressure [Pa] as a function of time [s], zero before time zero.
+        """
         total = np.zeros(len(time))
         for start, amplitude in self.arrivals(height, float(time[-1])):
             total += amplitude * np.array([pressure(t) if t >= 0.0 else 0.0 for t in time - start])
@@ -105,7 +115,7 @@ class Layers:
 
 @dataclass(frozen=True, slots=True)
 class Pulse:
-    """The pressure on the lower end: its value [Pa] at a time [s], and its duration [s]."""
+    """Pressure on the lower end: its value [Pa] as a function of time [s], and its duration [s]."""
 
     value: Callable[[float], float]
     duration: float
@@ -114,55 +124,58 @@ class Pulse:
 def measure(
     layers: Layers, pulse: Pulse, heights: Mapping[str, float], history: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, float]:
-    """Measure speed and amplitudes in the velocities of two points of the lowest layer and one of the uppermost.
+    """Measure wave speed and amplitudes from the velocities at two points of the lowest layer and one of the top layer.
 
-    Amplitudes are magnitudes (a thin layer sends back two of opposite signs) over the incident one, and so are their
-    errors: what comes back may be nothing.
+    Amplitudes are magnitudes over the incident one, since a thin layer reflects two waves of opposite signs. Their
+    errors are also relative to the incident amplitude, since the reflected one may vanish.
 
     Args:
-        layers: the bar.
-        pulse: the pressure.
-        heights: of ``near``, ``far`` and ``beyond`` [m].
-        history: ``time`` (s,) [s], and velocities (s,) [m/s] at the points.
+        layers: Layers of the bar.
+        pulse: Pressure on the lower end.
+        heights: Heights of the points ``near``, ``far`` and ``beyond`` [m].
+        history: ``time``, shape (n,) [s], and the velocity at each point, shape (n,) [m/s].
 
     Returns:
-        wave_speed [m/s], transmitted and reflected velocity, exact values, errors; and the ``wave_error``.
+        ``wave_speed`` [m/s], ``transmitted_velocity`` and ``reflected_velocity``, each with ``_exact`` and ``_error``,
+        and ``wave_error``.
     """
     time = history["time"]
     exact = {name: layers.velocity(height, time, pulse.value) for name, height in heights.items()}
     incident = float(np.abs(exact["near"]).max())
     near, far = (
-        peak(time, history[name], layers.travel(0.0, heights[name]) + 0.5 * pulse.duration, MARGIN * pulse.duration)
+        peak(
+            time, history[name], layers.travel(0.0, heights[name]) + 0.5 * pulse.duration, PEAK_WINDOW * pulse.duration
+        )
         for name in ("near", "far")
     )
     speed = (heights["far"] - heights["near"]) / (far[0] - near[0])
     result = {"wave_speed": speed, "wave_speed_exact": layers.speeds[0]}
     result["wave_speed_error"] = speed / layers.speeds[0] - 1.0
-    for name, (point, start) in passes(layers, heights).items():
+    for name, (point, start) in passage_times(layers, heights).items():
         here = (time >= start) & (time <= start + pulse.duration)
-        found, right = (_largest(values[point][here]) / incident for values in (history, exact))
-        result |= {name: found, f"{name}_exact": right, f"{name}_error": found - right}
+        computed, expected = (_largest(values[point][here]) / incident for values in (history, exact))
+        result |= {name: computed, f"{name}_exact": expected, f"{name}_error": computed - expected}
     return result | {"wave_error": wave_error(layers, pulse, heights, history)}
 
 
 def wave_error(
     layers: Layers, pulse: Pulse, heights: Mapping[str, float], history: Mapping[str, NDArray[np.float64]]
 ) -> float:
-    """Return the relative L2 norm, over time and points, of the velocities' difference from the exact ones.
+    """Return the relative L2 error of the velocities over time and points.
 
     Args:
-        layers: the bar.
-        pulse: the pressure.
-        heights: of points by name [m].
-        history: ``time`` (s,) [s], and velocities (s,) [m/s] at the points.
+        layers: Layers of the bar.
+        pulse: Pressure on the lower end.
+        heights: Heights of the points by name [m].
+        history: ``time``, shape (n,) [s], and the velocity at each point, shape (n,) [m/s].
     """
     exact = np.stack([layers.velocity(height, history["time"], pulse.value) for height in heights.values()])
-    found = np.stack([history[name] for name in heights])
-    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    computed = np.stack([history[name] for name in heights])
+    return float(np.linalg.norm(computed - exact) / np.linalg.norm(exact))
 
 
-def passes(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str, float]]:
-    """Return at which point, and from when on [s], each of the compared waves passes."""
+def passage_times(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str, float]]:
+    """Return the point of each compared wave and the time at which the wave reaches it [s]."""
     first = layers.lengths[0]
     return {
         "transmitted_velocity": ("beyond", layers.travel(0.0, heights["beyond"])),
@@ -171,5 +184,5 @@ def passes(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str,
 
 
 def _largest(values: NDArray[np.float64]) -> float:
-    """Return the largest magnitude; nan where the run has ended before."""
+    """Return the largest magnitude, or nan for an empty array (the run ends before the wave arrives)."""
     return float(np.abs(values).max()) if len(values) else float("nan")

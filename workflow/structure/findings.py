@@ -1,9 +1,10 @@
-"""What the stages of a structure found: its mesh, its motion against references, one solver against the other."""
+"""Metrics and health checks of a structure: mesh, motion, comparison with references and between solvers."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,12 @@ from reflowshock.workflow.case.run import Findings, at_least, at_most, in_words_
 from reflowshock.workflow.case.text import short
 from reflowshock.workflow.structure import exact_bar, exact_cantilever, exact_layers
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.records import compared_with_record
+from reflowshock.workflow.structure.records import compare_with_record
 from reflowshock.workflow.structure.references import BarWave, Cantilever, FrequencyRange, LayeredBar, Record
 
-SOLVER_DIFFERENCE = 0.01  # of the histories of watch points, explicit against implicit, relative L2
+SOLVER_DIFFERENCE = 0.01  # limit of the relative L2 difference of histories, explicit against implicit
 JUDGED = ("displacement_difference", "strain_difference")
-TWO_SCALE_ERROR = 0.01  # of the displacements of watch points, coupled models against a DNS, relative L2
+TWO_SCALE_ERROR = 0.01  # limit of the relative L2 error of displacements, coupled models against a DNS
 ERRORS_JUDGED = ("two_scale_displacement_error",)
 UNITS = {"wave_speed": "m/s", "tip_deflection": "m", "swing_frequency": "Hz"}
 
@@ -26,13 +27,16 @@ Arrays = Mapping[str, NDArray]
 
 
 def of_mesh(elements: Mapping[str, int]) -> Findings:
-    """Say how many elements each layer has."""
+    """Return the numbers of elements of the layers as metrics."""
     counts = {f"elements_{layer}": metric(count) for layer, count in elements.items()}
     return Findings(metrics=counts | {"elements": metric(sum(elements.values()))})
 
 
 def of_motion(results: Mapping[str, dict]) -> Findings:
-    """Judge the motion by what each solver says of itself in ``result.json``; the figures of the first one count."""
+    """Collect metrics and health checks from the ``result.json`` of each solver.
+
+    Names of all solvers but the first get the solver as a prefix.
+    """
     metrics: dict = {}
     health: dict = {}
     for solver, result in results.items():
@@ -44,11 +48,11 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
 
 
 def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
-    """Judge the motion by the references of the case, and two solvers by each other.
+    """Compare the motion with the references of the case, and the solvers with each other.
 
     Args:
-        case: the case.
-        folders: folder of each solver's products, the one whose figures count first.
+        case: Case of a structure.
+        folders: Folder with the products of each solver; the first solver gives the main metrics.
     """
     from reflowshock.fem.output.compare_structures import solver_differences
 
@@ -57,9 +61,9 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
     health: dict = {}
     for solver, folder in folders.items():
         prefix = "" if solver == next(iter(folders)) else f"{solver}_"
-        motion = Motion(read_modes(folder), histories[solver], read_places(folder))
-        found, checks = compared_with_references(case, motion)
-        metrics |= {prefix + name: value for name, value in found.items()}
+        motion = Motion(read_modes(folder), histories[solver], read_positions(folder))
+        values, checks = compare_with_references(case, motion)
+        metrics |= {prefix + name: value for name, value in values.items()}
         health |= {prefix + name: value for name, value in checks.items()}
     first = next(iter(histories.values()))
     if "implicit" in folders and len(folders) > 1:
@@ -74,12 +78,12 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
 
 def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
-    """Name differences from a DNS as what they are: errors of two scales."""
+    """Rename differences from a DNS to errors of the two-scale model."""
     return {f"two_scale_{name.replace('_difference', '_error')}": value for name, value in differences.items()}
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return core and wall time of a coupled run's windows over those of the DNS, on as many ranks."""
+    """Return core time and wall time of the coupled run over those of the DNS, without start-up."""
     results = [
         json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
     ]
@@ -92,65 +96,89 @@ def cost_ratio(folders: Mapping[str, Path]) -> dict:
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:
-    """Read the history that a solver left."""
+    """Read the histories that a solver wrote."""
     with np.load(folder / "history.npz") as arrays:
         return dict(arrays)
 
 
 def read_modes(folder: Path) -> list[dict]:
-    """Read the natural modes that a solver left, lowest first; none where another solver has found them."""
+    """Read the natural modes that a solver wrote, lowest first, or an empty list."""
     path = folder / "modes.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
-def read_places(folder: Path) -> dict[str, tuple[float, float, float]]:
-    """Read where the motion of each watch point is recorded [m]: at the node that is nearest to it."""
+def read_positions(folder: Path) -> dict[str, tuple[float, float, float]]:
+    """Read the node position at which the motion of each watch point is recorded [m]."""
     watch = json.loads((folder / "result.json").read_text(encoding="utf-8"))["model"]["watch"]
     return {name: point["node_at"] for name, point in watch.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What a solver found.
+    """Computed motion of a structure.
 
     Attributes:
-        modes: natural modes, lowest first.
-        history: arrays of its ``history.npz``.
-        places: watch point -> where its motion is recorded [m].
+        modes: Natural modes, lowest first.
+        history: Arrays of ``history.npz``.
+        positions: Node position at which each watch point is recorded [m].
     """
 
     modes: list[dict]
     history: Arrays
-    places: Mapping[str, tuple[float, float, float]]
+    positions: Mapping[str, tuple[float, float, float]]
 
 
-def compared_with_references(case: StructureCase, motion: Motion) -> tuple[dict, dict]:
+def compare_with_references(case: StructureCase, motion: Motion) -> tuple[dict, dict]:
     """Return metrics and health checks of all references of a case, for one solver."""
     metrics: dict = {}
     health: dict = {}
     for reference in case.references.values():
-        if isinstance(reference, BarWave | LayeredBar):
-            found = _waves(case, reference, motion)
-            limits = {"wave_speed_error": reference.speed_limit} | dict.fromkeys(
-                ("transmitted_velocity_error", "reflected_velocity_error"), reference.amplitude_limit
-            )
-        elif isinstance(reference, Cantilever):
-            tip = motion.history[f"displacement@{reference.tip}"][:, 2]
-            found = exact_cantilever.measure(strip_of(case, reference), motion.history["time"], tip)
-            limits = dict.fromkeys(("tip_deflection_error", "swing_frequency_error"), reference.limit)
-        else:
-            if isinstance(reference, FrequencyRange) and motion.modes:
-                health |= _in_range(reference, motion.modes)
-            elif isinstance(reference, Record):
-                metrics |= compared_with_record(case, reference, motion.history)
-            continue
-        metrics |= {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in found.items()}
-        health |= {name: at_most(abs(found[name]), limit) for name, limit in limits.items()}
+        compare = COMPARISONS.get(reference.kind)
+        if compare is not None:
+            values, checks = compare(case, reference, motion)
+            metrics |= values
+            health |= checks
     return metrics, health
 
 
+def _compare_waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion) -> tuple[dict, dict]:
+    limits = {"wave_speed_error": reference.speed_limit} | dict.fromkeys(
+        ("transmitted_velocity_error", "reflected_velocity_error"), reference.amplitude_limit
+    )
+    return _within_limits(_waves(case, reference, motion), limits)
+
+
+def _compare_cantilever(case: StructureCase, reference: Cantilever, motion: Motion) -> tuple[dict, dict]:
+    tip = motion.history[f"displacement@{reference.tip}"][:, 2]
+    measured = exact_cantilever.measure(strip_of(case, reference), motion.history["time"], tip)
+    return _within_limits(measured, dict.fromkeys(("tip_deflection_error", "swing_frequency_error"), reference.limit))
+
+
+def _compare_frequency(_: StructureCase, reference: FrequencyRange, motion: Motion) -> tuple[dict, dict]:
+    return {}, _in_range(reference, motion.modes) if motion.modes else {}
+
+
+def _compare_record(case: StructureCase, reference: Record, motion: Motion) -> tuple[dict, dict]:
+    return compare_with_record(case, reference, motion.history), {}
+
+
+def _within_limits(measured: dict[str, float], limits: Mapping[str, float]) -> tuple[dict, dict]:
+    """Return measured values as metrics, and the checks of their errors."""
+    metrics = {name: metric(value, UNITS.get(name.removesuffix("_exact"), "")) for name, value in measured.items()}
+    return metrics, {name: at_most(abs(measured[name]), limit) for name, limit in limits.items()}
+
+
+COMPARISONS: dict[str, Callable[[StructureCase, Any, Motion], tuple[dict, dict]]] = {
+    "bar_wave": _compare_waves,
+    "layered_bar": _compare_waves,
+    "cantilever": _compare_cantilever,
+    "frequency": _compare_frequency,
+    "record": _compare_record,
+}
+
+
 def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
-    """Return the two layers as bars."""
+    """Return the two layers of a case as bars with their exact solution."""
     from reflowshock.materials.elasticity import elasticity_matrix
 
     layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
@@ -161,7 +189,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
 
 def layers_of(case: StructureCase) -> exact_layers.Layers:
-    """Return all layers as bars."""
+    """Return all layers of a case as a layered bar with its exact solution."""
     from reflowshock.materials.elasticity import elasticity_matrix
 
     materials = case.problem.layer_materials.values()
@@ -172,21 +200,21 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
     )
 
 
-def waves_that_do_not_pass(case: StructureCase) -> Iterator[Problem]:
-    """Find runs that end before the waves that a layered bar compares have passed by half."""
+def truncated_waves(case: StructureCase) -> Iterator[Problem]:
+    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run."""
     for key, reference in case.references.items():
-        if isinstance(reference, LayeredBar):
+        if reference.kind == "layered_bar":
             roles = zip(("near", "far", "beyond"), [*reference.incident, reference.transmitted], strict=True)
             heights = {role: case.watch[name].at[2] for role, name in roles}
-            starts = [start for _, start in exact_layers.passes(layers_of(case), heights).values()]
+            starts = [start for _, start in exact_layers.passage_times(layers_of(case), heights).values()]
             least = max(starts) + 0.5 * _pulse_of(case, reference.load).duration
             if case.dynamics.duration < least:
-                message = f"ends before the waves of references.{key} have passed the watch points"
+                message = f"the run ends before the waves of references.{key} have passed the watch points"
                 yield Problem("dynamics.duration", message, short(case.dynamics.duration), f">= {short(least)}")
 
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
-    """Return the only layer as a strip."""
+    """Return the only layer of a case as a strip with its exact solution."""
     from reflowshock.materials.elasticity import elasticity_matrix
 
     (material,) = case.problem.layer_materials.values()
@@ -195,39 +223,39 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
 
 
 def wave_points(reference: BarWave | LayeredBar) -> list[str]:
-    """Return the watch points of a bar, upwards."""
+    """Return the names of the watch points of a bar in the order of their heights."""
     return [*reference.incident, reference.transmitted]
 
 
 def exact_velocities(
     case: StructureCase,
     reference: BarWave | LayeredBar,
-    places: Mapping[str, tuple[float, float, float]],
+    positions: Mapping[str, tuple[float, float, float]],
     times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the exact velocities (points x times,) [m/s] along a bar, one of ``wave_points`` after the other.
+    """Return the exact velocities at all ``wave_points``, concatenated, shape (points * n,) [m/s].
 
     Args:
-        case: the case.
-        reference: the bar.
-        places: watch point -> where its motion is recorded [m].
-        times: (times,) [s].
+        case: Case of a structure.
+        reference: Reference solution of a bar.
+        positions: Position of each watch point [m].
+        times: Times, shape (n,) [s].
     """
     layers, pulse = layers_of(case), _pulse_of(case, reference.load)
-    return np.concatenate([layers.velocity(places[name][2], times, pulse.value) for name in wave_points(reference)])
+    return np.concatenate([layers.velocity(positions[name][2], times, pulse.value) for name in wave_points(reference)])
 
 
 def _waves(case: StructureCase, reference: BarWave | LayeredBar, motion: Motion) -> dict[str, float]:
     points, history = wave_points(reference), motion.history
     velocities = [history[f"velocity@{name}"][:, 2] for name in points]
-    heights = [motion.places[name][2] for name in points]
+    heights = [motion.positions[name][2] for name in points]
     roles = ("near", "far", "beyond")
-    found = dict(zip(roles, velocities, strict=True)) | {"time": history["time"]}
-    at, pulse = dict(zip(roles, heights, strict=True)), _pulse_of(case, reference.load)
-    if isinstance(reference, LayeredBar):
-        return exact_layers.measure(layers_of(case), pulse, at, found)
-    curves = exact_layers.wave_error(layers_of(case), pulse, at, found)
-    return exact_bar.measure(bars_of(case, reference), history["time"], velocities, heights) | {"wave_error": curves}
+    by_role = dict(zip(roles, velocities, strict=True)) | {"time": history["time"]}
+    height_by_role, pulse = dict(zip(roles, heights, strict=True)), _pulse_of(case, reference.load)
+    if reference.kind == "layered_bar":
+        return exact_layers.measure(layers_of(case), pulse, height_by_role, by_role)
+    error = exact_layers.wave_error(layers_of(case), pulse, height_by_role, by_role)
+    return exact_bar.measure(bars_of(case, reference), history["time"], velocities, heights) | {"wave_error": error}
 
 
 def _pulse_of(case: StructureCase, name: str) -> exact_layers.Pulse:

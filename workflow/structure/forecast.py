@@ -1,4 +1,4 @@
-"""Size, time steps and cost of a structure from its parameters, and its tables of the plan."""
+"""Predicted size, time steps and cost of a structure, and its tables in the output of ``plan``."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverCost, SolverForecast
 
 MEGA = 1.0e6
-SECONDS_TO_START = 4.0  # until the ranks of a solver have loaded their libraries and kernels
+START_UP_SECONDS = 4.0  # time for the ranks of a solver to load libraries and kernels
 
 
 @dataclass(frozen=True, slots=True)
 class LayerForecast:
-    """A layer of the mesh: its material, number of elements, critical time step of the smallest one [s]."""
+    """Layer of the mesh: material, number of elements, smallest critical time step [s], whether it is mass scaled."""
 
     material: str
     elements: int
@@ -33,7 +33,7 @@ class LayerForecast:
 
 @dataclass(frozen=True, slots=True)
 class CoupledForecast:
-    """Two models of a structure: fine layers, window [s], steps in it, predicted wall time on one core [s]."""
+    """Two coupled models: fine layers, window [s], substeps per window, predicted wall time on one core [s]."""
 
     fine: tuple[str, ...]
     window: float
@@ -43,15 +43,15 @@ class CoupledForecast:
 
 @dataclass(frozen=True, slots=True)
 class StructureForecast:
-    """What a run will be like.
+    """Predicted size and cost of a run.
 
     Attributes:
-        effects: effect -> {"on", "why"}.
-        layers: layer -> size and step.
-        steps: time step [s] of each solver.
-        solvers: their cost on one core, and which is cheaper.
-        coupled: two models, where there are two.
-        seconds: stage -> predicted wall time [s].
+        effects: State of each effect, ``{"on", "why"}``.
+        layers: Size and critical step of each layer.
+        steps: Time step of each solver [s].
+        solvers: Cost of the solvers on one core, and the cheaper one.
+        coupled: Forecast of the two-scale run; None without coupling.
+        seconds: Wall time of each stage [s].
     """
 
     effects: Mapping[str, Any]
@@ -63,7 +63,7 @@ class StructureForecast:
 
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
-    """Predict sizes, steps and cost."""
+    """Predict sizes, time steps and cost of a run."""
     from reflowshock.fem.estimates.solver_cost import forecast_solvers
     from reflowshock.fem.estimates.structure_effects import effects
 
@@ -76,12 +76,18 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
     alone = solvers.explicit.seconds / case.ranks
     cost = {"explicit": alone, "implicit": solvers.implicit.seconds, "dns": alone}
     cost |= {"explicit": coupled.seconds / case.ranks} if coupled else {}
-    seconds = {"shock": sum(SECONDS_TO_START + cost[solver] for solver in dynamics.solvers)}
+    seconds = {"shock": sum(START_UP_SECONDS + cost[solver] for solver in dynamics.solvers)}
     return StructureForecast(effects(case.problem, added_mass(case, layers)), layers, steps, solvers, coupled, seconds)
 
 
 def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
-    """Predict window and cost of two models from the seconds of an element's update; buffers and levels left out."""
+    """Predict window and cost of a two-scale run, without buffers and step levels.
+
+    Args:
+        case: Case of a structure.
+        layers: Size and critical step of each layer.
+        update: Time of one update of one element [s].
+    """
     from reflowshock.fem.problem.structure import fine_layers
 
     coupling, dynamics = case.dynamics.coupling, case.dynamics
@@ -98,7 +104,7 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
 
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Predict the critical step [s] of all elements, with damping."""
+    """Predict the critical time step of all elements with damping [s]."""
     from reflowshock.fem.estimates.estimate import damped_critical_step
 
     undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
@@ -106,7 +112,7 @@ def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> f
 
 
 def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
-    """Predict the time step [s] of each solver."""
+    """Predict the time step of each solver [s]."""
     from reflowshock.fem.estimates.solver_cost import implicit_step
     from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
@@ -120,19 +126,21 @@ def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> 
 
 
 def step_problems(case: StructureCase) -> Iterator[Problem]:
-    """Find steps that cannot be taken: none at all, too many, or one that is known to be above the critical step."""
+    """Yield problems of time steps: undefined, too many, above the critical step, or windows longer than a pulse."""
     import numpy as np
 
     try:
         with np.errstate(all="ignore"):
             layers = forecast_layers(case)
     except np.linalg.LinAlgError:
-        yield Problem("structure", "has elements without a time step: sizes, densities or moduli are out of range")
+        yield Problem(
+            "structure", "the critical time step cannot be computed: sizes, densities or moduli are out of range"
+        )
         return
     numerics, critical = case.dynamics.numerics, critical_step(case, layers)
     exact = numerics.critical_step == "element" and case.structure.holes is None
     if numerics.explicit_step and exact and numerics.explicit_step > critical and "explicit" in case.dynamics.solvers:
-        message = "is above the critical step: the solution would be unstable"
+        message = "exceeds the critical step, so the solution would be unstable"
         allowed = f"<= {short(critical)}; critical_step = power_iteration may allow more"
         yield Problem("dynamics.numerics.explicit_step", message, short(numerics.explicit_step), allowed)
     steps = forecast_steps(case, layers)
@@ -144,7 +152,7 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 
 
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
-    """Find pulses that are over before two models meet again."""
+    """Yield problems of pulses that are shorter than the coupling window [s]."""
     from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
     for name, pulse in pulses_of(case.loads).items():
@@ -156,7 +164,7 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
-    """Predict size and critical time step of every layer."""
+    """Predict the size and critical time step of every layer."""
     import numpy as np
 
     from reflowshock.fem.elements.box_step import box_element_step
@@ -172,7 +180,7 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
 
 
 def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Predict the mass [kg] that scaling adds: it raises the steps of some layers to the smallest of the others."""
+    """Predict the mass added by raising the steps of mass-scaled layers to the smallest of the others [kg]."""
     body, materials = case.structure, case.problem.layer_materials
     target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
     area = case.box.extent(0) * case.box.extent(1)
@@ -187,7 +195,7 @@ def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> floa
 
 
 def structure_size(case: StructureCase) -> Size:
-    """Predict what the stages of a case take."""
+    """Predict time, ranks and memory of a case."""
     outlook = forecast_structure(case)
     elements = sum(layer.elements for layer in outlook.layers.values())
     implicit = outlook.solvers.implicit.memory if "implicit" in case.dynamics.solvers else 0.0
@@ -195,13 +203,13 @@ def structure_size(case: StructureCase) -> Size:
 
 
 def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
-    """Yield layers and solvers."""
-    yield layers(outlook)
-    yield solvers(case, outlook)
+    """Yield the tables of layers and solvers."""
+    yield layers_table(outlook)
+    yield solvers_table(case, outlook)
 
 
-def layers(outlook: StructureForecast) -> Table:
-    """Elements and critical steps of the layers, top first."""
+def layers_table(outlook: StructureForecast) -> Table:
+    """Return a table of elements and critical steps of the layers, top first."""
     table = new_table("\nLayers, top first", "layer", "elements", "critical step", "material")
     for name, layer in reversed(outlook.layers.items()):
         remark = "; mass scaled to the smallest step of the others" if layer.mass_scaled else ""
@@ -210,26 +218,26 @@ def layers(outlook: StructureForecast) -> Table:
     return table
 
 
-def solvers(case: StructureCase, outlook: StructureForecast) -> Table:
-    """Steps, cost and memory of both solvers, and which to take."""
+def solvers_table(case: StructureCase, outlook: StructureForecast) -> Table:
+    """Return a table of steps, cost and memory of both solvers, with a recommendation as its caption."""
     table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
-    numerics, found = case.dynamics.numerics, outlook.solvers
-    given = numerics.explicit_step is not None
-    fraction = "as given" if given else f"{numerics.step_fraction:g} of the smallest critical step"
-    factor = f"of it {duration(found.implicit.setup)} for the factor"
-    for name, cost, remark in (("explicit", found.explicit, fraction), ("implicit", found.implicit, factor)):
+    numerics, forecast = case.dynamics.numerics, outlook.solvers
+    is_prescribed = numerics.explicit_step is not None
+    fraction = "as given" if is_prescribed else f"{numerics.step_fraction:g} of the smallest critical step"
+    factor = f"including {duration(forecast.implicit.setup)} for the factorisation"
+    for name, cost, remark in (("explicit", forecast.explicit, fraction), ("implicit", forecast.implicit, factor)):
         unused = "" if name in case.dynamics.solvers else "; not in dynamics.solver"
         table.add_row(name, short(outlook.steps[name]), f"{cost.steps}", _about(cost), _memory(cost), remark + unused)
     if outlook.coupled:
         table.add_row("two models", *_coupled(outlook.coupled))
-    table.caption, table.caption_justify = found.sentence, "left"
+    table.caption, table.caption_justify = forecast.sentence, "left"
     return table
 
 
-def _coupled(found: CoupledForecast) -> tuple[str, str, str, str, str]:
-    """Window, steps in it, cost of two models."""
-    remark = f"window; fine: {', '.join(found.fine) or 'nothing'}; without buffers and levels inside it"
-    return short(found.window), f"m = {found.substeps}", f"about {duration(found.seconds)}", "", remark
+def _coupled(coupled: CoupledForecast) -> tuple[str, str, str, str, str]:
+    """Return the cells of a two-scale run: window, substeps, cost, memory, remark."""
+    remark = f"window; fine layers: {', '.join(coupled.fine) or 'none'}; without buffers and step levels"
+    return short(coupled.window), f"m = {coupled.substeps}", f"about {duration(coupled.seconds)}", "", remark
 
 
 def _about(cost: "SolverCost") -> str:

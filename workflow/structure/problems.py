@@ -1,4 +1,4 @@
-"""What does not fit together in the case of a structure."""
+"""Consistency checks of the case of a structure."""
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
@@ -8,11 +8,15 @@ from reflowshock.workflow.structure.references import reference_problems
 
 
 def structure_problems(case: StructureCase) -> list[Problem]:
-    """Find what does not fit together: materials, places, facet sets, loads, references."""
+    """Check materials, positions, facet sets, loads, references and time steps of a structure against each other."""
     from reflowshock.fem.problem import structure_checks
     from reflowshock.meshing.board.box_plan import box_problems
-    from reflowshock.workflow.structure.findings import waves_that_do_not_pass
+    from reflowshock.workflow.structure.findings import truncated_waves
 
-    found = [*box_problems(case.box), *structure_checks.problems(case.problem), *unreadable_pulses(case.pulse_tables)]
-    found += reference_problems(case.references, case.problem)
-    return found or [*step_problems(case), *waves_that_do_not_pass(case)]
+    problems = [
+        *box_problems(case.box),
+        *structure_checks.problems(case.problem),
+        *unreadable_pulses(case.pulse_tables),
+    ]
+    problems += reference_problems(case.references, case.problem)
+    return problems or [*step_problems(case), *truncated_waves(case)]

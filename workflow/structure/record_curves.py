@@ -1,4 +1,4 @@
-"""Curves of accelerations beside their records, and of the response spectra of the inputs."""
+"""Charts of computed and recorded_acceleration accelerations, and of the response spectra of the inputs."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,40 +10,40 @@ from reflowshock.workflow.report.colours import GREY
 from reflowshock.workflow.report.curves import GRAVITY, MILLI, TIME
 from reflowshock.workflow.report.spectra import spectrum_curves
 from reflowshock.workflow.structure.case import StructureCase
-from reflowshock.workflow.structure.records import recorded
+from reflowshock.workflow.structure.records import recorded_acceleration
 from reflowshock.workflow.structure.references import Record
 
 Histories = Mapping[str, Mapping[str, NDArray]]
 
 
 def acceleration_curves(case: StructureCase, histories: Histories, styles: Mapping[str, dict[str, Any]]) -> list[Chart]:
-    """Return the acceleration of every watch point in space, after the filter, beside its records."""
+    """Return one chart for each watch point: its filtered acceleration relative to space, and its records."""
     from reflowshock.fem.loads.structure_pulses import pulses_of
     from reflowshock.fem.output.acceleration import watch_accelerations
 
     pulses = pulses_of(case.loads)
-    courses = {solver: watch_accelerations(arrays, case.problem, pulses) for solver, arrays in histories.items()}
+    accelerations = {solver: watch_accelerations(arrays, case.problem, pulses) for solver, arrays in histories.items()}
     end = float(next(iter(histories.values()))["time"][-1])
     charts = []
-    for name in next(iter(courses.values())):
+    for name in next(iter(accelerations.values())):
         lines = [
-            Series("recorded", course.time / MILLI, course.filtered / GRAVITY, GREY)
+            Series("recorded", record.time / MILLI, record.filtered / GRAVITY, GREY)
             for reference in case.references.values()
             if isinstance(reference, Record) and reference.watch == name
-            for course in [recorded(case, reference, end)]
+            for record in [recorded_acceleration(case, reference, end)]
         ]
         lines += [
-            Series(x=found[name].time / MILLI, y=found[name].filtered / GRAVITY, **styles[solver])
-            for solver, found in courses.items()
+            Series(x=computed[name].time / MILLI, y=computed[name].filtered / GRAVITY, **styles[solver])
+            for solver, computed in accelerations.items()
         ]
         charts.append(Chart(TIME, Axis("acceleration [G]"), lines, title=name))
     return charts
 
 
 def input_spectra(case: StructureCase) -> list[Chart]:
-    """Return the response spectrum of every input-G over the run's duration; nothing without any."""
+    """Return the shock response spectrum of every input-G over the duration of the run."""
     from reflowshock.fem.loads.structure_pulses import pulses_of
-    from reflowshock.fem.problem.structure import InputG
+    from reflowshock.fem.problem.load_kinds import InputG
 
     inputs = {name: load for name, load in case.loads.items() if isinstance(load, InputG)}
     return spectrum_curves(pulses_of(inputs), case.dynamics.duration)

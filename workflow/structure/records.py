@@ -1,4 +1,4 @@
-"""Records of accelerometers beside computed accelerations."""
+"""Comparison of computed accelerations with accelerometer records."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,8 +12,8 @@ from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.references import Record
 
 
-def recorded(case: StructureCase, reference: Record, end: float):
-    """Return the recorded acceleration (an ``Acceleration``) up to the end [s] of a run, after its filter."""
+def recorded_acceleration(case: StructureCase, reference: Record, end: float):
+    """Return a recorded acceleration as an ``Acceleration``, filtered like the run and cut at its end [s]."""
     from reflowshock.fem.loads.pulse_table import read_pulse
     from reflowshock.fem.output.acceleration import Acceleration, low_passed
 
@@ -25,15 +25,15 @@ def recorded(case: StructureCase, reference: Record, end: float):
     return Acceleration(times[within], values[within], low_passed(values, step, case.dynamics.filter)[within])
 
 
-def compared_with_record(case: StructureCase, reference: Record, history: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return the record's peaks and by how much the computed ones differ from them."""
+def compare_with_record(case: StructureCase, reference: Record, history: Mapping[str, NDArray]) -> dict[str, Any]:
+    """Return the peaks of a record and the relative differences of the computed peaks, as metrics."""
     from reflowshock.fem.loads.structure_pulses import pulses_of
     from reflowshock.fem.output.acceleration import watch_accelerations
 
     computed = watch_accelerations(history, case.problem, pulses_of(case.loads)).get(reference.watch)
-    measured = recorded(case, reference, float(history["time"][-1])).peaks_in_g(reference.watch)
-    found = {f"measured_{name}": metric(value, "G") for name, value in measured.items()}
+    measured = recorded_acceleration(case, reference, float(history["time"][-1])).peaks_in_g(reference.watch)
+    metrics = {f"measured_{name}": metric(value, "G") for name, value in measured.items()}
     for name, value in computed.peaks_in_g(reference.watch).items() if computed else ():
         what, _, where = name.partition("@")
-        found[f"{what}_difference@{where}"] = metric(value / measured[name] - 1.0)
-    return found
+        metrics[f"{what}_difference@{where}"] = metric(value / measured[name] - 1.0)
+    return metrics

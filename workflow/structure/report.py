@@ -1,8 +1,4 @@
-"""Report of a structure: what moved how, against what, at what cost.
-
-It has the largest deformation, natural modes, histories, reactions, the energy balance, and the comparison with
-references.
-"""
+"""Report of a structure: deformation, natural modes, histories, reactions, energy balance, references and cost."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -60,7 +56,7 @@ MODEL_ROWS = (
 
 
 def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics: dict) -> None:
-    """Add the sections on a structure."""
+    """Add the tables, charts and scenes of a structure to the context of the report template."""
     folder = run_folder / "shock"
     if not folder.is_dir():
         return
@@ -77,10 +73,10 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
     if case.supports:
         context["curves"]["reactions"] = reaction_curves(histories, list(case.supports))
     context["tables"] |= {
-        "structure": models(results),
+        "structure": model_table(results),
         "metrics": metric_table(metrics),
-        "references": references(metrics),
-        "published": published(case, metrics),
+        "references": reference_table(metrics),
+        "published": published_table(case, metrics),
         "cost": costs(results),
     }
     first = next(iter(results))
@@ -90,7 +86,7 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
 
 
 def add_two_scales(result: Mapping, context: dict) -> None:
-    """Add how the models of a run are coupled, where there are two."""
+    """Add the tables of coupling, step levels and rank placement of a two-scale run."""
     coupling = result.get("coupling")
     if coupling is None:
         return
@@ -102,28 +98,28 @@ def add_two_scales(result: Mapping, context: dict) -> None:
 
 
 def meshed_part(case: StructureCase) -> str:
-    """Return what planes of symmetry leave to be meshed, in words; empty where all of the body is."""
+    """Return the meshed part of the body: "half", "quarter", or empty for the whole body."""
     return ("", "half", "quarter")[len(set(case.structure.symmetry))]
 
 
 def headline(metrics: dict) -> list[dict]:
-    """The figures at the top of the page: of every kind the first one that the run has."""
-    shown = []
-    for wanted in HEADLINE:
-        name = next((name for name in metrics if name.split("@")[0] == wanted), None)
+    """Return labels and values of the figures at the top of the page, the first metric of each quantity."""
+    figures = []
+    for quantity_name in HEADLINE:
+        name = next((name for name in metrics if name.split("@")[0] == quantity_name), None)
         if name is not None:
-            shown.append({"label": label(name), "value": text(name, metrics[name])})
-    return shown
+            figures.append({"label": label(name), "value": text(name, metrics[name])})
+    return figures
 
 
 def label(name: str) -> str:
-    """Write the name of a metric in words."""
+    """Return the name of a metric as readable text."""
     what, _, where = name.partition("@")
     return what.replace("_", " ") + (f" at {where}" if where else "")
 
 
 def text(name: str, metric: dict) -> str:
-    """Write the value of a metric: differences as per cent, strains in microstrain."""
+    """Format the value of a metric: errors and differences in per cent, strains in microstrain."""
     what = name.partition("@")[0]
     if what.endswith(FRACTIONS):
         return percent(metric["value"])
@@ -134,12 +130,12 @@ def text(name: str, metric: dict) -> str:
 
 
 def metric_table(metrics: dict) -> dict:
-    """All metrics."""
-    return {"head": ["metric", "value"], "rows": [[label(name), text(name, found)] for name, found in metrics.items()]}
+    """Return a table of all metrics."""
+    return {"head": ["metric", "value"], "rows": [[label(name), text(name, value)] for name, value in metrics.items()]}
 
 
-def references(metrics: dict) -> dict | None:
-    """What was measured beside its exact value."""
+def reference_table(metrics: dict) -> dict | None:
+    """Return a table of computed and exact values with errors, or None without exact values."""
     rows = []
     for name, metric in metrics.items():
         if f"{name}_exact" in metrics:
@@ -148,23 +144,23 @@ def references(metrics: dict) -> dict | None:
     return {"head": ["quantity", "computed", "exact", "error"], "rows": rows} if rows else None
 
 
-def published(case: StructureCase, metrics: dict) -> dict | None:
-    """What was computed beside what others published."""
+def published_table(case: StructureCase, metrics: dict) -> dict | None:
+    """Return a table of computed and published values, or None without published values."""
     rows = [
         [
-            label(one.metric),
-            text(one.metric, metrics[one.metric]) if one.metric in metrics else "–",
-            one.value,
-            one.source,
+            label(reference.metric),
+            text(reference.metric, metrics[reference.metric]) if reference.metric in metrics else "–",
+            reference.value,
+            reference.source,
         ]
-        for one in case.references.values()
-        if isinstance(one, Published)
+        for reference in case.references.values()
+        if isinstance(reference, Published)
     ]
     return {"head": ["quantity", "computed", "published", "source"], "rows": rows} if rows else None
 
 
-def models(results: Mapping[str, dict]) -> dict:
-    """What was computed, each solver a column."""
+def model_table(results: Mapping[str, dict]) -> dict:
+    """Return a table of model size and time steps with one column per solver."""
     records = [result["model"] for result in results.values()]
     return {
         "head": ["model", *results],
@@ -178,7 +174,7 @@ def _add_scenes(folder: Path, case: StructureCase, history: Mapping[str, np.ndar
     modes, parts = read_modes(folder), list(case.structure.layers)
     context["scenes"]["view"] = deformation_scene(model_series(folder), parts, _peak_time(case, history))
     context["view_caption"] = (
-        "At first the time of the largest strain energy. Displacements are relative to the supports."
+        "The first frame shows the time of the largest strain energy. Displacements are relative to the supports."
     )
     if modes:
         context["tables"]["modes"] = mode_table(modes)
@@ -186,27 +182,27 @@ def _add_scenes(folder: Path, case: StructureCase, history: Mapping[str, np.ndar
 
 
 def model_series(folder: Path) -> list[Path]:
-    """Return the series of fields of all models of a run."""
+    """Return the existing field series (PVD) of a run, one file per model."""
     return [path for role in ROLES if (path := folder / f"{role}.pvd").exists()]
 
 
 def _peak_time(case: StructureCase, history: Mapping[str, np.ndarray]) -> float:
-    """Time [s] at which the strain energy is largest."""
+    """Return the time of the largest strain energy [s]."""
     return float(history["time"][np.argmax(history["internal"])])
 
 
 def point_curves(histories: Histories, point: str) -> list[Chart]:
-    """Return displacement, velocity, strain and stress of a watch point, of each its largest component."""
-    return [component_chart(histories, what, point) for what in ("displacement", "velocity", "strain", "stress")]
+    """Return charts of displacement, velocity, strain and stress at a watch point, each of its largest component."""
+    return [component_chart(histories, name, point) for name in ("displacement", "velocity", "strain", "stress")]
 
 
 def reaction_curves(histories: Histories, supports: list[str]) -> list[Chart]:
-    """Return the largest component of the reaction of every support."""
+    """Return one chart per support with the largest component of its reaction."""
     return [component_chart(histories, "reaction", support, support) for support in supports]
 
 
 def energy_curves(histories: Histories) -> list[Chart]:
-    """Return the nonzero terms of each solver's energy balance, and the balance relative to the largest energy."""
+    """Return charts of each solver's nonzero energies, and of the balance relative to the largest energy."""
     charts = []
     for solver, history in histories.items():
         time, largest = history["time"] / MILLI, _largest(history)
@@ -222,9 +218,16 @@ def energy_curves(histories: Histories) -> list[Chart]:
     return charts
 
 
-def component_chart(histories: Histories, quantity: str, place: str, title: str = "") -> Chart:
-    """Return one component of a vector or tensor: the one that is largest in the first history."""
-    name = f"{quantity}@{place}"
+def component_chart(histories: Histories, quantity: str, location: str, title: str = "") -> Chart:
+    """Return a chart of one component of a vector or tensor: the largest one in the first history.
+
+    Args:
+        histories: Histories of each solver.
+        quantity: Key of ``UNITS``.
+        location: Watch point or support.
+        title: Title of the chart.
+    """
+    name = f"{quantity}@{location}"
     first = next(iter(histories.values()))[name]
     component = int(np.argmax(np.abs(first).max(axis=0)))
     factor, prefix = _prefix(float(np.abs(first[:, component]).max()))
@@ -237,7 +240,7 @@ def component_chart(histories: Histories, quantity: str, place: str, title: str 
 
 
 def _prefix(largest: float) -> tuple[float, str]:
-    """Return the power of a thousand, and its prefix, with which a value reads between 1 and 1000."""
+    """Return the power of a thousand and its SI prefix that scale a value to between 1 and 1000."""
     return next(((factor, prefix) for factor, prefix in PREFIXES if largest >= factor), (1.0, ""))
 
 

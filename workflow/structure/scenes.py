@@ -1,4 +1,4 @@
-"""Scenes of a structure in 3D: how it deforms, its natural modes."""
+"""3D scenes of a structure: deformation and natural modes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ STRESS = "von Mises stress"
 
 
 def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float) -> Scene:
-    """Return the models of a structure at all stored times, at first the one next to a time [s]."""
+    """Return a scene with the models of a structure at all stored times, starting at the one nearest to a time [s]."""
     series = FieldSeries.read(models, ("part", "von_mises"), time)
     groups = _layers(series, parts, {STRESS: series.fields["von_mises"] / MEGA})
     size = float(np.linalg.norm(series.displacement, axis=2).max())
@@ -32,7 +32,7 @@ def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float)
 
 
 def modes_scene(path: Path, parts: Sequence[str], modes: Sequence[Mapping]) -> Scene:
-    """Return the shapes of natural modes, one a frame."""
+    """Return a scene with one natural mode per frame."""
     series = FieldSeries.read([path], ("part",))
     size = float(np.linalg.norm(series.displacement, axis=2).max()) or 1.0
     frames = [f"mode {mode['mode']}: {mode['frequency']:.1f} Hz" for mode in modes[: len(series.times)]]

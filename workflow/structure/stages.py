@@ -1,4 +1,4 @@
-"""The stages of a structure: its mesh, one run of the package fem for each solver, what its motion compares with."""
+"""Stages of a structure: its mesh, one run of the package ``fem`` for each solver, comparison with references."""
 
 import json
 from pathlib import Path
@@ -13,15 +13,15 @@ SOLVERS = ("explicit", "implicit", "dns")
 
 
 def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
-    """Run one solver on its MPI ranks, showing its progress.
+    """Run one solver on its MPI ranks and show its progress.
 
     Args:
-        run: run folder with the mesh, case, cores.
-        folder: where the solver's products go.
-        solver: one of ``SOLVERS``.
+        run: Run folder with the mesh, case and cores.
+        folder: Folder for the products of the solver.
+        solver: One of ``SOLVERS``.
 
     Raises:
-        LaunchError: the run failed; the message has its last words.
+        LaunchError: The run failed; the message contains its last lines.
     """
     request = {
         "mode": "structure",
@@ -41,8 +41,8 @@ def solver_folders(folder: Path) -> dict[str, Path]:
 def read_results(folder: Path) -> dict[str, dict]:
     """Return ``result.json`` of each solver that ran, explicit first."""
     return {
-        solver: json.loads((own / "result.json").read_text(encoding="utf-8"))
-        for solver, own in solver_folders(folder).items()
+        solver: json.loads((solver_folder / "result.json").read_text(encoding="utf-8"))
+        for solver, solver_folder in solver_folders(folder).items()
     }
 
 
@@ -57,14 +57,14 @@ def geometry(run: Run[StructureCase], folder: Path) -> Findings:
 
 
 def shock(run: Run[StructureCase], folder: Path) -> Findings:
-    """Move the structure: each solver is one MPI run of the package fem."""
+    """Compute the motion, one MPI run of the package ``fem`` for each solver."""
     for solver in run.case.dynamics.solvers:
         run_solver(run, folder / solver, solver)
     return structure_findings.of_motion(read_results(folder))
 
 
 def comparison(run: Run[StructureCase], folder: Path) -> Findings:
-    """Compare the motion with exact solutions and bounds, and two solvers with each other."""
-    found = structure_findings.of_comparison(run.case, solver_folders(run.folder / "shock"))
-    write_json(folder / "comparison.json", found.metrics)
-    return found
+    """Compare the motion with the references of the case, and the solvers with each other."""
+    result = structure_findings.of_comparison(run.case, solver_folders(run.folder / "shock"))
+    write_json(folder / "comparison.json", result.metrics)
+    return result

@@ -1,1 +1,1 @@
-"""Parametric studies: one case at many settings."""
+"""Parametric studies: one case with many settings. Start with `study_file.py` and `command.py`."""

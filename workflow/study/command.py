@@ -1,4 +1,4 @@
-"""The command study: reads the study, checks every point, computes what is missing, writes the results."""
+"""The command ``study``: read a study, check every point, compute missing products, write the results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,24 +18,24 @@ from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import adopt
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.main_effects import is_number
-from reflowshock.workflow.study.progress import outlook, teller
+from reflowshock.workflow.study.progress import forecast_stages, progress_reporter
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, Row, row_of
 from reflowshock.workflow.study.study_file import Study, read_study
 
 LAST = "report"
-WHAT = "study"  # its folder holds
-SHOWN = 10  # points of the ranking in the terminal
+CONTENT = "study"  # content of the folder, for its marker file
+RANKED_POINTS = 10  # points of the ranking in the terminal
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """The points of a study.
+    """Points of a study.
 
     Attributes:
-        study: the study.
-        settings: of each point.
-        possible: place in the study -> point.
-        impossible: place in the study -> what is wrong with its case.
+        study: Study.
+        settings: Settings of each point.
+        possible: Index of a point -> point with a valid case.
+        impossible: Index of a point -> error of its case.
     """
 
     study: Study
@@ -49,84 +49,85 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
 
     Args:
         path: TOML file.
-        oversubscribe: as `read_case` takes it.
-        force: likewise.
+        oversubscribe: Whether MPI may have more ranks than cores.
+        force: Whether implausible values are accepted.
 
     Raises:
-        CaseError: the study is wrong, or points of it cannot be and are not to be skipped.
+        CaseError: The study is invalid, or has invalid points that it does not skip.
     """
     study = read_study(path)
     settings = study.points
     points, impossible = read_possible_points(study.case, settings, oversubscribe, force)
     if impossible and not (study.about.skip_impossible and points):
         raise PointsError(str(path), impossible, settings)
-    places = [place for place in range(len(settings)) if place not in impossible]
-    return Points(study, settings, dict(zip(places, points, strict=True)), impossible)
+    indices = [index for index in range(len(settings)) if index not in impossible]
+    return Points(study, settings, dict(zip(indices, points, strict=True)), impossible)
 
 
-def show_outlook(points: Points, store: Store) -> None:
-    """Print what would be computed, and its predicted cost."""
-    every = list(points.possible.values())
-    stages = outlook(every, missing(store, every, LAST))
+def show_forecast(points: Points, store: Store) -> None:
+    """Print the products to compute with their predicted cost."""
+    possible = list(points.possible.values())
+    stages = forecast_stages(possible, missing(store, possible, LAST))
     table = new_table(
-        f"{points.study.about.name}: {len(every)} points, in {store.folder}",
+        f"{points.study.about.name}: {len(possible)} points, in {store.folder}",
         "stage",
         "products",
-        "there",
-        "to do",
+        "available",
+        "to compute",
         "cost",
     )
-    for own in stages:
-        cost = "" if own.seconds is None else f"about {duration(own.seconds)}"
-        table.add_row(own.stage, f"{own.products}", f"{own.products - own.missing}", f"{own.missing}", cost)
-    total = sum(own.seconds or 0.0 for own in stages)
-    count = sum(own.missing for own in stages)
+    for stage in stages:
+        cost = "" if stage.seconds is None else f"about {duration(stage.seconds)}"
+        available = stage.products - stage.missing
+        table.add_row(stage.stage, f"{stage.products}", f"{available}", f"{stage.missing}", cost)
+    total = sum(stage.seconds or 0.0 for stage in stages)
+    count = sum(stage.missing for stage in stages)
     table.add_row(
         "all",
-        f"{sum(own.products for own in stages)}",
-        f"{sum(own.products - own.missing for own in stages)}",
+        f"{sum(stage.products for stage in stages)}",
+        f"{sum(stage.products - stage.missing for stage in stages)}",
         f"{count}",
         f"about {duration(total)}" if total else "",
         style="bold",
     )
     console.print(table)
     if points.impossible:
-        console.print(f"{len(points.impossible)} points are not possible and are skipped")
+        console.print(f"{len(points.impossible)} points are impossible and are skipped")
 
 
 def predicted_study_seconds(points: Points, store: Store) -> float:
-    """Predict the wall time [s] of all that is missing of a study, one stage after the other."""
-    every = list(points.possible.values())
-    return sum(own.seconds or 0.0 for own in outlook(every, missing(store, every, LAST)))
+    """Predict the total wall time [s] of the missing products of a study, computed one after the other."""
+    possible = list(points.possible.values())
+    return sum(stage.seconds or 0.0 for stage in forecast_stages(possible, missing(store, possible, LAST)))
 
 
 def run_study(points: Points, store: Store, machine: Machine, *, force: bool = False) -> bool:
-    """Compute what is missing of a study and write its results.
+    """Compute the missing products of a study and write its results.
 
     Args:
-        points: of the study.
-        store: where products are.
-        machine: what they are computed with.
-        force: whether the folder may hold another study.
+        points: Points of the study.
+        store: Store of the products.
+        machine: Resources for the computation.
+        force: Whether the folder may hold another study.
 
     Returns:
-        Whether every point that can be is complete and healthy.
+        Whether every possible point is complete and healthy, and the metrics of the study exist.
 
     Raises:
-        CaseError: the folder must not, or cannot be written into.
-        RunFolderBusy: another process is at work in it.
+        CaseError: The folder belongs to something else or is not writable.
+        RunFolderBusy: Another process uses the folder.
     """
-    every, about = list(points.possible.values()), points.study.about
-    with locked(store.folder, WHAT, about.name, force) as lock:
-        jobs = missing(store, every, LAST)
+    possible, about = list(points.possible.values()), points.study.about
+    with locked(store.folder, CONTENT, about.name, force) as lock:
+        jobs = missing(store, possible, LAST)
         if jobs:
             with progress_bar(f"{about.name}: {len(jobs)} products to compute") as bar:
-                report = teller(store, every, jobs, bar, partial(warn_of_metrics, points, store))
+                report = progress_reporter(store, possible, jobs, bar, partial(warn_of_metrics, points, store))
                 watched = replace(machine, each_second=report)
-                failed = run_points(store, every, LAST, watched, lock)
+                failed = run_points(store, possible, LAST, watched, lock)
         else:
-            console.print(f"nothing to compute: {store.folder} has all {len(every)} points")
-            for point in every:
+            console.print(f"nothing to compute: {store.folder} has all {len(possible)} points")
+            for point in possible:
                 show_products(store, point)
             failed = {}
         rows = results(points, store, failed)
@@ -136,55 +137,60 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
 
 
 def _write_results(store: Store, study: Study, rows: Sequence[Row]) -> None:
-    """Write the results of a study beside its store; what a user has changed in earlier ones is set aside."""
+    """Write the results of a study next to its store; files that the user has changed are kept under another name."""
     from reflowshock.workflow.study.page import write_results
 
-    made = store.home / "work" / "results"
-    discard(made)
-    made.mkdir(parents=True)
-    write_results(made, study, rows)
-    adopt(store, store.folder, made)
-    discard(made)
+    folder = store.home / "work" / "results"
+    discard(folder)
+    folder.mkdir(parents=True)
+    write_results(folder, study, rows)
+    adopt(store, store.folder, folder)
+    discard(folder)
 
 
 def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
     """Return a row for each point, in the order of the study."""
     keys = points.study.design.keys
-    rows = [row_of(place + 1, store, point, keys, failed.get(point.key)) for place, point in points.possible.items()]
+    rows = [row_of(index + 1, store, point, keys, failed.get(point.key)) for index, point in points.possible.items()]
     rows += [
-        Row(place + 1, "", {key: points.settings[place][key] for key in keys}, IMPOSSIBLE, "; ".join(error.lines()))
-        for place, error in points.impossible.items()
+        Row(index + 1, "", {key: points.settings[index][key] for key in keys}, IMPOSSIBLE, "; ".join(error.lines()))
+        for index, error in points.impossible.items()
     ]
     return sorted(rows, key=lambda row: row.number)
 
 
 def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
-    """Say early which metrics of a study the first point that is complete does not have."""
+    """Warn of metrics of a study that the first complete point lacks, so that the user can stop early."""
     show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
-    known = _known(points.study, [row])
+    available = _metrics_of(points.study, [row])
     for name in points.study.metrics:
-        if name not in known:
-            hint = nearest(name, sorted(known))
+        if name not in available:
+            hint = nearest(name, sorted(available))
             suggestion = f"; did you mean {hint}?" if hint else "."
             print_error(
-                f"the first point has no {_sort(points.study, name)}metric {name}{suggestion} "
+                f"the first point has no {_required_type(points.study, name)}metric {name}{suggestion} "
                 "Ctrl-C stops the study and keeps results"
             )
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
-    """Whether points have the metrics of a study, the one that ranks as a number; tells those that they have not."""
-    known = _known(study, rows)
-    missing_ones = [name for name in study.metrics if known and name not in known]
-    for name in missing_ones:
-        hint = nearest(name, sorted(known))
-        print_error(f"no point has a {_sort(study, name)}metric {name}" + (f"; did you mean {hint}?" if hint else ""))
-    return not missing_ones
+    """Return whether the points have all metrics of a study, and print the missing ones.
+
+    The ranking metric must be a number.
+    """
+    available = _metrics_of(study, rows)
+    unavailable = [name for name in study.metrics if available and name not in available]
+    for name in unavailable:
+        hint = nearest(name, sorted(available))
+        print_error(
+            f"no point has a {_required_type(study, name)}metric {name}" + (f"; did you mean {hint}?" if hint else "")
+        )
+    return not unavailable
 
 
-def _known(study: Study, rows: Sequence[Row]) -> set[str]:
-    """Metrics of points that a study can show: numbers, and words but for the one that ranks."""
+def _metrics_of(study: Study, rows: Sequence[Row]) -> set[str]:
+    """Return the metrics of points that a study can use: numbers, and texts except for the ranking metric."""
     return {
         name
         for row in rows
@@ -193,15 +199,15 @@ def _known(study: Study, rows: Sequence[Row]) -> set[str]:
     }
 
 
-def _sort(study: Study, name: str) -> str:
+def _required_type(study: Study, name: str) -> str:
     return "numeric " if name == study.about.rank_by else ""
 
 
 def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
-    """Print the best points, the effects, and what went wrong."""
+    """Print the best points, the main effects, and failures."""
     ranking = tables.ranking(study, rows)
     if ranking["rows"]:
-        count = min(SHOWN, len(ranking["rows"]))
+        count = min(RANKED_POINTS, len(ranking["rows"]))
         title = f"{count} of {len(rows)} points by {study.about.rank_by}"
         console.print(text_table(title, ranking["head"], ranking["rows"][:count]))
         effects = tables.effect_table(tables.effects(study, rows))

@@ -1,4 +1,4 @@
-"""Designs: the settings of the points of a study, from grids, lists and Latin hypercubes. A factor varies as one."""
+"""Designs of experiments: the settings of the points of a study, from grids, lists and Latin hypercubes."""
 
 import json
 import math
@@ -15,47 +15,50 @@ from reflowshock.units import QUANTITY
 
 @dataclass(frozen=True, slots=True)
 class Hypercube:
-    """A random Latin hypercube: in each dimension one sample in each of as many equal parts of the unit interval.
+    """Random Latin hypercube of n samples: each of n equal parts of the unit interval has one sample in each dimension.
 
-    It is grown from the odd factor of its size by doubling: of the halves of each part one has a sample already, the
-    new samples take the others, in random order. So 2 n samples begin with the same n; any other size begins anew.
+    The hypercube grows by doubling from the odd factor of its size: each part is halved, and new samples fill the empty
+    halves in random order. So 2 n samples contain the n samples; sizes with another odd factor share no samples.
     """
 
     samples: int
     seed: int
 
     def shares(self, dimensions: int) -> np.ndarray:
-        """Return the samples (samples, dimensions), each in [0, 1)."""
+        """Return samples in [0, 1), shape (samples, dimensions)."""
         from scipy.stats import qmc
 
         size = self.samples // (self.samples & -self.samples)
-        found = qmc.LatinHypercube(dimensions, seed=np.random.default_rng((self.seed, size))).random(size)
+        shares = qmc.LatinHypercube(dimensions, seed=np.random.default_rng((self.seed, size))).random(size)
         while size < self.samples:
             random = np.random.default_rng((self.seed, 2 * size))
-            free = [np.setdiff1d(np.arange(2 * size), (2 * size * column).astype(int)) for column in found.T]
+            free = [np.setdiff1d(np.arange(2 * size), (2 * size * column).astype(int)) for column in shares.T]
             parts = np.stack([random.permutation(column) for column in free], axis=1)
-            found = np.concatenate([found, (parts + random.random((size, dimensions))) / (2 * size)])
+            shares = np.concatenate([shares, (parts + random.random((size, dimensions))) / (2 * size)])
             size *= 2
-        return found
+        return shares
 
 
 DIGITS = 6
 
 
 def as_text(value: object) -> str:
-    """Write a value of TOML as ``--set`` takes it: names, quantities and dates without quotes."""
+    """Write a TOML value in the form of ``--set``: names, quantities and dates without quotes."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False) if _is_toml(value) else value
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def between(low: object, high: object, share: float) -> str | None:
-    """Return the value at a share of a range, with six digits: a quantity, number or whole number; None if it is none.
+    """Return the value at a relative position in a range, with six digits.
 
     Args:
-        low: its beginning, e.g. "0.8 mm".
-        high: its end, in the same unit.
-        share: 0 to 1.
+        low: Lower end: a quantity such as "0.8 mm", a number or a whole number.
+        high: Upper end, in the same unit.
+        share: Relative position, 0 to 1.
+
+    Returns:
+        Text of the value; None if the ends do not form a range.
     """
     if isinstance(low, int) and isinstance(high, int) and not isinstance(low, bool) and not isinstance(high, bool):
         return str(min(low + int(share * (high - low + 1)), high))
@@ -78,14 +81,14 @@ def _is_toml(text: str) -> bool:
     return True
 
 
-MOST_POINTS = 10_000  # each a run
+MOST_POINTS = 10_000
 MOST_SAMPLED = 1_000_000  # values of a Latin hypercube
-VALUES = 'a list of values; of several keys ("a, b") each one value for all, or a list of one for each'
+VALUES = 'a list of values; for several keys ("a, b") each item is one value or a list with one value per key'
 RANGE = 'a range of two different values in the same unit, e.g. ["0.8 mm", "1 mm"]'
 
 
 class TooManyPoints(ValueError):
-    """A study of more points than are written down; holds their number."""
+    """Error of a study with too many points."""
 
     def __init__(self, count: int) -> None:
         super().__init__(f"would have {count} points")
@@ -93,11 +96,11 @@ class TooManyPoints(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """What is varied as one.
+    """Factor of a design.
 
     Attributes:
-        keys: dotted keys that change together; the first one names it.
-        continuous: whether its values are samples of a range; else there are a few.
+        keys: Dotted keys that vary together; the first one is the name of the factor.
+        continuous: Whether its values are samples of a range instead of a few levels.
     """
 
     keys: tuple[str, ...]
@@ -106,33 +109,38 @@ class Factor:
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """Factors, and the settings of each point, dotted key -> text."""
+    """Design of a study.
+
+    Attributes:
+        factors: Varied factors.
+        points: Settings of each point, dotted key -> text.
+    """
 
     factors: tuple[Factor, ...] = ()
     points: tuple[Mapping[str, str], ...] = ({},)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """All keys that vary."""
+        """Varied keys."""
         return tuple(key for factor in self.factors for key in factor.keys)
 
     @property
-    def given(self) -> tuple[str, ...]:
-        """All keys that points have, also those that do not vary; one that a factor has twice is there twice."""
+    def point_keys(self) -> tuple[str, ...]:
+        """Keys of the points, varied or not; a key that a factor has twice occurs twice."""
         fixed = dict.fromkeys(key for point in self.points for key in point if key not in self.keys)
         return self.keys + tuple(fixed)
 
     def __mul__(self, other: "Design") -> "Design":
-        """Each point of one with each of the other."""
-        points = tuple({**one, **two} for one, two in product(self.points, other.points))
+        """Return the design of all combinations of the points of two designs."""
+        points = tuple({**first, **second} for first, second in product(self.points, other.points))
         return Design(self.factors + other.factors, points)
 
     @classmethod
     def of(cls, *axes: "Design") -> "Design":
-        """Every combination of designs; of none the one point without settings.
+        """Return all combinations of designs; without arguments, one point without settings.
 
         Raises:
-            TooManyPoints: there are more than a study can have; they are counted first.
+            TooManyPoints: The number of combinations exceeds the limit.
         """
         count = math.prod(len(axis.points) for axis in axes)
         if count > MOST_POINTS:
@@ -164,29 +172,29 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
 
 
 def list_axis(rows: Sequence[Mapping[str, object]], problems: list[Problem]) -> Design:
-    """Return the design of ``[[list]]``; a factor is what is not the same in all rows."""
+    """Return the design of ``[[list]]``; its factors are the keys that differ between rows."""
     points = tuple({key: as_text(value) for key, value in row.items()} for row in rows)
-    for place, point in enumerate(points):
+    for index, point in enumerate(points):
         if missing := [key for key in points[0] if key not in point] + [key for key in point if key not in points[0]]:
             problems.append(
                 Problem(
-                    f"list.{missing[0]}", f"is not in all rows (see row {place + 1})", None, "the same keys in each"
+                    f"list.{missing[0]}", f"is not in all rows (see row {index + 1})", None, "the same keys in each"
                 )
             )
     varied = [key for key in points[0] if len({point.get(key) for point in points}) > 1]
     return Design(tuple(Factor((key,)) for key in varied or points[0]), points)
 
 
-def sampled(table: Mapping[str, object], cube: Hypercube, problems: list[Problem]) -> Design:
-    """Return the design of ``[latin_hypercube]``: ``"keys" = [low, high]``, one dimension each."""
+def sample_axis(table: Mapping[str, object], cube: Hypercube, problems: list[Problem]) -> Design:
+    """Return the design of ``[latin_hypercube]``; each line ``"keys" = [low, high]`` is one dimension."""
     factors = [Factor(_keys(text), continuous=True) for text in table]
     ranges = []
     for factor, (text, ends) in zip(factors, table.items(), strict=True):
-        found = _range(factor.keys, ends)
-        if found is None:
+        key_ranges = _range(factor.keys, ends)
+        if key_ranges is None:
             problems.append(Problem(f"latin_hypercube.ranges.{text}", "is not a range", ends, RANGE))
         else:
-            ranges.append(found)
+            ranges.append(key_ranges)
     if not table:
         problems.append(Problem("latin_hypercube.ranges", "is empty", None, RANGE))
     if len(factors) * cube.samples > MOST_SAMPLED:
@@ -211,19 +219,22 @@ def _keys(text: str) -> tuple[str, ...]:
 
 
 def _level(keys: Sequence[str], value: object) -> dict[str, str] | None:
-    """Return the settings of one value: of several keys a list with one for each, or one for all."""
+    """Return the settings of one value: a list with one value per key, or one value for all keys.
+
+    A list of the wrong length gives None.
+    """
     if len(keys) == 1 or not isinstance(value, list):
         return dict.fromkeys(keys, as_text(value))
-    return {key: as_text(own) for key, own in zip(keys, value, strict=True)} if len(value) == len(keys) else None
+    return {key: as_text(item) for key, item in zip(keys, value, strict=True)} if len(value) == len(keys) else None
 
 
 def _range(keys: Sequence[str], ends: object) -> dict[str, tuple[object, object]] | None:
-    """Return the range of each key; None where it is none."""
+    """Return the lower and upper end of each key; None for an invalid range."""
     if not isinstance(ends, list) or len(ends) != 2:
         return None
-    own = [end if isinstance(end, list) and len(keys) > 1 else [end] * len(keys) for end in ends]
-    if any(len(values) != len(keys) for values in own):
+    low, high = (end if isinstance(end, list) and len(keys) > 1 else [end] * len(keys) for end in ends)
+    if len(low) != len(keys) or len(high) != len(keys):
         return None
-    found = {key: (own[0][place], own[1][place]) for place, key in enumerate(keys)}
-    texts = [[between(*range_, share) for range_ in found.values()] for share in (0.0, 1.0)]
-    return None if None in texts[0] or texts[0] == texts[1] else found
+    ranges = {key: (low[index], high[index]) for index, key in enumerate(keys)}
+    texts = [[between(*range_, share) for range_ in ranges.values()] for share in (0.0, 1.0)]
+    return None if None in texts[0] or texts[0] == texts[1] else ranges

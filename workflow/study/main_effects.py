@@ -1,4 +1,4 @@
-"""Main effects: what a metric does with one factor, over all values of the others."""
+"""Main effects: dependence of a metric on one factor, averaged over the others, with Spearman's rank correlation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from reflowshock.workflow.study.results import Row, numbers
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A metric at one value of a factor.
+    """Metric at one value of a factor.
 
     Attributes:
-        value: of the factor, as the user wrote it.
-        mean: of the metric over all points with this value.
-        low: its least.
-        high: its largest.
+        value: Value of the factor as the user wrote it.
+        mean: Mean of the metric over all points with this value.
+        low: Smallest value of the metric.
+        high: Largest value of the metric.
     """
 
     value: str
@@ -28,15 +28,15 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class MainEffect:
-    """What a metric does with one factor.
+    """Main effect of a factor on a metric.
 
     Attributes:
-        factor: what varies.
-        unit: of its values; empty where they are no quantities.
-        values: (points,) the factor's values, numbers or names.
-        metrics: (points,) the metric, in SI.
-        rank_correlation: Spearman's, of points: 1 where the metric grows with the factor; None where this has no order.
-        probability: that chance alone would make it as large.
+        factor: Varied factor.
+        unit: Unit of the factor's values; empty if they are not quantities.
+        values: Values of the factor, numbers or names, one per point.
+        metrics: Values of the metric, shape (points,), in SI units.
+        rank_correlation: Spearman's rank correlation, 1 if the metric grows with the factor; None for names.
+        probability: Probability of a correlation at least as large by chance (p-value).
     """
 
     factor: Factor
@@ -48,12 +48,12 @@ class MainEffect:
 
     @property
     def levels(self) -> list[Level]:
-        """The metric at each of the factor's values, in their order."""
+        """Metric at each value of the factor, in their order."""
         distinct = sorted(set(self.values)) if self.is_ordered else list(dict.fromkeys(self.values))
-        chosen = [self.metrics[[own == value for own in self.values]] for value in distinct]
+        groups = [self.metrics[[other == value for other in self.values]] for value in distinct]
         return [
-            Level(f"{value:g}" if isinstance(value, float) else value, own.mean(), own.min(), own.max())
-            for value, own in zip(distinct, chosen, strict=True)
+            Level(f"{value:g}" if isinstance(value, float) else value, group.mean(), group.min(), group.max())
+            for value, group in zip(distinct, groups, strict=True)
         ]
 
     @property
@@ -63,7 +63,7 @@ class MainEffect:
 
     @property
     def size(self) -> float:
-        """How far the means at the factor's values lie apart; of samples of a range how far their linear trend goes."""
+        """Difference between the largest and smallest mean; for samples of a range, the change of the linear trend."""
         if self.factor.continuous and len(self.values) > 1:
             slope = np.polyfit(np.array(self.values, dtype=float), self.metrics, 1)[0]
             return float(abs(slope) * np.ptp(np.array(self.values, dtype=float)))
@@ -72,39 +72,39 @@ class MainEffect:
 
 
 def measured(rows: Sequence[Row], metric: str) -> list[Row]:
-    """Return the rows that have a metric that is a number."""
+    """Return the rows in which a metric is a number."""
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
 
 def is_number(value: object) -> bool:
-    """Whether a metric's value is one that can be ranked."""
+    """Return whether the value of a metric is a finite number."""
     return isinstance(value, float | int) and not isinstance(value, bool) and bool(np.isfinite(value))
 
 
 def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
-    """Return what a metric does with a factor.
+    """Return the main effect of a factor on a metric.
 
     Args:
-        factor: what varies.
-        rows: those that have the metric.
-        metric: its name.
+        factor: Varied factor.
+        rows: Points that have the metric.
+        metric: Name of the metric.
     """
     from scipy.stats import spearmanr
 
     unit, values = numbers([row.settings[factor.keys[0]] for row in rows])
-    found = np.array([float(row.metrics[metric]["value"]) for row in rows])
+    metrics = np.array([float(row.metrics[metric]["value"]) for row in rows])
     ordered = all(isinstance(value, float) for value in values)
     correlation = probability = None
-    if ordered and len(set(values)) > 1 and np.ptp(found) > 0.0 and len(rows) > 2:
-        result = spearmanr(np.array(values, dtype=float), found)
+    if ordered and len(set(values)) > 1 and np.ptp(metrics) > 0.0 and len(rows) > 2:
+        result = spearmanr(np.array(values, dtype=float), metrics)
         correlation, probability = float(result.statistic), float(result.pvalue)
     named = tuple(value if isinstance(value, float) else str(value) for value in values)
-    return MainEffect(factor, unit, named, found, correlation, probability)
+    return MainEffect(factor, unit, named, metrics, correlation, probability)
 
 
 def ranked(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
-    """Return the healthy rows that have a metric, best first."""
+    """Return the healthy rows in which a metric is a number, the best first; the goal is "minimise" or "maximise"."""
     from reflowshock.workflow.study.results import HEALTHY
 
-    found = [row for row in measured(rows, metric) if row.verdict == HEALTHY]
-    return sorted(found, key=lambda row: row.metrics[metric]["value"], reverse=goal == "maximise")
+    healthy = [row for row in measured(rows, metric) if row.verdict == HEALTHY]
+    return sorted(healthy, key=lambda row: row.metrics[metric]["value"], reverse=goal == "maximise")

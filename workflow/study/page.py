@@ -1,4 +1,4 @@
-"""study.html, main_effects.png, process_map.png, results.csv and results.parquet of a study."""
+"""Result files of a study: study.html, main_effects.png, process_map.png, results.csv and results.parquet."""
 
 import base64
 from collections.abc import Sequence
@@ -25,19 +25,19 @@ def write_results(folder: Path, study: Study, rows: Sequence[Row]) -> None:
     """Write all results of a study.
 
     Args:
-        folder: where they go.
-        study: what was varied.
-        rows: one a point.
+        folder: Folder to write to.
+        study: Study.
+        rows: Results, one row per point.
     """
     table = columns(rows, study)
     write_csv(folder / "results.csv", table)
     write_parquet(folder / "results.parquet", table)
-    found = tables.effects(study, rows)
-    pictures = {"picture": _picture(folder, found), "map": _map(folder, study, rows)}
-    write_page(folder / "study.html", "study.html.j2", _context(study, rows, found) | pictures)
+    effects = tables.effects(study, rows)
+    pictures = {"picture": _picture(folder, effects), "map": _map(folder, study, rows)}
+    write_page(folder / "study.html", "study.html.j2", _context(study, rows, effects) | pictures)
 
 
-def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
+def _context(study: Study, rows: Sequence[Row], effects: list) -> dict:
     healthy = sum(row.verdict == HEALTHY for row in rows)
     return {
         "version": __version__,
@@ -46,7 +46,7 @@ def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
         "count": len(rows),
         "healthy": healthy,
         "ranking": tables.ranking(study, rows),
-        "effects": tables.effect_table(found),
+        "effects": tables.effect_table(effects),
         "imbalance": tables.imbalance(rows),
         "troubles": tables.troubles(rows),
         "continuous": any(factor.continuous for factor in study.design.factors),
@@ -54,15 +54,15 @@ def _context(study: Study, rows: Sequence[Row], found: list) -> dict:
     }
 
 
-def _picture(folder: Path, found: list) -> str:
-    """Draw main effects into a PNG; return it in base64. Nothing where no point has a metric."""
-    return _saved(main_effects(found), folder / "main_effects.png") if found else ""
+def _picture(folder: Path, effects: list) -> str:
+    """Write the main effects as PNG and return it in base64; return an empty text without effects."""
+    return _saved(main_effects(effects), folder / "main_effects.png") if effects else ""
 
 
 def _map(folder: Path, study: Study, rows: Sequence[Row]) -> str:
-    """Draw a process map where a metric of the study is told in words, as ``_picture``."""
-    metric, told = outcomes(study, rows)
-    figure = process_map(study, metric, told) if told else None
+    """Write a process map as PNG and return it in base64, if a metric of the study has texts as values."""
+    metric, described = outcomes(study, rows)
+    figure = process_map(study, metric, described) if described else None
     return "" if figure is None else _saved(figure, folder / "process_map.png")
 
 
@@ -74,10 +74,10 @@ def _saved(figure: Figure, path: Path) -> str:
 
 
 def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Figure:
-    """Draw main effects: means at each value of a factor with least and largest, or samples with their trend.
+    """Draw main effects: mean and range at each value of a factor, or samples with their linear trend.
 
     Args:
-        effects: metric, its unit, its effects: a row of panels each.
+        effects: Metric, its unit and its main effects; each item is a row of panels.
     """
     columns = max(len(row) for _, _, row in effects)
     with pyplot.rc_context(STYLE):
@@ -85,33 +85,34 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
             len(effects), columns, squeeze=False, sharey="row", layout="constrained",
             figsize=(max(2.5 * columns, 4.0), 2.5 * len(effects)),
         )  # fmt: skip
-        for row, (metric, unit, own) in zip(axes, effects, strict=True):
-            factor, shown = readable(unit, max(float(np.abs(effect.metrics).max()) for effect in own))
-            row[0].set_ylabel(f"{metric.replace('_', ' ')} [{shown}]" if shown else metric.replace("_", " "))
-            for axis, effect in zip(row, own, strict=False):
+        for row, (metric, unit, metric_effects) in zip(axes, effects, strict=True):
+            largest = max(float(np.abs(effect.metrics).max()) for effect in metric_effects)
+            factor, label = readable(unit, largest)
+            row[0].set_ylabel(f"{metric.replace('_', ' ')} [{label}]" if label else metric.replace("_", " "))
+            for axis, effect in zip(row, metric_effects, strict=False):
                 (_samples if effect.factor.continuous and effect.is_ordered else _means)(axis, effect, factor)
                 axis.set_xlabel(axis_title(effect))
         return figure
 
 
 def axis_title(effect: MainEffect) -> str:
-    """Name a factor in two lines that fit a panel, with the unit that the study gives its values in."""
+    """Return the name of a factor in two lines, with the unit of its values in the study."""
     table, _, name = effect.factor.keys[0].rpartition(".")
     return f"{table}\n{name} [{spelled(effect.unit)}]" if effect.unit else f"{table}\n{name}"
 
 
 def _means(axis: Axes, effect: MainEffect, factor: float) -> None:
     levels = effect.levels
-    places = np.arange(len(levels))
+    positions = np.arange(len(levels))
     mean, low, high = (
         factor * np.array([getattr(level, name) for level in levels]) for name in ("mean", "low", "high")
     )
     at = [[level.value for level in levels].index(_name(value)) for value in effect.values]
     axis.plot(at, factor * effect.metrics, "_", color=GREY, markersize=9, zorder=3)
     axis.errorbar(
-        places, mean, [mean - low, high - mean], color=BLUE, marker="o", markersize=4, capsize=3, linewidth=1.4
+        positions, mean, [mean - low, high - mean], color=BLUE, marker="o", markersize=4, capsize=3, linewidth=1.4
     )
-    axis.set_xticks(places, [level.value for level in levels])
+    axis.set_xticks(positions, [level.value for level in levels])
     axis.margins(x=0.15)
 
 

@@ -1,4 +1,4 @@
-"""How far a study is: what will be computed; points done, points failed, time left."""
+"""Progress of a study: forecast of its products; completed and failed points; remaining time."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -12,30 +12,30 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 
 
-def teller(
+def progress_reporter(
     store: Store,
     points: Sequence[Point],
     jobs: Sequence[Job],
     bar: ProgressBar,
     at_first: Callable[[Point], None] = lambda _: None,
 ) -> Callable[[], None]:
-    """Return what tells a progress bar, when called, how far a study is; without a terminal a line for each point.
+    """Return a function that updates a progress bar, or without a terminal prints a line for each completed point.
 
-    Time left: each missing product takes as long as the mean of those of its stage that were made since the start, and
-    as many are made at a time as so far.
+    The remaining time assumes that a missing product takes as long as the mean product of its stage so far, and that
+    the number of parallel jobs stays the same.
 
     Args:
-        store: where products are made.
-        points: all of them.
-        jobs: the products that are missing.
-        bar: the progress bar.
-        at_first: called with the first point that is complete, once.
+        store: Store of the products.
+        points: All points.
+        jobs: Missing products.
+        bar: Progress bar.
+        at_first: Function that is called once, with the first complete point.
     """
     begin = time.monotonic()
     first = [at_first]
-    waiting, seconds, shown = list(jobs), dict[str, list[float]](), [""]
+    waiting, seconds, printed = list(jobs), dict[str, list[float]](), [""]
 
-    def tell() -> None:
+    def report() -> None:
         for job in [job for job in waiting if store.has(job.point, job.stage)]:
             record = store.record(job.point, job.stage)
             seconds.setdefault(job.stage, []).append(record["seconds"] if record else 0.0)
@@ -50,39 +50,39 @@ def teller(
         words = f"{len(done)} of {len(points)} points done, {failed} failed"
         line = words if left is None else f"{words}, about {duration(left)} left"
         bar(1.0 - len(waiting) / len(jobs), line)
-        if not console.is_terminal and words != shown[0]:
+        if not console.is_terminal and words != printed[0]:
             console.print(f"       {line}")
-        shown[0] = words
+        printed[0] = words
 
-    return tell
+    return report
 
 
 def seconds_left(waiting: Sequence[str], done: dict[str, list[float]], elapsed: float) -> float | None:
-    """Return the wall time [s] that the rest will take; None before anything is done.
+    """Return the remaining wall time [s]; None before the first product.
 
     Args:
-        waiting: stages of the products that are missing.
-        done: stage -> wall times [s] of its products made so far.
-        elapsed: wall time [s] in which they were made.
+        waiting: Stages of the missing products.
+        done: Stage -> wall times of its products so far [s].
+        elapsed: Wall time in which these were computed [s].
     """
-    every = [value for own in done.values() for value in own]
-    if not every:
+    times = [value for stage_times in done.values() for value in stage_times]
+    if not times:
         return None
-    mean = sum(every) / len(every)
-    rest = sum(sum(own) / len(own) if (own := done.get(stage)) else mean for stage in waiting)
-    return rest * elapsed / max(sum(every), 1e-9)
+    mean = sum(times) / len(times)
+    rest = sum(sum(stage_times) / len(stage_times) if (stage_times := done.get(stage)) else mean for stage in waiting)
+    return rest * elapsed / max(sum(times), 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
-class StageOutlook:
-    """Products of one stage.
+class StageForecast:
+    """Forecast of the products of one stage.
 
     Attributes:
-        stage: its name.
-        points: number of points that need one.
-        products: number of distinct ones.
-        missing: number of those that will be computed.
-        seconds: wall time [s] predicted for these, one after the other; None where there is no forecast.
+        stage: Name of the stage.
+        points: Number of points that need a product.
+        products: Number of distinct products.
+        missing: Number of products to compute.
+        seconds: Predicted wall time of the missing products, computed one after the other [s]; None without a forecast.
     """
 
     stage: str
@@ -92,18 +92,19 @@ class StageOutlook:
     seconds: float | None
 
 
-def outlook(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageOutlook]:
-    """Predict what a study will compute.
+def forecast_stages(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageForecast]:
+    """Predict the products of a study and their cost, stage by stage.
 
     Args:
-        points: all of them.
-        jobs: the products that are missing.
+        points: All points.
+        jobs: Missing products.
     """
-    found = []
+    forecasts = []
     for stage in dict.fromkeys(name for point in points for name in point.case.pipeline.names):
-        wanted = [point.digests[stage] for point in points if stage in point.digests]
-        own = [job for job in jobs if job.stage == stage]
-        seconds = [stage_seconds(job.point.case).get(stage) for job in own]
-        known = [value for value in seconds if value is not None]
-        found.append(StageOutlook(stage, len(wanted), len(set(wanted)), len(own), sum(known) if known else None))
-    return found
+        digests = [point.digests[stage] for point in points if stage in point.digests]
+        stage_jobs = [job for job in jobs if job.stage == stage]
+        predicted = [stage_seconds(job.point.case).get(stage) for job in stage_jobs]
+        times = [seconds for seconds in predicted if seconds is not None]
+        total = sum(times) if times else None
+        forecasts.append(StageForecast(stage, len(digests), len(set(digests)), len(stage_jobs), total))
+    return forecasts

@@ -1,4 +1,4 @@
-"""Results of a study: one row a point; the same columns as CSV and as Parquet, units in their names."""
+"""Results of a study: one row per point, with the same columns in CSV and Parquet; column names have units."""
 
 import csv
 import json
@@ -15,21 +15,21 @@ from reflowshock.workflow.study.study_file import Study
 
 HEALTHY, UNHEALTHY, FAILED, IMPOSSIBLE = "healthy", "unhealthy", "failed", "impossible"
 Value = str | float | int | bool | None
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a formula of a spreadsheet begins
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What became of a point.
+    """Result of a point.
 
     Attributes:
-        number: its place in the study, from 1.
-        key: of its run folder; empty where its case is impossible.
-        settings: what varies, dotted key -> text.
-        verdict: "healthy", "unhealthy" (a check did not hold), "failed" or "impossible".
-        message: which check, why it failed, what is wrong with its case.
-        seconds: wall time of all its stages, shared ones included; None where it is not complete.
-        metrics: name -> {"value", "unit"}.
+        number: Number of the point in the study, from 1.
+        key: Key of its run folder; empty if its case is impossible.
+        settings: Varied settings, dotted key -> text.
+        verdict: "healthy", "unhealthy" (a health check failed), "failed" or "impossible".
+        message: Failed checks, failure, or error of its case.
+        seconds: Wall time of all its stages including shared ones [s]; None if the point is incomplete.
+        metrics: Metric -> {"value", "unit"}.
     """
 
     number: int
@@ -42,7 +42,7 @@ class Row:
 
     @property
     def report(self) -> str:
-        """Its report, relative to the folder of the study."""
+        """Path of the report relative to the folder of the study; empty without one."""
         return f"points/{self.key}/report.html" if self.verdict in (HEALTHY, UNHEALTHY) else ""
 
 
@@ -50,33 +50,33 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
     """Return the row of a point.
 
     Args:
-        number: its place in the study.
-        store: where its products are.
-        point: the point.
-        keys: those that vary.
-        failure: why it is not complete; None where it is.
+        number: Number of the point in the study.
+        store: Store of its products.
+        point: Point.
+        keys: Varied keys.
+        failure: Message of its failure; None if the point is complete.
     """
-    shown = display_values(point.case)
-    settings = {key: shown.get(key, point.settings[key]) for key in keys}
+    texts = display_values(point.case)
+    settings = {key: texts.get(key, point.settings[key]) for key in keys}
     if failure is not None:
         return Row(number, point.key, settings, FAILED, failure)
     summary = json.loads((store.run_folder(point) / "summary.json").read_text(encoding="utf-8"))
-    missed = [_check(name, check) for name, check in summary["health"].items() if not check["ok"]]
+    failed_checks = [_check(name, check) for name, check in summary["health"].items() if not check["ok"]]
     return Row(
         number,
         point.key,
         settings,
-        UNHEALTHY if missed else HEALTHY,
-        "; ".join(missed),
+        UNHEALTHY if failed_checks else HEALTHY,
+        "; ".join(failed_checks),
         sum(summary["timings"].values()),
         summary["metrics"],
     )
 
 
 def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
-    """Return the results by column; a unit stands in brackets after the name, metrics are in SI units.
+    """Return the results by column; the name ends with the unit in brackets, metrics are in SI units.
 
-    Columns about points have names that no metric has: a drop's metrics have a ``verdict``, and ``seconds``.
+    Columns on points have names that differ from all metrics, since metrics include ``verdict`` and ``seconds``.
     """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}
@@ -95,9 +95,8 @@ def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
 
 
 def numbers(texts: Sequence[str]) -> tuple[str, list[Value]]:
-    """Return quantities of one unit as numbers and this unit; other values as they are, without one."""
-    found = [QUANTITY.fullmatch(text) for text in texts]
-    matches = [match for match in found if match is not None]
+    """Return the common unit of quantities and their numbers; without a common unit, an empty unit and the texts."""
+    matches = [match for text in texts if (match := QUANTITY.fullmatch(text)) is not None]
     units = {match["unit"] for match in matches}
     if len(matches) < len(texts) or len(units) != 1:
         return "", list(texts)
@@ -105,9 +104,9 @@ def numbers(texts: Sequence[str]) -> tuple[str, list[Value]]:
 
 
 def write_csv(path: Path, table: Mapping[str, Sequence[Value]]) -> None:
-    """Write columns as CSV, the first line has their names; what is missing is empty.
+    """Write columns as CSV with their names in the first line; missing values are empty.
 
-    A text that a spreadsheet would take for a formula has an apostrophe in front, as such programs write it.
+    An apostrophe precedes a text that a spreadsheet would evaluate as a formula.
     """
     partial = path.with_suffix(".partial")
     with partial.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
@@ -122,17 +121,19 @@ def _no_formula(value: Value) -> Value:
 
 
 def write_parquet(path: Path, table: Mapping[str, Sequence[Value]]) -> None:
-    """Write columns as Parquet; what is missing is null."""
+    """Write columns as Parquet; missing values are null."""
     import pyarrow
     from pyarrow import parquet
 
     partial = path.with_suffix(".partial")
-    parquet.write_table(pyarrow.table({name: pyarrow.array(_alike(values)) for name, values in table.items()}), partial)
+    parquet.write_table(
+        pyarrow.table({name: pyarrow.array(_uniform(values)) for name, values in table.items()}), partial
+    )
     partial.replace(path)
 
 
-def _alike(values: Sequence[Value]) -> list[Value]:
-    """Return values of one type: whole numbers among others become floats, all else text."""
+def _uniform(values: Sequence[Value]) -> list[Value]:
+    """Return values of one type: mixed numbers become floats, other mixed values texts."""
     types = {type(value) for value in values if value is not None}
     if len(types) < 2:
         return list(values)

@@ -1,4 +1,4 @@
-"""A study file: which case, at which settings, ranked by what."""
+"""Study file: a case, its fixed and varied settings, and the metric that ranks the points."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -25,14 +25,14 @@ from reflowshock.workflow.study.designs import (
     as_text,
     grid_axes,
     list_axis,
-    sampled,
+    sample_axis,
 )
 
 DESIGNS = "at least one of [grid], [[list]], [latin_hypercube]"
 
 
 class StudyTable(Parameters):
-    """What the table ``[study]`` says: the case, relative to the file, and what is made of the results."""
+    """Table ``[study]``: the case, relative to the study file, and the evaluation of the results."""
 
     name: Name
     title: str = ""
@@ -45,7 +45,7 @@ class StudyTable(Parameters):
 
 
 class LatinHypercubeTable(Parameters):
-    """A Latin hypercube: each parameter once in each of ``samples`` equal parts of its range."""
+    """Table ``[latin_hypercube]``: each parameter has one sample in each of ``samples`` equal parts of its range."""
 
     samples: int = Field(ge=1, le=10000)
     seed: int = Field(0, ge=0)
@@ -53,7 +53,7 @@ class LatinHypercubeTable(Parameters):
 
 
 class StudyFile(Parameters):
-    """The tables of a study file."""
+    """Tables of a study file."""
 
     study: StudyTable
     settings: dict[str, Any] = Field(default_factory=dict)
@@ -64,13 +64,13 @@ class StudyFile(Parameters):
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A study.
+    """Parametric study.
 
     Attributes:
-        about: name, title, metrics.
-        case: the case file.
-        settings: of all points, dotted key -> text.
-        design: what varies.
+        about: Table ``[study]``: name, title, metrics.
+        case: Case file.
+        settings: Settings of all points, dotted key -> text.
+        design: Varied settings.
     """
 
     about: StudyTable
@@ -80,7 +80,7 @@ class Study:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """The metrics that are plotted: first the one that points are ranked by."""
+        """Metrics to plot; the first one ranks the points."""
         return tuple(dict.fromkeys((self.about.rank_by, *self.about.metrics)))
 
     @property
@@ -90,10 +90,10 @@ class Study:
 
 
 def read_study(path: Path) -> Study:
-    """Read and check a study file; its case is read with its points.
+    """Read and check a study file, without its case.
 
     Raises:
-        CaseError: with all problems found.
+        CaseError: The file is invalid; the error lists all problems.
     """
     text = read_text(path)
     try:
@@ -103,12 +103,12 @@ def read_study(path: Path) -> Study:
 
 
 def _study(path: Path, table: dict) -> Study:
-    """Return the study of a table; errors as ``read_study``, without their places."""
+    """Return the study of a table; raise the errors of `read_study` without line numbers."""
     if "study" not in table and any(kind in table for kind in NAMES):
         raise CaseError(str(path), [Problem("", "is a case, not a study; use reflowshock plan or run")])
     values = table | ({"list": tuple(table["list"])} if isinstance(table.get("list"), list) else {})
-    if isinstance(given := table.get("study"), dict) and isinstance(given.get("metrics"), list):
-        values["study"] = given | {"metrics": tuple(given["metrics"])}
+    if isinstance(about := table.get("study"), dict) and isinstance(about.get("metrics"), list):
+        values["study"] = about | {"metrics": tuple(about["metrics"])}
     try:
         file = StudyFile.model_validate(values, strict=True)
     except ValidationError as error:
@@ -133,13 +133,13 @@ def _study(path: Path, table: dict) -> Study:
 
 
 def _design(file: StudyFile, problems: list[Problem]) -> Design:
-    """Every combination of the grid with every row of the list and every sample."""
+    """Return every combination of the grid, the rows of the list and the samples."""
     axes = list(grid_axes(dict(dotted(file.grid)), problems))
     if file.list:
         axes.append(list_axis([dict(dotted(row)) for row in file.list], problems))
     if file.latin_hypercube is not None:
         cube = file.latin_hypercube
-        axes.append(sampled(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems))
+        axes.append(sample_axis(dict(dotted(cube.ranges)), Hypercube(cube.samples, cube.seed), problems))
     try:
         design = Design.of(*axes)
     except TooManyPoints as error:
@@ -147,7 +147,7 @@ def _design(file: StudyFile, problems: list[Problem]) -> Design:
         return Design()
     problems += [
         Problem(key, "is given twice", None, "one place in [grid], [[list]] or ranges")
-        for key, count in Counter(key for axis in axes for key in axis.given).items()
+        for key, count in Counter(key for axis in axes for key in axis.point_keys).items()
         if count > 1
     ]
     if not design.factors and not problems:

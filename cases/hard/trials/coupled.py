@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.fem.coupling.gravouil_combescure import GravouilCombescure
-from reflowshock.fem.coupling.held_velocity import Answered
+from reflowshock.fem.coupling.held_velocity import ForceReceiver
 from reflowshock.fem.coupling.impulse import Impulse
 from reflowshock.fem.coupling.scheme import Scheme
 from reflowshock.fem.division.checks import check_division
@@ -218,7 +218,7 @@ class Coupled:
         elif pushed:
             self.meso.interface_force()[meso.body.interface] = macro.force[macro.body.interface]
             meso.force += self.meso.foreign_force()
-        elif isinstance(self.macro, Answered):
+        elif isinstance(self.macro, ForceReceiver):
             self._channels.forces.send(meso.force)
             work = self.macro.interface_work
             self.macro.take_force()

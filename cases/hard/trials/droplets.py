@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 from reflowshock.arrays import Floats
 from reflowshock.cases.hard.trial import Trial, pure_trial
 from reflowshock.parameters import Parameters, changed
-from reflowshock.particles.parameters.droplets import Droplet, cap
-from reflowshock.particles.parameters.flows import DamBreak
-from reflowshock.particles.parameters.printing import Printing
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.droplet import Droplet, cap
+from reflowshock.particles.flows.printing import Printing
 from reflowshock.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ class Watch:
 
 def droplet(parameters: DropletTrial) -> dict[str, float]:
     """Let one droplet or two move."""
-    from reflowshock.particles.scenes.droplet import follow
+    from reflowshock.particles.sph_flows.droplet import follow
 
     scene, simulation = parameters.droplet, droplets(parameters)
     watch, count = Watch(simulation), 1 + (parameters.pair != "none")
@@ -159,9 +159,9 @@ def droplet(parameters: DropletTrial) -> dict[str, float]:
 
 def droplets(parameters: DropletTrial) -> "Simulation":
     """Set up one droplet or two, and their disorder."""
-    from reflowshock.particles.scenes.droplet import droplet as alone
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
+    from reflowshock.particles.sph_flows.droplet import droplet as alone
     from reflowshock.particles.surface.remeshing import EDGE
 
     scene = parameters.droplet
@@ -223,9 +223,9 @@ def tank(parameters: TankTrial) -> dict[str, float]:
 
 
 def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
-    from reflowshock.particles.scenes.dam_break import dam, particles_lost
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
+    from reflowshock.particles.sph_flows.dam_break import dam, particles_lost
 
     scene = parameters.dam_break
     one = dam(scene)

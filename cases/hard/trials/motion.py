@@ -13,7 +13,7 @@ from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import Tables, prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
-from reflowshock.fem.dynamics.participant import Alone, explicit_motion
+from reflowshock.fem.dynamics.participant import SingleModel, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -57,7 +57,7 @@ def flight(given: Flight) -> dict[str, float]:
     body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(given.kinematics, step))
     loads: list[Load] = []
     if given.mass_damping or stiffness:
-        loads.append(RayleighDamping.build(body, (given.mass_damping / step, stiffness)))
+        loads.append(RayleighDamping.build(body, given.mass_damping / step, stiffness))
     motion = explicit_motion(body, loads, step)
     random_start(motion, given.seed)
     found = watched(motion, given, EnergyBalance(limit=BALANCE, trivial=0.0, step=step, critical=critical))
@@ -99,7 +99,7 @@ def watched(motion: ExplicitMotion, given: Flight, balance: EnergyBalance) -> di
     """Take the steps with looks at the energies; return errors; errors as ``flight``."""
     steps = min(LOOK, given.steps)
     looks = given.steps // steps
-    participant = Alone(motion, WindowPlan(steps * motion.step, steps, looks, 1))
+    participant = SingleModel(motion, WindowPlan(steps * motion.step, steps, looks, 1))
     balance.judge(energy_sums(participant, 0.0), 0.0)
     first, error = momentum(motion, given.kinematics == "finite"), np.zeros(2)
     scale = momentum_scale(motion)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, surveyed
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.coupling.held_velocity import Answered, HeldVelocity, HeldVelocityMacro
+from reflowshock.fem.coupling.held_velocity import ForceReceiver, HeldVelocity, HeldVelocityMacro
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
@@ -143,4 +143,4 @@ class PrintedMacro(HeldVelocityMacro):
         """Start at rest; a ``Meso`` must have sent the interface mass."""
         channels.forces.receive(np.zeros((len(body.mass), 3)))
         motion = ExplicitMotion(body, loads, plan.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
-        Answered.__init__(self, motion, plan, channels)
+        ForceReceiver.__init__(self, motion, plan, channels)

@@ -12,8 +12,8 @@ from reflowshock.cases.hard.trials.pairs import FRACTION, SCHEMES, SIZE, Pair
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.mesh.mesh import MeshData, append
+from reflowshock.fem.parallel.checkpoint_state import values
 from reflowshock.fem.parallel.exchange import InterfaceChannels
-from reflowshock.fem.parallel.portable import values
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.materials.elasticity import elasticity_matrix
 from reflowshock.materials.library import FR4, SAC405

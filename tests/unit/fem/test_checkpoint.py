@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from reflowshock.fem.coupling.planner import KEPT, kept
+from reflowshock.fem.coupling.planner import COST_FILE, stored_costs
 from reflowshock.fem.parallel.checkpoint import Checkpoints
-from reflowshock.fem.parallel.portable import Log, Rows, Same, Shares, Sum
+from reflowshock.fem.parallel.checkpoint_state import Log, Rows, Same, Shares, Sum
 from reflowshock.fem.run import time_loop
 from reflowshock.fem.run.structure import run_structure
 from tests.support.fem_structures import structure_input
@@ -40,7 +40,7 @@ def written(folder) -> Checkpoints:
     files = checkpoints(folder)
     files.read(state(0))
     for window in (3, 5):
-        files.keep(f"macro-{window}", {"macro": {"time": Same(window)}})
+        files.store(f"macro-{window}", {"macro": {"time": Same(window)}})
         files.write(window, 0.5 * window, state(window))
     return files
 
@@ -62,7 +62,7 @@ def test_a_state_comes_back_as_it_was(tmp_path):
     assert found["history"]["balance"] == {"limit": 0.01}
     assert (found["macro"]["displacement"] == 5.0).all()
     assert found["macro"]["work"] == 0.5
-    assert files.kept("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
+    assert files.stored("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
 
 
 @pytest.mark.parametrize("pattern", ["*/state-0000-1", "*/macro-5-0000"])
@@ -116,6 +116,6 @@ def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeyp
 
 @pytest.mark.parametrize("content", [b"", b"[1, 2]", b'{"fixed": [1.0]', b'{"fixed": 1, "element": [], "latency": 0}'])
 def test_a_broken_measurement_of_speeds_is_taken_again(tmp_path, capsys, content):
-    (tmp_path / KEPT).write_bytes(content)
-    assert kept(MPI.COMM_WORLD, tmp_path, np.array([0], np.int8)) is None
+    (tmp_path / COST_FILE).write_bytes(content)
+    assert stored_costs(MPI.COMM_WORLD, tmp_path, np.array([0], np.int8)) is None
     assert "measured again" in warnings(capsys.readouterr().out)[0]

@@ -63,7 +63,7 @@ def moving_bar(
     counted = np.zeros_like(body.shared.owned)
     counted[owned] = True
     body.shared.owned[:] = counted
-    damping = RayleighDamping.build(body, coefficients)
+    damping = RayleighDamping.build(body, *coefficients)
     motion = motion_of(body, 0.5 * critical, [damping, BodyAcceleration(GRAVITY, Constant(1e6))])
     free = motion.mobility > 0.0
     motion.velocity[:] = np.where(free, np.random.default_rng(3).uniform(-1, 1, free.shape), 0.0)

@@ -113,7 +113,7 @@ def test_strong_stiffness_damping_leaves_held_velocity(mesh):
 
 def test_yielding_solder_is_no_business_of_local_steps(mesh):
     parts = scene(mesh, YIELDING, scheme="local_steps")
-    refused(parts, divide(*parts), r"elements of solder have a path; held_velocity or gravouil_combescure")
+    refused(parts, divide(*parts), r"elements of solder are not; use held_velocity or gravouil_combescure")
 
 
 def test_window_above_the_elements_step_is_refused(mesh):
@@ -127,4 +127,4 @@ def test_board_that_is_all_buffer_is_refused(mesh):
     parts = scene(mesh, scheme="held_velocity", buffer_layers=20)
     division = divide(*parts)
     assert steps_of_division(*parts[:2], division, parts[2]).macro_critical > 0.0
-    refused(parts, division, r"nothing is left for the macro model: .*20 layers")
+    refused(parts, division, r"the macro model is empty: .*20 layers")

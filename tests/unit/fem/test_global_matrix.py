@@ -63,7 +63,7 @@ def test_mass_is_the_lumped_mass(tied):
 def test_supports_that_hold_everything():
     body, _ = dns_body(bar(0.1, 3, 0.01), STEEL)
     body.free[:] = False
-    with pytest.raises(ValueError, match="the supports hold every node"):
+    with pytest.raises(ValueError, match="the supports fix every node"):
         Equations.of(MPI.COMM_SELF, body)
 
 

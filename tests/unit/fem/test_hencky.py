@@ -114,7 +114,7 @@ def test_tetrahedra_are_refused():
     cells = np.arange(4, dtype=np.int32)[None]
     matrix = elasticity_matrix(FR4)[None]
     elements = Elements(points, cells, np.zeros(1, np.int32), matrix, np.ones(1), element_kind(4))
-    with pytest.raises(MeshError, match="needs hexahedra, not tetrahedron"):
+    with pytest.raises(MeshError, match="available for hexahedra, not tetrahedron"):
         HenckyElements.build(elements, [FR4], np.zeros((1, 3)))
 
 

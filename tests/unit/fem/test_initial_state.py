@@ -13,7 +13,7 @@ from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
-from reflowshock.fem.parallel import portable
+from reflowshock.fem.parallel import checkpoint_state
 from reflowshock.fem.run.cooling import pins, rigid_motions
 from reflowshock.materials.library import FR4, SAC405, SILICON
 from tests.support.fem_residual import Cooled, cooled, layered
@@ -51,7 +51,7 @@ def test_nothing_moves_without_a_shock(formulation, kinematics):
 
 
 def launched(body: Body, step: float) -> ExplicitMotion:
-    motion = motion_of(body, step, [RayleighDamping.build(body, (0.0, 0.01 * step))])
+    motion = motion_of(body, step, [RayleighDamping.build(body, 0.0, 0.01 * step)])
     motion.launch(np.array([0.0, 0.1, 1.0]))
     return motion
 
@@ -98,7 +98,7 @@ def test_state_continues_from_a_checkpoint():
     for _ in range(5):
         motions[0].advance()
         motions[0].update_force()
-    motions[1].restore(portable.values(motions[0].state()))
+    motions[1].restore(checkpoint_state.values(motions[0].state()))
     for motion in motions:
         motion.advance()
         motion.update_force()

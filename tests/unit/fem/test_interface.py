@@ -15,7 +15,7 @@ from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.shock_checks import problems
 from reflowshock.fem.run import time_loop
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import SITES, write_small_assembly
 
@@ -42,7 +42,8 @@ def results(files: Path, name: str, mode: str, numerics: dict | None = None, **c
     output.mkdir(exist_ok=True)
     shock = SHOCK | {"numerics": NUMERICS | (numerics or {})}
     meshes = (files / "assembly.msh", files / "joints.msh")
-    run(MPI.COMM_SELF, RunInput(mode=mode, meshes=meshes, materials=ELASTIC, shock=shock, output=output, **changes))
+    request = RunInput(mode=mode, meshes=meshes, materials=ELASTIC, shock=shock, output=output, **changes)
+    run_package(MPI.COMM_SELF, request)
     return output
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import BOARD_X, BOARD_Y, small_assembly, write_msh
 
@@ -45,7 +45,7 @@ def results(files: Path, assembly: str = "assembly.msh", **changes) -> tuple[dic
     output = files / "_".join(["out", *changes])
     output.mkdir(exist_ok=True)
     meshes = (files / assembly, files / "joints.msh")
-    run(
+    run_package(
         MPI.COMM_SELF,
         RunInput(mode="two_scale", meshes=meshes, materials=ELASTIC, shock=SHOCK | changes, output=output),
     )

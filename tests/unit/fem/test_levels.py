@@ -145,7 +145,7 @@ def test_hourglass_energy_is_told_apart():
 
 
 def test_levels_need_linear_elastic_elements():
-    with pytest.raises(LevelError, match="1 of the materials yield"):
+    with pytest.raises(LevelError, match="1 materials yield"):
         check_elastic([SAC405, FR4], "small", (3,))
     with pytest.raises(LevelError, match="kinematics = finite"):
         check_elastic([FR4], "finite", (3,))
@@ -191,7 +191,7 @@ def test_no_level_where_all_elements_take_the_window():
 
 
 def test_too_many_steps_are_refused():
-    with pytest.raises(LevelError, match="allowed are 64 steps a level, and 1 levels"):
+    with pytest.raises(LevelError, match="allowed: 64 steps per level and 1 levels"):
         choose_levels(CHAIN, Tie.none(), Pace(np.geomspace(1e-3, 1.0, 12), np.ones(12), 0.9, 0.9), 1)
 
 
@@ -199,7 +199,7 @@ def test_damping_takes_more_substeps_and_has_a_limit():
     assert Substeps.of(8, 1, 0.02).reach < Substeps.of(8, 1).reach
     damped = Pace(np.ones(12), np.ones(12), 0.9, 0.9, stiffness=0.01)
     assert choose_levels(CHAIN, Tie.none(), damped, 1)[0].min() == 1  # the window is too large for damped elements
-    with pytest.raises(LevelError, match=r"too strong for levels, which bear 0\.03"):
+    with pytest.raises(LevelError, match=r"too large for local time steps; the limit is 0\.03"):
         Substeps.of(8, 1, 0.04)
 
 

@@ -13,7 +13,7 @@ from reflowshock.fem.errors import AgreedError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock_checks import problems
-from reflowshock.fem.run.package import run
+from reflowshock.fem.run.package import run_package
 from reflowshock.materials.roles import ELASTIC
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
@@ -53,7 +53,7 @@ def request(files: Path, name: str, **coupling) -> RunInput:
 
 def results(files: Path, name: str, **coupling) -> tuple[dict, dict[str, np.ndarray]]:
     (files / name).mkdir()
-    run(MPI.COMM_SELF, request(files, name, **coupling))
+    run_package(MPI.COMM_SELF, request(files, name, **coupling))
     with np.load(files / name / "history.npz") as arrays:
         return json.loads((files / name / "result.json").read_text()), dict(arrays)
 
@@ -81,7 +81,7 @@ def test_all_joints_can_be_driven(files):
 def test_one_way_without_coarse_joints_is_an_error(files):
     whole = request(files, "none", direction="one_way").model_copy(update={"coarse_joints": None})
     with pytest.raises(AgreedError, match="no file of coarse joints"):
-        run(MPI.COMM_SELF, whole)
+        run_package(MPI.COMM_SELF, whole)
 
 
 def test_schemes_that_need_an_answer_are_refused_one_way(files):
@@ -93,4 +93,4 @@ def test_pulse_that_is_over_within_a_window_is_an_error_that_names_both(files):
     short = request(files, "short", direction="one_way")
     short = short.model_copy(update={"shock": short.shock.model_copy(update={"pulse_duration": 1e-9})})
     with pytest.raises(AgreedError, match=r"a pulse of 1e-09 s is shorter than a window of \S+e-0[89] s"):
-        run(MPI.COMM_SELF, short)
+        run_package(MPI.COMM_SELF, short)

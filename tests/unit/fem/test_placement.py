@@ -9,12 +9,20 @@ from mpi4py import MPI
 from pydantic import ValidationError
 
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of
-from reflowshock.fem.coupling.planner import Measured, ModelWork, keep, kept, plan_from, plan_ranks, words
+from reflowshock.fem.coupling.planner import (
+    Measured,
+    ModelWork,
+    plan_from,
+    plan_ranks,
+    store_costs,
+    stored_costs,
+    words,
+)
 from reflowshock.fem.coupling.speeds import (
     Kind,
     StepCost,
     families,
-    line_through,
+    fit_step_cost,
     sample_terms,
     seconds_of_step,
     speeds_of,
@@ -119,10 +127,10 @@ def test_speeds_alike_are_equal():
     assert speeds_of(np.array([1.0, 3.0])) == pytest.approx([1.5, 0.5])
 
 
-def test_line_through_two_samples():
-    assert line_through((100, 2e-5), (1100, 1.2e-4)) == pytest.approx((1e-5, 1e-7))
-    assert line_through((100, 3e-4), (1000, 1e-4)) == pytest.approx((5e-5, 5e-8))  # disturbed
-    assert line_through((64, 1e-4), (64, 1e-4)) == pytest.approx((5e-5, 0.5e-4 / 64))
+def test_step_cost_from_two_samples():
+    assert fit_step_cost(100, 2e-5, 1100, 1.2e-4) == pytest.approx((1e-5, 1e-7))
+    assert fit_step_cost(100, 3e-4, 1000, 1e-4) == pytest.approx((5e-5, 5e-8))  # disturbed
+    assert fit_step_cost(64, 1e-4, 64, 1e-4) == pytest.approx((5e-5, 0.5e-4 / 64))
 
 
 def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) -> ModelWork:
@@ -141,7 +149,7 @@ def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float
 
 def planned(ranks: Ranks, measurement: Measured, **loads: ModelWork):
     family = {role: families(load.mesh, load.kind) for role, load in loads.items()}
-    return plan_from(loads, family, ranks, (measurement, True))
+    return plan_from(loads, family, ranks, measurement, True)
 
 
 def test_families_and_levels_make_the_work():
@@ -171,11 +179,11 @@ def test_measurement_is_kept_for_a_run_that_continues(tmp_path):
     first = plan_ranks(MPI.COMM_SELF, loads, Ranks(total=1), tmp_path)
     assert first.summary["update_seconds"].keys() == {"box", "assembled"}
     assert plan_ranks(MPI.COMM_SELF, loads, Ranks(total=1), tmp_path).summary == first.summary
-    keep(tmp_path, measured(2))
-    assert kept(MPI.COMM_SELF, tmp_path, np.array([0])) is None
-    keep(tmp_path, measured(1))
-    assert kept(MPI.COMM_SELF, tmp_path, np.array([0])) is not None
-    assert kept(MPI.COMM_SELF, tmp_path, np.array([0, 2])) is None
+    store_costs(tmp_path, measured(2))
+    assert stored_costs(MPI.COMM_SELF, tmp_path, np.array([0])) is None
+    store_costs(tmp_path, measured(1))
+    assert stored_costs(MPI.COMM_SELF, tmp_path, np.array([0])) is not None
+    assert stored_costs(MPI.COMM_SELF, tmp_path, np.array([0, 2])) is None
     json.dumps(first.summary)
 
 

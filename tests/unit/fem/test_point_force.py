@@ -7,12 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.errors import AgreedError, LoadError
-from reflowshock.fem.loads.structure_loads import structure_loads
+from reflowshock.fem.loads.structure_loads import LoadedModel, structure_loads
 from reflowshock.fem.loads.structure_pulses import pulse_of, pulses_of
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.mesh.point_shares import point_shares
 from reflowshock.fem.problem.inputs import INPUT
-from reflowshock.fem.problem.structure import PointForce
+from reflowshock.fem.problem.load_kinds import PointForce
 from reflowshock.fem.run.structure import run_structure
 from reflowshock.fem.setup.structure_models import build_structure
 from reflowshock.meshing.board.box import write_box
@@ -74,7 +74,7 @@ def test_a_point_outside_is_said_with_the_nearest_node():
 
 def load_of(request):
     model, _ = build_structure(MPI.COMM_SELF, request, [])
-    (load,) = structure_loads(MPI.COMM_SELF, model.body, model.tables, request, pulses_of(request.loads))
+    (load,) = structure_loads(LoadedModel(MPI.COMM_SELF, model.body, model.tables, request), pulses_of(request.loads))
     return model, load
 
 

@@ -12,7 +12,7 @@ from reflowshock.fem.division.division import choose_scheme
     [
         (True, True, "local_steps", "linear elastic"),
         (True, False, "local_steps", "linear elastic"),
-        (False, True, "held_velocity", "depends on its path; layers of board fit"),
+        (False, True, "held_velocity", "are path-dependent; layers of board fit"),
         (False, False, "gravouil_combescure", "no two layers of board fit"),
     ],
 )

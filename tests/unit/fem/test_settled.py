@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.fem.output.settled import HISTORIES, half_swing, is_settled
+from reflowshock.fem.output.settled import HISTORIES, half_oscillation, is_settled
 
 PERIOD = 4e-3
 
@@ -24,15 +24,15 @@ def swinging(time):
 
 def test_half_a_swing_is_the_time_of_the_first_return():
     time = np.linspace(0.0, PERIOD, 401)
-    assert half_swing(time, np.sin(2.0 * np.pi * time / PERIOD)) == pytest.approx(0.5 * PERIOD, rel=0.01)
-    assert half_swing(time, time) is None
+    assert half_oscillation(time, np.sin(2.0 * np.pi * time / PERIOD)) == pytest.approx(0.5 * PERIOD, rel=0.01)
+    assert half_oscillation(time, time) is None
 
 
 def test_a_trembling_before_the_swing_is_no_return():
     time = np.linspace(0.0, PERIOD, 401)
     swing = np.sin(2.0 * np.pi * time / PERIOD)
     swing[1:5] *= -1.0
-    assert half_swing(time, swing) == pytest.approx(0.5 * PERIOD, rel=0.01)
+    assert half_oscillation(time, swing) == pytest.approx(0.5 * PERIOD, rel=0.01)
 
 
 @pytest.mark.parametrize(("share", "over"), [(0.4, False), (0.7, False), (0.76, True), (1.0, True)])

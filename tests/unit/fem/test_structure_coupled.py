@@ -70,13 +70,13 @@ def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
 def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
     layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
     request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
-    with pytest.raises(CouplingError, match=r"less than half of the longest.*name it in dynamics\.coupling\.fine"):
+    with pytest.raises(CouplingError, match=r"half of the longest.*name the fine layers in dynamics\.coupling\.fine"):
         divided_on_one_rank(request)
 
 
 def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
     request = write_bar(tmp_path, WIDTH, LAYERS, 1e-8, dynamics=dynamics())
-    with pytest.raises(StepError, match=r"loads\.push lasts 1e-08 s, less than the window of two models, 1\.\d+e-07 s"):
+    with pytest.raises(StepError, match=r"loads\.push lasts 1e-08 s, less than the coupling window of 1\.\d+e-07 s"):
         divided_on_one_rank(request)
 
 
@@ -148,7 +148,7 @@ def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
     """The macro model alone would know of it, and the meso model's interface run away: strains were 1.3 times wrong."""
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
-    with pytest.raises(CouplingError, match=r"loads\.side moves 6 nodes of the interface.*impulse"):
+    with pytest.raises(CouplingError, match=r"loads\.side prescribes the motion of 6 interface nodes.*impulse"):
         divided_on_one_rank(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **(TABLES | side), dynamics=changes))
 
 

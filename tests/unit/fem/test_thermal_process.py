@@ -41,7 +41,7 @@ def test_a_process_answers_as_the_structure_itself(tmp_path):
         assert np.array_equal(process.points, structure.points)
         assert np.array_equal(process.package, structure.package)
         assert np.array_equal(process.rigid_modes.pad_motion, structure.rigid_modes.pad_motion)
-        with pytest.raises(StructureError, match=r"wanted are numbers of shape \(4, 2, 6\)"):
+        with pytest.raises(StructureError, match=r"required: finite, shape \(4, 2, 6\)"):
             process.solve(REFERENCE, 0.0, wrenches[1:], np.zeros(1))
         there, here = (item.solve(*loads) for item in (process, structure))
         for name in ("displacement", "pad_motion", "corner_force"):

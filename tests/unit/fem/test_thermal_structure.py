@@ -89,7 +89,7 @@ def test_forces_of_a_wrench_have_its_force_and_moment():
 def test_a_pad_beyond_its_side_is_named():
     mesh, pads = append([board_mesh(), package_mesh()]), small_pads()
     pads.centres[1, 1, 0] = 2.4e-3
-    with pytest.raises(MeshError, match=r"wetted disc of B3, radius 0.2 mm, reaches 0\.\d+ mm beyond package_side"):
+    with pytest.raises(MeshError, match=r"wetted disc of B3, radius 0.2 mm, extends 0\.\d+ mm beyond package_side"):
         pad_matrix(mesh, pads)
 
 
@@ -182,7 +182,7 @@ def test_force_of_solder_may_be_left_out(tmp_path):
 
 def test_loads_of_another_shape_are_refused(floating):
     with pytest.raises(
-        ValueError, match=r"wrenches has the shape \(3, 2, 6\); wanted are numbers of shape \(4, 2, 6\)"
+        ValueError, match=r"wrenches has the shape \(3, 2, 6\); required: finite, shape \(4, 2, 6\)"
     ):
         floating.solve(REFERENCE, 0.0, np.zeros((3, 2, 6)), np.zeros(1))
     with pytest.raises(ValueError, match=r"rigid has the shape \(1,\), not all finite"):
@@ -192,7 +192,7 @@ def test_loads_of_another_shape_are_refused(floating):
 def test_meshes_that_do_not_fit_are_refused(tmp_path):
     assembly = small_structure(tmp_path)
     pads = replace(assembly.pads, radii=assembly.pads.radii * 10.0)
-    with pytest.raises(AgreedError, match=r"reaches .* beyond board_side"):
+    with pytest.raises(AgreedError, match=r"extends .* beyond board_side"):
         ThermalStructure.build(MPI.COMM_SELF, replace(assembly, pads=pads))
     with pytest.raises(AgreedError, match=r"No such file|not found"):
         ThermalStructure.build(MPI.COMM_SELF, replace(assembly, mesh=tmp_path / "none.msh"))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph.surface_coupling import find_weights, near_vertices
+from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface import remeshing
 from reflowshock.particles.surface.breakup import are_outside, largest_part, small_parts, split_fans
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops

@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics
-from reflowshock.particles.parameters.rheology import Rheology
-from reflowshock.particles.scenes.dam_break import dam
-from reflowshock.particles.scenes.droplet import droplet
-from reflowshock.particles.scenes.viscous_flows import channel
+from reflowshock.particles.flows.channel import Poiseuille
+from reflowshock.particles.flows.dam_break import DamBreak
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
+from reflowshock.particles.flows.rheology import Rheology
+from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph_flows.dam_break import dam
+from reflowshock.particles.sph_flows.droplet import droplet
+from reflowshock.particles.sph_flows.viscous_flows import channel
 
 ROOT = Path(__file__).parents[3]
 SIMULATED = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}

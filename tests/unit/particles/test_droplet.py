@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics, cap
-from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.scenes.droplet import base_width, droplet, outcome, solve_droplet, width
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics, cap
+from reflowshock.particles.flows.droplet_metrics import base_width, outcome
+from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.capillary_forces import (
@@ -18,6 +18,7 @@ from reflowshock.particles.sph.capillary_forces import (
 )
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph_flows.droplet import droplet, solve_droplet, width
 from reflowshock.particles.surface.remeshing import is_folded
 from reflowshock.particles.surface.surface_mesh import SurfaceLost, SurfaceMesh
 

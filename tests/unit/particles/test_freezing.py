@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reflowshock.materials import enthalpy
-from reflowshock.particles.parameters.freezing import Freezing
-from reflowshock.particles.parameters.printing import LITTLE_FROZEN, Printing, PrintingNumerics
+from reflowshock.particles.flows.freezing import Freezing
+from reflowshock.particles.flows.printing import LITTLE_FROZEN, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import LIQUID, SOLID, Deposit
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.heat import Heat, enthalpy_at

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.grid import Grid
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
+from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
 from reflowshock.particles.surface.morphological_closing import (
     TopologyChange,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.droplets import DropletNumerics
-from reflowshock.particles.parameters.printing import Cure, Printing, PrintingNumerics
+from reflowshock.particles.flows.droplet import DropletNumerics
+from reflowshock.particles.flows.printing import Cure, Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import HELD, LIQUID, SOLID, Deposit
 from reflowshock.particles.printing.part import Layer, Part
 from reflowshock.particles.printing.part_files import write_part

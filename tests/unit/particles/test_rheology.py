@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.parameters.flow_effects import decide_flow
-from reflowshock.particles.parameters.printing import Printing
-from reflowshock.particles.parameters.rheology import Rheology
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
+from reflowshock.particles.flows.flow_effects import decide_flow
+from reflowshock.particles.flows.printing import Printing
+from reflowshock.particles.flows.rheology import Rheology
 from reflowshock.particles.printing.deposit import Deposit
-from reflowshock.particles.scenes.droplet import droplet
 from reflowshock.particles.sph.shear_viscosity import viscosity_at, viscosity_of
+from reflowshock.particles.sph_flows.droplet import droplet
 
 INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "duration": 1e-5}
 CARREAU = Rheology(law="carreau", exponent=0.4, shear_rate=1e5, viscosity_at_infinity=1e-3)

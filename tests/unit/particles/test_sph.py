@@ -8,18 +8,21 @@ from scipy.spatial import cKDTree
 
 from reflowshock.data_file import fields_of
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.flow_effects import artificial_viscosity, decide_flow
-from reflowshock.particles.parameters.flows import DamBreak, Poiseuille, SphNumerics, TaylorGreen
+from reflowshock.particles.flows.channel import Poiseuille
+from reflowshock.particles.flows.dam_break import DamBreak, second_rise
+from reflowshock.particles.flows.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.flows.sph_numerics import SphNumerics
+from reflowshock.particles.flows.vortices import TaylorGreen
 from reflowshock.particles.reference.dam_break import MEASURED, measured_pressure
-from reflowshock.particles.scenes.dam_break import dam, second_rise, solve_dam_break
 from reflowshock.particles.scenes.products import read_flow, write_flow
-from reflowshock.particles.scenes.viscous_flows import channel, solve_poiseuille, vortices
 from reflowshock.particles.sph.flow import liquid_and_walls
 from reflowshock.particles.sph.fluid_state import REPRODUCING
 from reflowshock.particles.sph.particle_rates import condition_of, rates_of, solved
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
 from reflowshock.particles.sph.threads import Rows
+from reflowshock.particles.sph_flows.dam_break import dam, solve_dam_break
+from reflowshock.particles.sph_flows.viscous_flows import channel, solve_poiseuille, vortices
 
 AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.pi * q * q}
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet, liquid_of
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_coupling import find_weights
 from reflowshock.particles.sph.thin_films import add_wall_friction, film_sums
+from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
 from reflowshock.particles.surface.morphological_closing import narrowest_gap
 from reflowshock.particles.surface.remeshing import smoothed, without_dry_spots

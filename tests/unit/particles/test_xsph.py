@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.parameters.droplets import Droplet, DropletNumerics
-from reflowshock.particles.scenes.droplet import droplet
+from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import threads
 from reflowshock.particles.sph.particle_rates import drift_of
+from reflowshock.particles.sph_flows.droplet import droplet
 
 INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "duration": 1e-5}
 

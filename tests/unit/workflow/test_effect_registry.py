@@ -14,7 +14,7 @@ from reflowshock.fem.estimates.drop_effects import (
     called_for,
     stiffened,
 )
-from reflowshock.fem.problem.structure import KINDS
+from reflowshock.fem.problem.load_kinds import KINDS
 from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import app

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from reflowshock.particles.sph.flow import FlowResult
+from reflowshock.particles.flows.result import FlowResult
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.flows.droplet import droplet_curves
 from reflowshock.workflow.kinds import kind_of

@@ -10,7 +10,7 @@ from reflowshock.cases.hard.trials.packages import MM
 from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.meshing.board.pads import pad_table, write_pads
 from reflowshock.meshing.board.parameters import Warpage
-from reflowshock.workflow.board_drop.forecast import forecast
+from reflowshock.workflow.board_drop.forecast import forecast_package
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package_report import joint_tables
@@ -66,9 +66,9 @@ def test_others_are_judged_beside_them():
 
 
 def test_plan_foresees_only_those_that_are_reflowed(run):
-    assert (forecast(run.case).joints, forecast(run.case).distinct) == (4, 0)
+    assert (forecast_package(run.case).joints, forecast_package(run.case).distinct) == (4, 0)
     package = run.case.package.model_copy(update={"surfaces": {"A4": run.case.package.surfaces["A4"]}})
-    assert forecast(run.case.model_copy(update={"package": package})).distinct == 1
+    assert forecast_package(run.case.model_copy(update={"package": package})).distinct == 1
 
 
 def test_the_reflow_depends_on_what_surfaces_hold(run):

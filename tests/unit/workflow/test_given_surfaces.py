@@ -19,6 +19,7 @@ from reflowshock.meshing.core.facets import outlines
 from reflowshock.meshing.surface.closed_surface import enclosed_volume, read_surface
 from reflowshock.particles.scenes.products import write_shapes
 from reflowshock.particles.steps.shape import JointShape, Snapshot
+from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints, write_surfaces
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
@@ -149,7 +150,8 @@ def test_given_reflowed_and_bridged_surfaces_are_written_and_meshed(run):
     assert findings.of_surface(measures).metrics["given_surface_volume_change_max"]["value"] == 0.07
     given = read_surface(run.folder / "surface/A4.vtu")
     assert enclosed_volume(given) == pytest.approx(measures["A4"]["volume"])
-    qualities = mesh_real_joints(run, run.folder / "solder_mesh")
+    coarse = needs_coarse_joints(run.case.shock.coupling)
+    qualities = mesh_real_joints(run.case, run.folder, run.folder / "solder_mesh", coarse=coarse)
     assert set(qualities[""]) == {"A4", "B4"} and set(qualities["bridged_"]) == {"A3+B3"}
     assert (run.folder / "solder_mesh/free_form_A3+B3.msh").exists()
     found = findings.of_solder_mesh(qualities, {})

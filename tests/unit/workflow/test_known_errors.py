@@ -115,7 +115,7 @@ def test_omitted_effects_are_sorted_by_influence():
         "symmetry": {"on": False},
     }  # fmt: skip
     assert left_out(effects) == "finite rotation 47 %, damping 2 %"
-    assert left_out({}) == "nothing whose expected influence is above 1 %"
+    assert left_out({}) == "none with an expected influence above 1 %"
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,8 @@ def test_joints_are_ranked_by_their_worse_pad(history):
     assert table["rows"][0][1:3] == ["NO LIMIT", "–"]
     assert table["rows"][0][3:10] == ["9.000", "100.0", "board", "0.500", "2", "1", "30.00"]
     assert table["rows"][1][7:9] == ["1", "5"]
-    assert table["head"][4] == "von Mises of the 25 µm at the pad [MPa]"
-    assert (table["head"][-1], table["rows"][0][-1]) == ("largest element value [MPa], depends on the mesh", "150.0")
+    assert table["head"][4] == "von Mises, 25 µm layer at the pad [MPa]"
+    assert (table["head"][-1], table["rows"][0][-1]) == ("largest element value [MPa] (mesh-dependent)", "150.0")
 
 
 def test_a_dns_that_ended_early_ranks_no_joints(history):
@@ -74,7 +74,7 @@ def test_joints_tell_their_verdict_and_by_what(history):
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
     found = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
     table = joint_tables.ranked_joints(yielding, joints, found)
-    assert table["head"][5] == "plastic work of the 25 µm [kJ/m³]"
+    assert table["head"][5] == "plastic work, 25 µm layer [kJ/m³]"
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert [row[1:3] for row in table["rows"]] == [["FAIL", "0.889 by peel"], ["PASS", "1.6 by peel"]]
     assert [row[5] for row in table["rows"]] == ["200", "100"]

@@ -79,7 +79,7 @@ FITTED = {
     PMIC.format("15 mm", 2, "2 mm").replace('"0 mm"', '"9 mm"'): ["pmic.at", "lies over a mounting hole"],
     'watch.a.at=["21 mm", "0 mm", "0 mm"]': ["watch.a.at", "lies 0.001 m outside the meshed body"],
     'watch.a={at=["0 mm", "0 mm", "0 mm"], direction=[0, 0, 0]}': ["watch.a.direction", "has no length"],
-    'watch.package.at=["0 mm", "0 mm", "0 mm"]': ["watch.package", "what is told of the package itself"],
+    'watch.package.at=["0 mm", "0 mm", "0 mm"]': ["watch.package", "is reserved for the results of the package"],
     'gauges.g.at=["19.5 mm", "5 mm"]': ["gauges.g.length", "outside the meshed body"],
     'gauges.g.at=["13.8 mm", "11 mm"]': ["gauges.g.length", "lies in a mounting hole"],
     'gauges.g={at=["5 mm", "5 mm"], face="top"}': ["gauges.g.face", "upper, lower"],
@@ -100,8 +100,8 @@ def test_what_cannot_be_fitted_to_the_board_is_said(setting):
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ('shock.coupling.scheme="local_steps"', "springs take no local steps"),
-        ('shock.method="large_mass"', "moves holes that nothing else holds"),
+        ('shock.coupling.scheme="local_steps"', "does not support supports.screws.bedding"),
+        ('shock.method="large_mass"', "needs mounting holes without supports"),
     ],
 )
 def test_what_does_not_go_with_elastic_screws_is_said(setting, message):

@@ -9,7 +9,7 @@ from reflowshock.fem.division.path_levels import MOST_LEVELS
 from reflowshock.fem.kernels.levels import PACES
 from reflowshock.meshing.board.estimate import count_elements
 from reflowshock.workflow.board_drop.board_deflection import decided
-from reflowshock.workflow.board_drop.forecast import forecast
+from reflowshock.workflow.board_drop.forecast import forecast_board_drop
 from reflowshock.workflow.board_drop.part_forecast import forecast_parts, two_scale_parts
 from reflowshock.workflow.board_drop.shock_forecast import (
     SECONDS_TO_START,
@@ -154,7 +154,7 @@ def test_what_lies_around_windows_counts():
     case = read_case(SMALL_CASE)
     parts = forecast_parts(case)
     assert seconds_outside_windows(case, parts) > seconds_outside_windows(case, parts, share=0.1) > SECONDS_TO_START
-    assert forecast(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
+    assert forecast_board_drop(case).seconds["shock"] > forecast_shock(case, parts).two_scale + SECONDS_TO_START
 
 
 def test_natural_modes_cost_only_where_they_are_asked_for():

@@ -4,7 +4,7 @@ import pytest
 
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.batch import show_products
-from reflowshock.workflow.process.last_word import LOG, LOGS
+from reflowshock.workflow.process.error_exit import LOG, LOGS
 from reflowshock.workflow.run import clean
 from reflowshock.workflow.store import view
 from reflowshock.workflow.store.folders import locked, remove_own

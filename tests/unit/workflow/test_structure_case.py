@@ -104,7 +104,7 @@ def test_bad_values_are_named(setting, words):
 def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
     case = BOARD.parents[2] / "cases" / "cantilever" / "case.toml"
     given = "dynamics.numerics.explicit_step=1 ms"
-    with pytest.raises(CaseError, match=r"explicit_step = \"1 ms\": is above the critical step.*allowed: <= .* ns"):
+    with pytest.raises(CaseError, match=r"explicit_step = \"1 ms\": exceeds the critical step.*allowed: <= .* ns"):
         read_case(case, [given])
     for other in ("dynamics.solver=implicit", "dynamics.numerics.critical_step=power_iteration"):
         read_case(case, [given, other])
@@ -270,7 +270,7 @@ def test_effects_have_reasons():
             "loads.push.duration=10 ns",
             r'loads.push.duration = "10 ns": is shorter than one coupling window .* no dynamics.coup',
         ),
-        ("dynamics.duration=12 us", r'dynamics.duration = "12 µs": ends before the waves of references.wave'),
+        ("dynamics.duration=12 us", r'dynamics.duration = "12 µs": the run ends before the waves of references.wave'),
     ],
 )
 def test_two_models_of_a_bar_need_time(setting, words):

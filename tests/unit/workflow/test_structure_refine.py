@@ -6,7 +6,7 @@ import pytest
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.structure.findings import Motion, compared_with_references, layers_of
+from reflowshock.workflow.structure.findings import Motion, compare_with_references, layers_of
 from reflowshock.workflow.structure.forecast import forecast_structure
 
 TWO_SCALES, ONE_SCALE = CASES / "two_scale_bar/case.toml", CASES / "cantilever/case.toml"
@@ -65,6 +65,6 @@ def test_waves_are_compared_where_they_are_recorded(name):
         velocity = np.zeros((len(time), 3))
         velocity[:, 2] = layers_of(case).velocity(places[point][2], time, pressure)
         history[f"velocity@{point}"] = velocity
-    found, health = compared_with_references(case, Motion([], history, places))
+    found, health = compare_with_references(case, Motion([], history, places))
     assert found["wave_error"]["value"] < 1e-12
     assert all(check["ok"] for check in health.values())

@@ -1,4 +1,4 @@
-"""Studies: designs, results as tables, what is told of effects; nothing is computed."""
+"""Studies: designs, tables of results, main effects; nothing is computed."""
 
 import csv
 from pathlib import Path
@@ -16,7 +16,7 @@ from reflowshock.workflow.study.command import has_metrics, read_points_of, resu
 from reflowshock.workflow.study.designs import Factor, Hypercube, as_text, between
 from reflowshock.workflow.study.main_effects import effect_of, ranked
 from reflowshock.workflow.study.process_map import outcomes, process_map
-from reflowshock.workflow.study.progress import outlook, seconds_left
+from reflowshock.workflow.study.progress import forecast_stages, seconds_left
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
 from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
@@ -35,7 +35,7 @@ def write(tmp_path):
     return study
 
 
-def test_a_grid_is_every_combination_and_keys_may_change_together(write):
+def test_grid_is_every_combination_and_keys_may_vary_together(write):
     study = read_study(write('[grid]\n"a.b" = [1, 2]\n"c, d.e" = ["x", ["y", true]]\n[settings]\nf.g = "1 mm"\n'))
     assert study.points == [
         {"f.g": "1 mm", "a.b": a, "c": c, "d.e": e} for a in ("1", "2") for c, e in (("x", "x"), ("y", "true"))
@@ -51,12 +51,12 @@ def test_rows_of_a_list_are_combined_with_the_grid(write):
 
 @pytest.mark.parametrize("samples", [1, 6, 7, 24])
 def test_each_part_of_a_range_has_one_sample(samples):
-    found = Hypercube(samples, seed=3).shares(4)
-    for column in found.T:
+    shares = Hypercube(samples, seed=3).shares(4)
+    for column in shares.T:
         assert sorted((samples * column).astype(int)) == list(range(samples))
 
 
-def test_twice_as_many_samples_keep_the_earlier_ones():
+def test_doubled_hypercube_contains_the_earlier_samples():
     small, large = Hypercube(6, 1).shares(3), Hypercube(24, 1).shares(3)
     assert np.array_equal(small, large[:6])
     assert not np.array_equal(Hypercube(6, 2).shares(3), small)
@@ -74,11 +74,11 @@ def test_samples_are_quantities_in_the_unit_of_their_range(write):
     ("value", "text"),
     [("1 mm", "1 mm"), ("B", "B"), ("2", '"2"'), (2, "2"), (True, "true"), (["a", "b"], '["a", "b"]'), (0.5, "0.5")],
 )
-def test_values_are_written_as_set_takes_them(value, text):
+def test_values_are_written_in_the_form_of_set(value, text):
     assert as_text(value) == text
 
 
-def test_ends_of_a_range_must_be_alike():
+def test_ends_of_a_range_must_have_one_unit():
     assert between("1 mm", "2 mm", 0.25) == "1.25 mm"
     assert between(1.0, 2, 0.5) == "1.5"
     assert between("1 mm", "2 m", 0.5) is None
@@ -103,13 +103,13 @@ def test_ends_of_a_range_must_be_alike():
         ("[latin_hypercube]\nsamples = 0\nranges.a = [1, 2]\n", ["samples = 0", ">= 1"]),
     ],
 )
-def test_a_study_that_is_wrong_is_told(write, text, words):
+def test_invalid_study_is_rejected(write, text, words):
     with pytest.raises(CaseError) as caught:
         read_study(write(text))
     assert all(word in str(caught.value) for word in words)
 
 
-def test_points_that_cannot_be_are_told_or_skipped(write):
+def test_impossible_points_are_rejected_or_skipped(write):
     text = '[grid]\n"package.pitch" = ["0.1 mm", "1 mm"]\n'
     with pytest.raises(PointsError, match=r"point 1 \(package.pitch = 0.1 mm\)"):
         read_points_of(write(text))
@@ -120,7 +120,7 @@ def test_points_that_cannot_be_are_told_or_skipped(write):
     assert "pads overlap" in rows[0].message
 
 
-def test_a_problem_of_many_points_is_told_once(write):
+def test_problem_of_many_points_is_reported_once(write):
     with pytest.raises(PointsError) as caught:
         read_points_of(write(GRID + '[settings]\nshock.duraton = "1 ms"\n'))
     (line,) = caught.value.lines()
@@ -128,20 +128,21 @@ def test_a_problem_of_many_points_is_told_once(write):
     assert "did you mean shock.duration?" in line
 
 
-def test_a_date_is_no_value_of_a_key(write):
+def test_date_is_rejected_as_a_value(write):
     with pytest.raises(PointsError, match="2020-01-01"):
         read_points_of(write("[grid]\nsolder.volume = [2020-01-01]\n"))
 
 
-def test_what_is_shared_is_foreseen_once(write, tmp_path):
+def test_shared_products_are_predicted_once(write, tmp_path):
     points = list(read_points_of(write(GRID)).possible.values())
-    found = {own.stage: own for own in outlook(points, missing(Store(tmp_path / "store"), points, "report"))}
-    assert (found["geometry"].products, found["reflow"].products, found["geometry"].points) == (2, 4, 4)
+    jobs = missing(Store(tmp_path / "store"), points, "report")
+    stages = {forecast.stage: forecast for forecast in forecast_stages(points, jobs)}
+    assert (stages["geometry"].products, stages["reflow"].products, stages["geometry"].points) == (2, 4, 4)
     expected = sum(stage_seconds(point.case)["reflow"] for point in points)
-    assert found["reflow"].seconds == pytest.approx(expected)
+    assert stages["reflow"].seconds == pytest.approx(expected)
 
 
-def test_time_left_is_that_of_stages_like_those_that_are_done():
+def test_remaining_time_follows_completed_stages():
     assert seconds_left(["a"], {}, 1.0) is None
     assert seconds_left(["a", "a", "b", "c"], {"a": [2.0], "b": [4.0, 6.0]}, 6.0) == pytest.approx(
         (4.0 + 5.0 + 4.0) / 2
@@ -172,8 +173,8 @@ def test_main_effects_are_differences_of_means():
 
 def test_only_healthy_points_are_ranked():
     rows = [*ROWS, row(5, 1.0, 0.07, 0.5, UNHEALTHY), row(6, 1.0, 0.07, None)]
-    assert [own.number for own in ranked(rows, "stress", "minimise")] == [1, 3, 2, 4]
-    assert [own.number for own in ranked(rows, "stress", "maximise")] == [4, 2, 3, 1]
+    assert [point.number for point in ranked(rows, "stress", "minimise")] == [1, 3, 2, 4]
+    assert [point.number for point in ranked(rows, "stress", "maximise")] == [4, 2, 3, 1]
 
 
 def test_csv_and_parquet_have_the_same_columns_with_units(write, tmp_path):
@@ -192,7 +193,7 @@ def test_csv_and_parquet_have_the_same_columns_with_units(write, tmp_path):
     assert read[4]["stress [Pa]"] == ""
 
 
-def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
+def test_page_has_ranking_effects_and_failures(write, tmp_path):
     from reflowshock.workflow.study.page import write_results
 
     rows = [*ROWS, row(5, 1.0, 0.08, None, "failed")]
@@ -207,20 +208,20 @@ def test_the_page_tells_ranks_effects_and_troubles(write, tmp_path):
     assert [line[1] for line in tables.ranking(study, rows)["rows"]] == ["key1", "key3", "key2", "key4"]
 
 
-def told(number: int, settings: dict[str, str], word: str) -> Row:
+def row_with_outcome(number: int, settings: dict[str, str], word: str) -> Row:
     metrics = {"outcome": {"value": word, "unit": ""}, "stress": {"value": 4e-6 * number, "unit": "m"}}
     return Row(number, f"key{number}", settings, HEALTHY, seconds=1.0, metrics=metrics)
 
 
-def test_a_metric_in_words_is_a_map_over_two_factors(write, tmp_path):
+def test_process_map_over_two_factors(write, tmp_path):
     from reflowshock.workflow.study.page import main_effects, write_results
 
     study = read_study(write(GRID, HEAD + 'metrics = ["outcome"]\n'))
-    rows = [told(one.number, dict(one.settings), "merged" if one.number < 3 else "separate") for one in ROWS]
+    rows = [row_with_outcome(r.number, dict(r.settings), "merged" if r.number < 3 else "separate") for r in ROWS]
     assert outcomes(study, rows) == ("outcome", rows) and outcomes(study, ROWS) == ("", [])
     axis = process_map(study, "outcome", rows).axes[0]
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("pitch [mm]", "volume [mm^3]")
-    drawn = {one.get_label(): one.get_offsets().tolist() for one in axis.collections}
+    drawn = {marks.get_label(): marks.get_offsets().tolist() for marks in axis.collections}
     assert drawn == {"merged": [[0.9, 0.07], [0.9, 0.0724]], "separate": [[1.0, 0.07], [1.0, 0.0724]]}
     assert has_metrics(study, rows) and not has_metrics(
         read_study(write(GRID, HEAD.replace("stress", "outcome"))), rows
@@ -231,21 +232,21 @@ def test_a_metric_in_words_is_a_map_over_two_factors(write, tmp_path):
     assert figure.axes[0].get_ylabel() == "stress [µm]"
 
 
-def test_a_metric_in_words_is_a_line_over_one_factor_and_nothing_over_names(write):
+def test_process_map_over_one_factor_is_a_line_and_over_names_missing(write):
     from reflowshock.workflow.study.page import main_effects
 
     text = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n'
-    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "0.9 mm"), (2, "1 mm"))]
+    rows = [row_with_outcome(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "0.9 mm"), (2, "1 mm"))]
     assert process_map(read_study(write(text)), "outcome", rows).axes[0].get_xlabel() == "pitch [mm]"
-    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "900 um"), (2, "1000 um"))]
+    rows = [row_with_outcome(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "900 um"), (2, "1000 um"))]
     assert process_map(read_study(write(text)), "outcome", rows).axes[0].get_xlabel() == "pitch [µm]"
     axis = main_effects(tables.effects(read_study(write(text)), rows)).axes[0]
     assert axis.get_xlabel() == "package\npitch [µm]"
-    rows = [told(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "fine"), (2, "wide"))]
+    rows = [row_with_outcome(k, {"package.pitch": pitch}, "merged") for k, pitch in ((1, "fine"), (2, "wide"))]
     assert process_map(read_study(write(text)), "outcome", rows) is None
 
 
-def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys):
+def test_missing_metric_is_reported(write, tmp_path, monkeypatch, capsys):
     points = read_points_of(write('[grid]\n"package.pitch" = ["1 mm"]\n', HEAD.replace("stress", "stres")))
     monkeypatch.setattr("reflowshock.workflow.study.command.missing", lambda *_: [])
     monkeypatch.setattr("reflowshock.workflow.study.command.row_of", lambda *_: ROWS[0])
@@ -254,7 +255,7 @@ def test_a_metric_that_there_is_not_is_told(write, tmp_path, monkeypatch, capsys
     assert "did you mean stress?" in capsys.readouterr().err
 
 
-def test_no_text_of_a_csv_file_is_a_formula(tmp_path):
+def test_csv_file_contains_no_formula(tmp_path):
     from reflowshock.workflow.study.results import write_csv
 
     path = tmp_path / "results.csv"

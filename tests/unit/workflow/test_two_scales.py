@@ -36,12 +36,12 @@ def rows_of(table: dict) -> dict[str, str]:
     return {row[0]: row[1] for row in table["rows"]}
 
 
-def test_the_section_tells_scheme_joints_and_checks():
+def test_the_section_has_scheme_joints_and_checks():
     rows = rows_of(section.two_scales(COUPLING, MODEL, "the most stressed"))
     assert rows["scheme"].startswith("local time steps")
-    assert rows["why"] == "all is linear"
+    assert rows["reason"] == "all is linear"
     assert rows["fine joints"] == "A4 B4"
-    assert rows["how they were chosen"] == "the most stressed"
+    assert rows["selection of fine joints"] == "the most stressed"
     assert rows["meso share f of the elements"] == "40 %"
     assert rows["rigid motion through tie and interface, error"] == "2.00e-16"
     assert rows["mass of the macro model"] == "1000 mg"
@@ -68,12 +68,12 @@ def test_levels_begin_with_the_window():
     ]
 
 
-def test_predictions_stand_beside_what_was_measured():
+def test_predictions_are_listed_with_measurements():
     rows = rows_of(section.placement(COUPLING))
     assert rows["window, predicted, shared by 2 (chosen)"] == "300 µs"
     assert rows["window, predicted, macro on rank 0, meso on rank 1"] == "400 µs"
     assert rows["window, measured"] == "330 µs"
-    assert rows["rank 1 computes"] == "92 %"
+    assert rows["rank 1, computing"] == "92 %"
     assert rows["coupling, share of a window"] == "2 %"
 
 

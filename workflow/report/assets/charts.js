@@ -1,5 +1,5 @@
 "use strict";
-// Charts: values under the pointer stand in the legend; a drag zooms, a double click shows all again.
+// Charts with uPlot: the legend shows the values at the pointer; drag to zoom, double-click to reset.
 
 const CHART_HEIGHT = 230;
 const INK = "#1d2733";
@@ -45,14 +45,14 @@ async function drawChart(box, chart) {
   }).observe(box);
 }
 
-/** Return the width of what surrounds a chart that is folded away. */
+/** Return the width of the nearest visible ancestor of a hidden chart. */
 function shownWidth(box) {
   let parent = box;
   while (parent && !parent.clientWidth) parent = parent.parentElement;
   return (parent ? parent.clientWidth : 800) - 60;
 }
 
-/** Return the lines over one common x, as uPlot takes them. */
+/** Join the lines over a common x, as uPlot requires. */
 function aligned(lines, chart) {
   const tables = lines.map(([x, y]) => [Array.from(x), Array.from(y, (value) => gap(value, chart.y.log))]);
   const first = lines[0][0];
@@ -94,7 +94,7 @@ function axesOf(chart) {
   return [x, y, { ...shared, scale: "right", side: 1, values: ticks(chart.y), grid: { show: false }, size: sizeOfTicks }];
 }
 
-/** Return the width that the numbers of an upright axis take. */
+/** Return the width of the tick labels of a vertical axis. */
 function sizeOfTicks(plot, values, axis, cycle) {
   if (cycle > 1) return plot.axes[axis]._size;
   return 20 + 7 * Math.max(3, ...(values || []).map((text) => String(text).length));
@@ -105,7 +105,7 @@ function nameOf(axis, value) {
   return axis.names[value] === undefined ? "" : axis.names[value];
 }
 
-/** Return how the range of an axis follows from its values: named places have room on both sides. */
+/** Return the range of a categorical axis with a margin on both sides; undefined for other axes. */
 function rangeOf(axis) {
   return axis.names.length ? [-0.6, axis.names.length - 0.4] : undefined;
 }

@@ -1,5 +1,5 @@
 "use strict";
-// Controls of a 3D view: field, time, how large displacements are drawn, what is shown, where from.
+// Controls of a 3D view: field, time, displacement scale, visibility of groups, camera.
 
 function toolbar(viewer) {
   const { fields, frames } = viewer.scene;
@@ -46,27 +46,27 @@ function timeControls(viewer) {
 
 function exaggeration(viewer) {
   const most = Math.log10(Math.max(10 * viewer.scene.exaggeration, 10));
-  const told = element("output");
-  const slider = element("input", { type: "range", min: 0, max: most, step: most / 100, title: "displacement, times as large" });
+  const label = element("output");
+  const slider = element("input", { type: "range", min: 0, max: most, step: most / 100, title: "displacement scale" });
   slider.addEventListener("input", () => viewer.setFactor(Number((10 ** Number(slider.value)).toPrecision(2))));
   viewer.factorChanged = () => {
     slider.value = Math.log10(viewer.factor);
-    told.textContent = `× ${shortNumber(viewer.factor)}`;
+    label.textContent = `× ${shortNumber(viewer.factor)}`;
   };
   viewer.factorChanged();
-  return element("label", {}, "displacement ", slider, told);
+  return element("label", {}, "displacement ", slider, label);
 }
 
 function toggle(viewer, name) {
-  const own = viewer.groups.filter((group) => group.name === name);
+  const members = viewer.groups.filter((group) => group.name === name);
   const made = button("", () => {
-    const state = (own[0].state + 1) % STATES.length;
-    own.forEach((group) => (group.state = state));
-    made.tell();
+    const state = (members[0].state + 1) % STATES.length;
+    members.forEach((group) => (group.state = state));
+    made.update();
     viewer.wake();
   });
-  made.tell = () => (made.textContent = `${name}: ${STATES[own[0].state]}`);
-  made.tell();
+  made.update = () => (made.textContent = `${name}: ${STATES[members[0].state]}`);
+  made.update();
   return made;
 }
 

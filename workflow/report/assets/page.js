@@ -1,5 +1,5 @@
 "use strict";
-// What the other scripts share: the page's data, its arrays, new elements; and tables that sort by a click.
+// Shared by the other scripts: page data, arrays, elements, number formats; sortable tables.
 
 const page = JSON.parse(document.getElementById("page-data").textContent);
 const TYPES = { f4: Float32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i2: Int16Array };
@@ -17,7 +17,7 @@ async function inflated({ type, data }) {
   return new TYPES[type](await new Response(stream).arrayBuffer());
 }
 
-/** Return a new element with properties and children; texts are never markup. */
+/** Create an element with properties and children; text is never parsed as markup. */
 function element(tag, properties = {}, ...children) {
   const made = document.createElement(tag);
   for (const [key, value] of Object.entries(properties)) {
@@ -28,7 +28,7 @@ function element(tag, properties = {}, ...children) {
   return made;
 }
 
-/** Return a number with four digits. */
+/** Return a number with four significant digits. */
 function shortNumber(value) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
@@ -36,7 +36,7 @@ function shortNumber(value) {
   return String(Number(value.toPrecision(4)));
 }
 
-/** Return the colour `[r, g, b]`, 0 to 255, at a share of one of the page's scales. */
+/** Return the colour `[r, g, b]`, 0 to 255, at a position 0 to 1 of a colour scale. */
 function colourAt(share, scale) {
   const stops = page.scales[scale];
   const place = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
@@ -78,7 +78,7 @@ function compared(a, b) {
 
 document.querySelectorAll("table.sortable").forEach(sortable);
 
-// All of a page is printed: what is folded opens for that time.
+// Open folded sections while printing.
 let unfolded = [];
 addEventListener("beforeprint", () => {
   unfolded = [...document.querySelectorAll("details:not([open])")];

@@ -1,7 +1,7 @@
 "use strict";
-// Draw everything, what comes first on the page first; then joints that are picked in a table are shown in 3D.
+// Draw all figures from top to bottom; then connect the rows of the joint table to the 3D view.
 
-// The browser has shown the texts and tables, which need no drawing.
+// Resolves after the browser has painted texts and tables.
 const painted = () => new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
 
 async function start() {
@@ -21,7 +21,7 @@ const hasWebGL = document.querySelector("[data-scene]") && document.createElemen
 
 async function drawScene(place) {
   if (!hasWebGL) {
-    place.append(element("p", { className: "note" }, "This browser has no WebGL: the 3D view cannot be shown."));
+    place.append(element("p", { className: "note" }, "The 3D view needs WebGL 2, which this browser does not offer."));
     return;
   }
   place.viewer = await new Viewer(place, page.scenes[Number(place.dataset.scene)]).build();

@@ -1,5 +1,5 @@
 "use strict";
-// Of scenes in 3D: triangles and edges of faces, values that follow from a displacement, the bar of colours.
+// Geometry of 3D scenes: triangles and edges of faces, fields derived from displacements, colour bar.
 
 function derived(field, moved, k) {
   const [x, y, z] = [moved[3 * k], moved[3 * k + 1], moved[3 * k + 2]];

@@ -1,6 +1,6 @@
 "use strict";
-// Scenes in 3D: a drag turns, the wheel zooms once the view has been clicked, the right button moves; the slider shows
-// each stored time. A body that is clicked is named; `showPart` brings one to the front.
+// 3D scenes: drag to rotate, right-drag to pan, click and scroll to zoom; the slider selects the stored time. A click
+// names a body; `showPart` brings one to the front.
 
 const VIEW_HEIGHT = 460;
 const GHOST = 0.12;
@@ -26,7 +26,7 @@ class Viewer {
 
   async build() {
     this.root = new ogl.Transform();
-    // One for all bodies: a browser without a graphics card takes long to compile each.
+    // One program for all bodies, because compiling is slow without a graphics card.
     this.program = new ogl.Program(this.gl, { vertex: VERTEX, fragment: FRAGMENT, transparent: true });
     this.program.setBlendFunc(this.gl.ONE, this.gl.ONE_MINUS_SRC_ALPHA);
     this.groups = [];
@@ -186,7 +186,7 @@ class Viewer {
       const middle = range.map((values) => 0.5 * (Math.min(...values) + Math.max(...values)));
       const size = Math.max(...range.map((values) => Math.max(...values) - Math.min(...values)));
       this.lookAt(middle, 5.5 * size);
-      this.tell(part, 12, 12);
+      this.showTip(part, 12, 12);
     }
     this.wake();
     return true;
@@ -204,7 +204,7 @@ class Viewer {
   /** Look at what matters, the rest as one sees through it; or at the whole, all of it solid. */
   look(solid) {
     for (const group of this.groups) if (group.ghost && group.state !== 2) group.state = solid ? 1 : 0;
-    this.toggles.forEach((one) => one.tell());
+    this.toggles.forEach((one) => one.update());
     this.frameOn(solid);
     this.drift = this.meanMotion();
     this.setFactor(solid ? this.scene.exaggeration : this.wholeFactor());
@@ -260,16 +260,16 @@ class Viewer {
     if (Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) > 4) return;
     const box = this.gl.canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-    this.tell(this.pick(x, y), x, y);
+    this.showTip(this.pick(x, y), x, y);
   }
 
   tellAgain() {
-    if (!this.tip.hidden) this.tell(...this.told);
+    if (!this.tip.hidden) this.showTip(...this.tipArguments);
   }
 
   /** Name a body, and say the largest value that it has now. */
-  tell(part, x, y) {
-    this.told = [part, x, y];
+  showTip(part, x, y) {
+    this.tipArguments = [part, x, y];
     this.tip.hidden = part < 0;
     if (part < 0) return;
     const field = this.scene.fields[this.field];

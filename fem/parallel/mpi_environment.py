@@ -1,9 +1,9 @@
-"""The environment of processes that a process starts: apart from its MPI job. Loads no MPI."""
+"""Environment of child processes that must not belong to the parent's MPI job; does not load MPI."""
 
 from collections.abc import Mapping
 
-# What Open MPI leaves in the environment of a process that initialised MPI. An mpirun, or a child, that inherits it
-# takes itself for a part of that job and fails (seen from notebooks and test runs that imported mpi4py).
+# Open MPI sets these variables in a process that initialised MPI. A child process that inherits them takes itself for a
+# part of that job and fails, for example when started from a notebook that imported mpi4py.
 OTHER_MPI_JOB = (
     "PMIX_NAMESPACE", "PMIX_RANK", "PMIX_ID", "PMIX_SERVER_", "PMIX_DSTORE_", "PMIX_SECURITY_MODE", "PMIX_GDS_MODULE",
     "PMIX_BFROP_BUFFER_TYPE", "PMIX_VERSION", "PMIX_HOSTNAME", "PMIX_SYSTEM_TMPDIR", "PMIX_MCA_psec", "ORTE_",
@@ -13,6 +13,6 @@ OTHER_MPI_JOB = (
 )  # fmt: skip
 
 
-def own_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment without the traces of an MPI job that this process may be part of."""
+def without_mpi_job(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without the variables of the MPI job that this process may belong to."""
     return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}

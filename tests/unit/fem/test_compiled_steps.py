@@ -10,7 +10,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.dynamics.steps_at_once import StepsAtOnce
+from reflowshock.fem.dynamics.compiled_steps import CompiledSteps
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.loads.damping import RayleighDamping
@@ -53,13 +53,13 @@ def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interfa
 
 @pytest.mark.parametrize("pace", [1, 3])
 @pytest.mark.parametrize("name", SETTINGS)
-def test_steps_at_once_are_those_one_by_one(name, pace):
+def test_compiled_steps_are_those_one_by_one(name, pace):
     formulation, response, entries = SETTINGS[name]
     drop = half_sine_drop(1e7, 20 * STEP)
     ended = []
-    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_each):
+    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_single_steps):
         body = body_of(formulation, response, pace)
-        assert entries <= set().union(*StepsAtOnce.of(body, [drop]).terms)
+        assert entries <= set().union(*CompiledSteps.of(body, [drop]).terms)
         assert len(body.schedule) == (1 if pace == 1 else 2)
         motion, interface = moving(body, [drop])
         take(motion, STEPS, interface)
@@ -89,13 +89,13 @@ def test_nodes_that_move_most_often_come_first():
     body = body_of(*SETTINGS["turning"][:2], pace=3)
     _, node = body.node_paces
     assert np.all(np.diff(node) >= 0)
-    ends = StepsAtOnce.of(body, []).ends
+    ends = CompiledSteps.of(body, []).ends
     assert ends.tolist() == [np.sum(node == 1), len(node), len(node)]
 
 
 def test_inverted_elements_are_told_alike():
     told = []
-    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_each):
+    for take in (ExplicitMotion.take_steps, ExplicitMotion._take_single_steps):
         motion, interface = moving(body_of(*SETTINGS["turning"][:2]), speed=2e4)
         with pytest.raises(InvertedElementError) as error:
             take(motion, STEPS, interface)
@@ -105,6 +105,6 @@ def test_inverted_elements_are_told_alike():
 
 def test_what_acts_between_steps_is_no_matter_of_one_call():
     body = body_of(*SETTINGS["small"][:2])
-    assert StepsAtOnce.of(body, [RayleighDamping.build(body, (1.0, 0.0))]) is None
-    assert StepsAtOnce.of(replace(body, terms=[*body.terms, SimpleNamespace(history={})]), []) is None
-    assert StepsAtOnce.of(replace(body, terms=[*body.terms, body.terms[0]]), []) is None
+    assert CompiledSteps.of(body, [RayleighDamping.build(body, 1.0, 0.0)]) is None
+    assert CompiledSteps.of(replace(body, terms=[*body.terms, SimpleNamespace(history={})]), []) is None
+    assert CompiledSteps.of(replace(body, terms=[*body.terms, body.terms[0]]), []) is None

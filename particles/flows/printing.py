@@ -2,15 +2,15 @@
 
 from functools import lru_cache
 from math import cos, inf, pi, sin, sqrt
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from reflowshock.effect import Switch
-from reflowshock.parameters import Parameters
-from reflowshock.particles.parameters.droplets import RIGHT_ANGLE, Droplet, DropletEffects, DropletNumerics, cap
-from reflowshock.particles.parameters.flows import SphFlow
-from reflowshock.particles.parameters.freezing import Freezing
+from reflowshock.effect import Decision, Effect, Switch, decided, decision
+from reflowshock.parameters import Parameters, changed
+from reflowshock.particles.flows.droplet import RIGHT_ANGLE, Droplet, DropletEffects, DropletNumerics, cap
+from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.freezing import Freezing
 from reflowshock.quantity import Quantity
 
 # sqrt(rho D^3 / gamma) that a drop is followed at most after it has landed, if it does not cure before.
@@ -47,7 +47,7 @@ class PrintingNumerics(DropletNumerics):
     settling: float = Field(SETTLING, ge=0.5, le=100)
 
 
-class Printing(SphFlow):
+class Printing(FlowScene):
     """Drops of ink that are printed on a plate and on each other: columns along x, rows along y, layers upwards.
 
     Drops of a layer are printed row by row; "serpentine" turns at the end of each, "interleaved" takes every other
@@ -193,6 +193,15 @@ class Printing(SphFlow):
         middle = 0.5 * (self.columns - 1), 0.5 * (self.rows - 1)
         return [((column - middle[0]) * self.pitch, (row - middle[1]) * self.pitch) for column, row in grid]
 
+    @property
+    def unit_scene(self) -> Droplet:
+        """One drop, whose numbers decide on the effects of every flow."""
+        return self.drop
+
+    def decide_own_effects(self) -> dict[str, Decision]:
+        """Decide on surface tension and gravity of one drop, and on freezing."""
+        return self.drop.decide_own_effects() | decided(PRINTING_EFFECTS, self)
+
 
 @lru_cache(maxsize=8)  # asked for in every step
 def _drop_of(scene: Printing) -> Droplet:
@@ -204,3 +213,38 @@ def _drop_of(scene: Printing) -> Droplet:
         effects=DropletEffects(**scene.effects.model_dump(exclude={"freezing"})),
         numerics=DropletNumerics(**scene.numerics.model_dump(exclude={"settling"})),
     )  # fmt: skip
+
+
+class InkFreezing(Effect[Printing]):
+    """Freezing of printed drops on a cold plate."""
+
+    name = "freezing"
+    stage = "particles"
+    adds = "de/dt = div(k grad T) / rho; a particle without half of its latent heat stands still"
+    number = (
+        "sqrt(delay / t_f), t_f = H^2 / (4 lambda^2 a): share of a drop's height that freezes before the next lands"
+    )
+    threshold = LITTLE_FROZEN
+    influence = "the number; without freezing light cures the drops"
+    place = "reflowshock.particles.sph.heat.Heat"
+    switch = "printing.effects.freezing = auto, on, off"
+    source = "Neumann's solution, as in Carslaw & Jaeger 1959; Cleary & Monaghan 1999; Voller & Prakash 1987"
+
+    def decide(self, scene: Printing) -> Decision:
+        """By the share that freezes, or as the user says."""
+        freezing, switch = scene.freezing, scene.effects.freezing
+        if freezing is None:
+            return decision(False, "no freezing is given: light cures the drops")
+        why = (
+            f"Stefan number {freezing.stefan:.3g}: {100.0 * scene.share_frozen:.3g} % of a drop's height between drops"
+        )
+        if switch != "auto":
+            why = f"set to {switch} by the user ({why})"
+        return decision(scene.freezes, why, scene.share_frozen)
+
+    def other_way(self, case: Any, acts: bool) -> Any | None:
+        """Return a case whose drops are cured by light; where the case gives no freezing, none is known."""
+        return changed(case, f"{case.kind}.freezing", None) if acts else None
+
+
+PRINTING_EFFECTS = (InkFreezing(),)

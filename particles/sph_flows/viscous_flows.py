@@ -1,15 +1,15 @@
-"""Flows with exact solutions: liquid between plates that a force sets in motion, vortices that die out."""
+"""Viscous flows with exact solutions, by delta-SPH: the start of channel flow, and decaying vortices."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
-from reflowshock.particles.parameters.flows import Poiseuille, TaylorGreen
+from reflowshock.particles.flows.channel import Poiseuille, channel_points, exact_speeds, plate_points
+from reflowshock.particles.flows.result import FlowResult
+from reflowshock.particles.flows.vortices import TaylorGreen, box_points
 from reflowshock.particles.reference import viscous_flows as exact
 from reflowshock.particles.sph import flow
-from reflowshock.particles.sph.flow import FlowResult
 from reflowshock.particles.sph.simulation import Simulation
 
 Progress = Callable[[float], None]
@@ -18,10 +18,10 @@ Progress = Callable[[float], None]
 def solve_poiseuille(
     scene: Poiseuille, progress: Progress | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let a force set liquid between plates in motion; compare its speeds with the exact ones.
+    """Compute the start of channel flow and its error against the exact speeds.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     simulation = channel(scene)
 
@@ -39,28 +39,15 @@ def solve_poiseuille(
         "largest_error_at_end": (float(history["largest_error"][-1]), ""),
         "reynolds": (scene.reynolds_number, ""),
     }
-    if scene.rheology is None:  # else the steady flow alone is known
+    if scene.rheology is None:  # with a rheology only the steady flow is known
         metrics["profile_error"] = float(history["profile_error"].max()), ""
     return flow.result_of(run, history, metrics)
 
 
-def exact_speeds(height: Floats, time: float, scene: Poiseuille) -> Floats:
-    """Return exact speeds between plates [m/s] at heights `(n,)` [m], a time [s]; of a rheology, the steady ones."""
-    if scene.rheology is None:
-        return exact.starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
-    law = scene.rheology
-    return exact.steady_channel(
-        height, scene.width, scene.rate_at_wall, lambda rate: law.viscosity(rate, scene.viscosity)
-    )
-
-
 def channel(scene: Poiseuille) -> Simulation:
     """Set up liquid at rest between two plates."""
-    across, layers = scene.numerics.particles_across, flow.wall_layers(scene)
     law = flow.law_of(scene, (scene.columns * scene.spacing, 0.0, 0.0), (scene.force, 0.0, 0.0), has_surface=False)
-    columns, beside = np.arange(scene.columns), np.arange(layers)
-    liquid = flow.lattice(columns, np.arange(across), scene.spacing)
-    walls = flow.lattice(columns, np.concatenate((-1 - beside, across + beside)), scene.spacing)
+    liquid, walls = channel_points(scene), plate_points(scene, flow.wall_layers(scene))
     fields = flow.liquid_and_walls(liquid, walls, np.zeros(liquid.shape[1]), law)
     return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
@@ -68,10 +55,10 @@ def channel(scene: Poiseuille) -> Simulation:
 def solve_taylor_green(
     scene: TaylorGreen, progress: Progress | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Let vortices die out; compare their speeds with the exact ones.
+    """Compute decaying vortices and their error against the exact speeds.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     simulation = vortices(scene)
     rate = exact.taylor_green_decay(scene.side, scene.viscosity / scene.density)
@@ -94,9 +81,8 @@ def solve_taylor_green(
 
 def vortices(scene: TaylorGreen) -> Simulation:
     """Set up the vortices in a periodic box."""
-    places = np.arange(scene.numerics.particles_across)
     law = flow.law_of(scene, (scene.side, 0.0, scene.side), (0.0, 0.0, 0.0), has_surface=False)
-    liquid = flow.lattice(places, places, scene.spacing)
+    liquid = box_points(scene)
     u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)
     fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
     fields.u[:], fields.w[:] = scene.speed * u, scene.speed * w

@@ -1,4 +1,4 @@
-"""All steps of a window in one compiled call, where nothing else acts between them: no message, no load at nodes."""
+"""All steps of a window in one compiled call, if no message and no nodal load acts between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from reflowshock.fem.model.body import Body
 
 
 def none_of(*shape: int, kind: type = np.float64) -> Any:
-    """Return an array with no entries for a kernel that has nothing to do."""
+    """Return an empty array of the given shape, for the unused arguments of a kernel."""
     return np.zeros(shape, kind)
 
 
@@ -55,19 +55,21 @@ NOTHING = ForceArrays(
 
 
 def no_interface(steps: int) -> Interface:
-    """Return the interface of a model that nobody moves through some steps."""
-    nowhere = none_of(0, 3)
-    return Interface(NODES, NODES, nowhere, none_of(steps, 3), none_of(steps + 1, 2), none_of(2, 0, 3))
+    """Return an empty coupling interface for a number of steps."""
+    return Interface(NODES, NODES, none_of(0, 3), none_of(steps, 3), none_of(steps + 1, 2), none_of(2, 0, 3))
 
 
 @dataclass(frozen=True, slots=True)
-class StepsAtOnce:
-    """The compiled steps of a motion.
+class CompiledSteps:
+    """Arrays of a model with which one compiled call takes many explicit steps.
 
     Attributes:
-        forces: Its force terms by pace.
-        order: ``(ns,)`` slaves of the tie as ``StepArrays`` has them, ``tied`` in this order; others as there.
-        terms: By pace, entry of ``ForceArrays`` -> the term.
+        forces: Arrays of the force terms by pace.
+        order: Order of the tie's slaves in ``StepArrays``, shape (ns,).
+        tied: Slaves, masters and weights of the tie in this order.
+        moved: Number of slaves moved at each pace, as in ``StepArrays``.
+        ends: Number of nodes updated at each pace, as in ``StepArrays``.
+        terms: For each pace, the force term by its field of ``ForceArrays``.
     """
 
     forces: PacedForces
@@ -78,58 +80,64 @@ class StepsAtOnce:
     terms: list[dict[str, Any]]
 
     @classmethod
-    def of(cls, body: Body, loads: Sequence[Load]) -> "StepsAtOnce | None":
-        """Return the steps of a body under loads.
+    def of(cls, body: Body, loads: Sequence[Load]) -> "CompiledSteps | None":
+        """Return the compiled steps of a body under loads.
 
-        None where some of either act between steps in their own way, or there are more than ``PACES``.
+        None if a force term or a load needs Python between steps, or if there are more than ``PACES`` paces.
         """
-        found: dict[int, dict[str, Any]] = {}
+        terms: dict[int, dict[str, Any]] = {}
         for term, pace in body.paced:
-            arrays, alike = getattr(term, "arrays", {}), found.setdefault(pace, {})
-            if not arrays or alike.keys() & arrays.keys():
+            arrays, same_pace = getattr(term, "arrays", {}), terms.setdefault(pace, {})
+            if not arrays or same_pace.keys() & arrays.keys():
                 return None
-            alike |= dict.fromkeys(arrays, term)
-        if len(found) > PACES or any(acts_at_nodes(load) for load in loads):
+            same_pace |= dict.fromkeys(arrays, term)
+        if len(terms) > PACES or any(acts_at_nodes(load) for load in loads):
             return None
-        paces, rest = sorted(found), PACES - len(found)
-        entries = [{name: term.arrays[name] for name, term in found[pace].items()} for pace in paces]
-        arrays = tuple(forces_of(NOTHING._replace(**own)) for own in [*entries, *[{}] * rest])
-        every, tie = np.array([*paces, *[0] * rest]), body.tie
-        own, node = body.node_paces
-        order = np.argsort(own, kind="stable")
-        moved = np.sum(own[:, None] <= every, axis=0)
-        ends = np.array([*(1 + np.flatnonzero(node <= pace)[-1] for pace in paces[:-1]), *[len(node)] * (1 + rest)])
+        paces, unused = sorted(terms), PACES - len(terms)
+        entries = [{name: term.arrays[name] for name, term in terms[pace].items()} for pace in paces]
+        arrays = tuple(forces_of(NOTHING._replace(**entry)) for entry in [*entries, *[{}] * unused])
+        all_paces, tie = np.array([*paces, *[0] * unused]), body.tie
+        slave_pace, node_pace = body.node_paces
+        order = np.argsort(slave_pace, kind="stable")
+        moved = np.sum(slave_pace[:, None] <= all_paces, axis=0)
+        last = [1 + np.flatnonzero(node_pace <= pace)[-1] for pace in paces[:-1]]
+        ends = np.array([*last, *[len(node_pace)] * (1 + unused)])
         tied = tie.slave[order], tie.master[order], tie.weight[order]
-        return cls(paced_forces_of(arrays, every), order, tied, moved, ends, [found[pace] for pace in paces])
+        return cls(paced_forces_of(arrays, all_paces), order, tied, moved, ends, [terms[pace] for pace in paces])
 
     def take(
         self,
         motion: Motion,
-        state: tuple[np.ndarray, np.ndarray],
+        state: np.ndarray,
+        ahead: np.ndarray,
         interface: Interface,
-        course: tuple[Sequence[float], np.ndarray],
+        accelerations: np.ndarray,
     ) -> float:
-        """Take steps; return the work of the accelerations [J].
+        """Take m steps and advance the time of the motion.
 
         Args:
-            motion: Of which ``state`` is the ``state`` and ``ahead`` of ``StepArrays``.
-            state: See above.
-            interface: See ``take_steps``.
-            course: Times [s] as each of m steps begins and after the last; accelerations ``(m + 1, 3)`` [m/s^2] then.
+            motion: Motion that takes the steps.
+            state: Displacement, velocity and force of the motion, shape (3, n, 3).
+            ahead: Delayed force of paced terms, as in ``ExplicitMotion``.
+            interface: Coupling interface, see ``kernels.levels.take_steps``.
+            accelerations: Body acceleration before the first step and after each step, shape (m + 1, 3) [m/s^2].
+
+        Returns:
+            Work of the body acceleration [J].
 
         Raises:
-            InvertedElementError: An element is turned inside out; the motion's time is that of the step.
+            InvertedElementError: An element is inverted; ``motion.time`` is then the time of the failed step.
         """
-        times, accelerations = course
         steps = StepArrays(
-            *(*state, motion.mobility, motion.counted_mass, *self.tied),
+            *(state, ahead, motion.mobility, motion.counted_mass, *self.tied),
             order=self.order,
             moved=self.moved,
             ends=self.ends,
             slave_force=motion.slave_force,
         )
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
-        motion.time = times[taken]
+        for _ in range(taken):
+            motion.time += motion.step
         if which != ALL_FINE:
             error: InvertedElementError = self.terms[pace][NAMES[which]].inverted(block, motion.displacement)
             raise error
@@ -137,6 +145,6 @@ class StepsAtOnce:
 
 
 def acts_at_nodes(load: Load) -> bool:
-    """Return whether a load does more in a step than to accelerate all masses."""
+    """Return whether a load does more in a step than accelerate all masses."""
     kind = type(load)
     return any(getattr(kind, name) is not getattr(Load, name) for name in ("drive", "add", "collect"))

@@ -11,8 +11,8 @@ import pytest
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.process import last_word
-from reflowshock.workflow.process.last_word import in_words, say
+from reflowshock.workflow.process import error_exit
+from reflowshock.workflow.process.error_exit import describe_error, report_error
 from reflowshock.workflow.process.launch import LaunchError
 from reflowshock.workflow.store.folders import RunFolderBusy
 
@@ -20,7 +20,7 @@ from reflowshock.workflow.store.folders import RunFolderBusy
 @pytest.fixture(autouse=True)
 def no_run_before(monkeypatch):
     """Commands that other tests have called in this process are forgotten."""
-    monkeypatch.setattr(last_word, "_known", {})
+    monkeypatch.setattr(error_exit, "_run_folder", {})
 
 
 COMMAND = "from reflowshock.workflow.__main__ import main; main()"
@@ -43,8 +43,8 @@ def raised(error: BaseException, cause: BaseException | None = None) -> BaseExce
         (PermissionError(errno.EACCES, "x", "/a"), "permission denied: /a"),
         (FileNotFoundError(errno.ENOENT, "x", "/a"), "the file or folder does not exist or was removed: /a"),
         (OSError(errno.EMFILE, "x", "/a"), "too many files are open (ulimit -n): /a"),
-        (MemoryError(), last_word.NO_MEMORY),
-        (ImportError("libx.so: failed to map segment from shared object"), last_word.NO_MEMORY),
+        (MemoryError(), error_exit.NO_MEMORY),
+        (ImportError("libx.so: failed to map segment from shared object"), error_exit.NO_MEMORY),
         (RuntimeError("can't start new thread"), "no further process or thread can be started (ulimit -u)"),
         (OSError("file write failed: errno = 28, error message = 'No space left on device'"), "no space left on the "
          "device while writing /where"),
@@ -55,17 +55,17 @@ def raised(error: BaseException, cause: BaseException | None = None) -> BaseExce
     ],
 )  # fmt: skip
 def test_words(error, words):
-    assert in_words(error, Path("/where")) == words
+    assert describe_error(error, Path("/where")) == words
 
 
 def test_what_is_behind_an_error_tells():
     behind = OSError(errno.ENOSPC, "x", "/a")
-    assert in_words(raised(ValueError("cannot write"), behind)) == "no space left on the device while writing /a"
+    assert describe_error(raised(ValueError("cannot write"), behind)) == "no space left on the device while writing /a"
 
 
 def test_petsc_errors_are_in_words():
     error = type("Error", (RuntimeError,), {"__module__": "petsc4py.PETSc", "ierr": 55})()
-    assert in_words(error) == f"PETSc: {last_word.NO_MEMORY}"
+    assert describe_error(error) == f"PETSc: {error_exit.NO_MEMORY}"
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,13 @@ def test_petsc_errors_are_in_words():
     ],
 )
 def test_known_ends_need_no_details(error, code, said, capsys):
-    assert say(error) == code
+    assert report_error(error) == code
     assert capsys.readouterr().err == said
 
 
 def test_details_go_to_the_logs_of_the_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(last_word, "_known", {"folder": tmp_path})
-    assert say(raised(ZeroDivisionError("by zero"))) == 1
+    monkeypatch.setattr(error_exit, "_run_folder", {"folder": tmp_path})
+    assert report_error(raised(ZeroDivisionError("by zero"))) == 1
     (path,) = (tmp_path / "logs").iterdir()
     assert capsys.readouterr().err == f"error: ZeroDivisionError: by zero (details: {path})\n"
     assert "in raised" in path.read_text(encoding="utf-8")
@@ -93,17 +93,17 @@ def test_details_go_to_the_logs_of_the_run(tmp_path, monkeypatch, capsys):
 
 def test_details_go_to_a_temporary_file_without_a_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    say(ZeroDivisionError("by zero"))
+    report_error(ZeroDivisionError("by zero"))
     (path,) = tmp_path.iterdir()
     assert f"(details: {path})" in capsys.readouterr().err
 
 
 def test_the_last_lines_are_said_where_no_file_can_be_written(monkeypatch, capsys):
     monkeypatch.setattr("tempfile.tempdir", "/proc/nowhere")
-    say(raised(ZeroDivisionError("by zero")))
+    report_error(raised(ZeroDivisionError("by zero")))
     lines = capsys.readouterr().err.splitlines()
     assert lines[0].startswith("error: ZeroDivisionError: by zero (details cannot be written")
-    assert len(lines) <= 1 + last_word.LAST_LINES
+    assert len(lines) <= 1 + error_exit.LAST_LINES
 
 
 def command(*arguments: str, **options) -> subprocess.CompletedProcess:

@@ -5,8 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.effect import Switch
-from reflowshock.particles.parameters.flows import MethodNumerics, SphEffects, SphFlow
+from reflowshock.effect import Decision, Effect, Switch, decided, decision
+from reflowshock.particles.flows.flow import FlowScene, FlowSwitches
+from reflowshock.particles.flows.sph_numerics import MethodNumerics
+from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.quantity import Quantity
 
 RIGHT_ANGLE = 0.5 * pi
@@ -20,6 +22,10 @@ FOLLOWED_IMPACT, FOLLOWED_REST = 6.0, 4.0
 WallAngle = Annotated[float | None, Quantity("deg"), Field(ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)]
 
 
+# 1 / sqrt(We): with less, surface tension changes the spread of an impact by less than that.
+LITTLE_TENSION = 0.01
+
+
 class DropletNumerics(MethodNumerics):
     """How a droplet is computed: with particles a spacing apart at the start, or so many across the diameter."""
 
@@ -27,14 +33,14 @@ class DropletNumerics(MethodNumerics):
     particles_per_diameter: float | None = Field(None, ge=8, le=200)
 
 
-class DropletEffects(SphEffects):
+class DropletEffects(FlowSwitches):
     """What acts besides pressure: decided from Reynolds, Weber and Bond number (auto), or by the user."""
 
     surface_tension: Switch = "auto"
     gravity: Switch = "auto"
 
 
-class Droplet(SphFlow):
+class Droplet(FlowScene):
     """A droplet.
 
     With a speed, or with Weber and Reynolds number, it strikes a wall, as a sphere that just touches it; then the
@@ -163,6 +169,60 @@ class Droplet(SphFlow):
     def ohnesorge(self) -> float:
         """Ohnesorge number mu / sqrt(rho gamma D)."""
         return self.liquid_viscosity / sqrt(self.density * self.surface_tension * self.diameter)
+
+    def decide_own_effects(self) -> dict[str, Decision]:
+        """Decide on surface tension and gravity."""
+        return decided(DROPLET_EFFECTS, self)
+
+
+class DropletTension(Effect[Droplet]):
+    """Surface tension of a droplet, and the wetting of its wall."""
+
+    name = "droplet_tension"
+    stage = "particles"
+    adds = "-d(gamma (A_free - cos(theta) A_wet))/dx, shared among the particles beside the surface"
+    number = "1 / sqrt(We), We = rho U^2 D / gamma: square root of surface energy over kinetic energy"
+    threshold = LITTLE_TENSION
+    influence = "the number, for the spread of an impact; without an impact nothing else acts"
+    place = "reflowshock.particles.sph.liquid_surface.LiquidSurface"
+    switch = "droplet.effects.surface_tension = auto, on, off"
+    source = "Pasandideh-Fard et al. 1996: D_max / D = sqrt((We + 12) / (3 (1 - cos theta) + 4 We / sqrt(Re)))"
+
+    def decide(self, scene: Droplet) -> Decision:
+        """By the Weber number, or as the user says."""
+        number = min(1.0 / sqrt(scene.weber_number), 1.0) if scene.weber_number else 1.0
+        why = f"Weber number {scene.weber_number:.3g}" if scene.impact_speed else "nothing else moves the drop"
+        switch = scene.effects.surface_tension
+        if switch != "auto":
+            return decision(switch == "on", f"set to {switch} by the user ({why})", number)
+        return decision(number > LITTLE_TENSION, why, number)
+
+
+class DropletGravity(Effect[Droplet]):
+    """Weight of a droplet on a wall."""
+
+    name = "droplet_gravity"
+    stage = "particles"
+    adds = "g"
+    number = "Bo = rho g D^2 / gamma"
+    threshold = NEGLIGIBLE_SHAPE_CHANGE / SHAPE_CHANGE_BY_BOND
+    influence = "0.2 Bo, of the height"
+    place = "reflowshock.particles.sph.flow.law_of"
+    switch = "droplet.effects.gravity = auto, on, off"
+    source = "Bashforth & Adams 1883, tables"
+
+    def decide(self, scene: Droplet) -> Decision:
+        """By the Bond number, or as the user says; a free drop would only fall."""
+        bond, switch = scene.bond, scene.effects.gravity
+        if not scene.has_wall:
+            return decision(False, "no wall: the drop would fall as a whole", 0.0)
+        influence, why = min(SHAPE_CHANGE_BY_BOND * bond, 1.0), f"Bond number {bond:.3g}"
+        if switch != "auto":
+            return decision(switch == "on", f"set to {switch} by the user ({why})", influence)
+        return decision(influence > NEGLIGIBLE_SHAPE_CHANGE, why, influence)
+
+
+DROPLET_EFFECTS = (DropletTension(), DropletGravity())
 
 
 def cap(angle: float) -> tuple[float, float]:

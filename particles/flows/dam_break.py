@@ -1,0 +1,127 @@
+"""Scene of a dam break: a column of liquid in the corner of a tank is released (Buchner 2002)."""
+
+from math import sqrt
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from reflowshock.arrays import Floats
+from reflowshock.particles.flows.flow import PlaneFlow
+from reflowshock.particles.flows.lattice import lattice
+from reflowshock.particles.flows.result import Metrics
+from reflowshock.quantity import Quantity
+
+# Pressure at the sensor, in rho g H, above which the wave has reached it.
+REACHED = 0.05
+# In sqrt(H / g): the plateau behind the impact, and when the wave that falls back strikes.
+PLATEAU, SECOND = (3.5, 5.0), (5.2, 7.0)
+# In sqrt(H / g): pressures are averaged over it before the second rise is sought.
+WINDOW = 0.1
+
+
+class DamBreak(PlaneFlow):
+    """Column of liquid in the corner of a tank that is released; a sensor in the opposite wall measures pressure.
+
+    Walls are smooth: liquid slides along them. Pressures are reported in rho g H, times in sqrt(H / g), with the
+    height H of the column.
+    """
+
+    has_free_surface = True
+
+    height: Annotated[float, Quantity("m")] = Field(gt=0)
+    width: Annotated[float, Quantity("m")] = Field(gt=0)
+    tank_length: Annotated[float, Quantity("m")] = Field(gt=0)
+    sensor_height: Annotated[float, Quantity("m")] = Field(gt=0)
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, gt=0)
+    duration: Annotated[float, Quantity("s")] = Field(gt=0)
+
+    @property
+    def length(self) -> float:
+        """The column's height [m]."""
+        return self.height
+
+    @property
+    def fastest(self) -> float:
+        """Speed of a fall over the column's height, sqrt(2 g H) [m/s]."""
+        return sqrt(2.0 * self.gravity * self.height)
+
+    @property
+    def unit_of_time(self) -> float:
+        """sqrt(H / g) [s]."""
+        return sqrt(self.height / self.gravity)
+
+    @property
+    def columns(self) -> int:
+        """Particles along the column's width."""
+        return max(1, round(self.width / self.spacing))
+
+    @property
+    def particles(self) -> int:
+        """Particles of the liquid."""
+        return self.columns * self.numerics.particles_across
+
+    @property
+    def until(self) -> float:
+        """Duration of the flow [s]."""
+        return self.duration
+
+
+def column_points(scene: DamBreak) -> Floats:
+    """Return the particles of the column at the start, shape (3, n) [m]."""
+    return lattice(np.arange(scene.columns), np.arange(scene.numerics.particles_across), scene.spacing)
+
+
+def tank_points(scene: DamBreak, layers: int) -> Floats:
+    """Return the wall particles of a tank without a lid, 4 columns high, shape (3, m) [m].
+
+    Args:
+        scene: Dam break.
+        layers: Number of particles across a wall.
+    """
+    spacing, length = scene.spacing, tank_columns(scene)
+    rows = np.arange(-layers, 4 * scene.numerics.particles_across)
+    block = lattice(np.arange(-layers, length + layers), rows, spacing)
+    outside = (block[0] < 0.0) | (block[0] > length * spacing) | (block[2] < 0.0)
+    return block[:, outside]
+
+
+def tank_columns(scene: DamBreak) -> int:
+    """Return the length of the tank in spacings."""
+    return round(scene.tank_length / scene.spacing)
+
+
+def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
+    """Return arrivals and pressure of the wave and the rise of energy; nan for what lies after the end of the run."""
+    time = history["time"] / scene.unit_of_time
+    pressure = history["sensor_pressure"] / (scene.density * scene.gravity * scene.height)
+    reached = pressure > REACHED
+    plateau = (time >= PLATEAU[0]) & (time <= PLATEAU[1])
+    total = history["kinetic_energy"] + history["potential_energy"] + history["elastic_energy"]
+    unknown = float("nan")
+    return {
+        "impact_onset": (float(time[np.argmax(reached)]) if reached.any() else unknown, "sqrt(H/g)"),
+        "plateau_mean": (float(pressure[plateau].mean()) if time[-1] >= PLATEAU[1] else unknown, "rho g H"),
+        "second_rise": (second_rise(time, pressure), "sqrt(H/g)"),
+        "energy_rise": (float((np.maximum.accumulate(total[::-1])[::-1] - total).max() / total[0]), ""),
+    }  # fmt: skip
+
+
+def second_rise(time: Floats, pressure: Floats) -> float:
+    """Return the time of the second rise: midway from the plateau to the largest window mean after it.
+
+    Args:
+        time: Times, shape (n,) [sqrt(H / g)].
+        pressure: Pressure at the sensor, shape (n,) [rho g H].
+
+    Returns:
+        Time in sqrt(H / g); nan where the history ends before.
+    """
+    if time[-1] < SECOND[1]:
+        return float("nan")
+    width = max(1, round(WINDOW / float(np.diff(time).mean())))
+    smooth = np.convolve(pressure, np.full(width, 1.0 / width), mode="same")
+    plateau = pressure[(time >= PLATEAU[0]) & (time <= PLATEAU[1])].mean()
+    later = (time >= SECOND[0]) & (time <= SECOND[1])
+    middle = 0.5 * (plateau + smooth[later].max())
+    return float(time[later][np.argmax(smooth[later] >= middle)])
