@@ -84,8 +84,8 @@ def speed2_of(i, fields):
 
 
 @compiled
-def cover(k, i, fields, values, law):
+def cover(k, i, fields, found, law):
     """Write the ``values`` that `wall_values` returns to the k-th wall particle, particle i of all."""
-    pressure, u, v, w, share = values
+    pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share
     fields.density[i] = law.rest_density + pressure / (law.sound * law.sound)

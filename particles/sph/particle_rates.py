@@ -19,6 +19,7 @@ LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
 # Functions without arrays of their own need no reference counts, which cost a tenth of a step and made threads wait.
 compiled = njit(cache=True, error_model="numpy", _nrt=False)
 # Sums may be reordered by the compiler, so that several pairs are computed at a time; threads do not change the order.
+# The order follows the names of the variables: renaming one changes the last bits of results.
 summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}, _nrt=False)
 
 
@@ -48,11 +49,11 @@ def across(distance, period):
 
 
 @compiled
-def apart(position, j, side, fields, periods):
+def apart(place, j, side, fields, periods):
     """Return the vector from particle j, or from its mirror image if ``side`` is -1, to a position [m]."""
-    dx = across(position[0] - fields.x[j], periods[0])
-    dy = across(position[1] - fields.y[j], periods[1])
-    return dx, dy, across(position[2] - side * fields.z[j], periods[2])
+    dx = across(place[0] - fields.x[j], periods[0])
+    dy = across(place[1] - fields.y[j], periods[1])
+    return dx, dy, across(place[2] - side * fields.z[j], periods[2])
 
 
 @compiled
@@ -133,48 +134,48 @@ def _by_liquid(i, neighbours, fields, law):
     Pairs have no branch, so that several are computed at a time.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
-    density, pressure, specific_volume = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
+    density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     gx, gy, gz = fields.slope_x[i], fields.slope_y[i], fields.slope_z[i]
     periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     diffusion, artificial, viscosity = positive(law.diffusion), positive(law.artificial), own_viscosity(i, fields, law)
-    along = 2.0 * (law.dimension + 2) * specific_volume if law.has_surface else 0.0  # factor of the viscosity of a pair
-    aside = 0.0 if law.has_surface else 2.0 * specific_volume
+    along = 2.0 * (law.dimension + 2) * lightness if law.has_surface else 0.0  # over the viscosity of a pair
+    aside = 0.0 if law.has_surface else 2.0 * lightness
     rate = ax = ay = az = cx = cy = cz = 0.0
     bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
         side = 1.0 - 2.0 * image
-        hold = side if law.no_slip else 1.0  # an image moves along the wall with the particle, or against it
-        weight_below = (side - 1.0) * law.gravity_z  # images have additional hydrostatic pressure
-        held = 0.5 * (1.0 - hold)  # 1 for images at a no-slip wall, which does not rotate with the liquid
-        turning, sheared = (1.0 - held) * along, (1.0 - held) * aside + held * 2.0 * specific_volume
+        hold = side if law.no_slip else 1.0  # an image moves on along the wall, or back
+        weight_below = (side - 1.0) * law.gravity_z  # an image has more weight
+        held = 0.5 * (1.0 - hold)  # by the wall, with which nothing turns
+        turning, sheared = (1.0 - held) * along, (1.0 - held) * aside + held * 2.0 * lightness
         for n in range(len(neighbours)):
             j = uint32(neighbours[n])
             dx, dy, dz = apart((x, y, z), j, side, fields, periods)
             distance2 = dx * dx + dy * dy + dz * dz
             q = sqrt(distance2) * inverse
-            gradient = scale * slope(law.kernel, line, q)
-            density_j = fields.density[j]
-            volume = fields.mass[j] / density_j
+            steep = scale * slope(law.kernel, line, q)
+            beside = fields.density[j]
+            volume = fields.mass[j] / beside
             uj, vj, wj = fields.u[j], fields.v[j], side * fields.w[j]
             du, dv, dw = u - hold * uj, v - hold * vj, w - wj
             approach = du * dx + dv * dy + dw * dz
             closing = approach + (hold - 1.0) * (uj * dx + vj * dy)
-            rate += pair_terms.continuity(closing, gradient, volume, density)
-            other = fields.pressure[j] + weight_below * fields.z[j] * density_j
-            push = pair_terms.pressure(pressure, other, gradient, volume, specific_volume)
-            push += artificial * pair_terms.artificial_viscosity(approach, distance2, gradient, volume, specific_volume)
+            rate += pair_terms.continuity(closing, steep, volume, density)
+            other = fields.pressure[j] + weight_below * fields.z[j] * beside
+            push = pair_terms.pressure(pressure, other, steep, volume, lightness)
+            push += artificial * pair_terms.artificial_viscosity(approach, distance2, steep, volume, lightness)
             shared = pair_terms.shared_viscosity(viscosity, fields.viscosity[j]) if law.rheology else viscosity
             nearness = 1.0 / (distance2 + softening)
-            push += pair_terms.central_viscosity(approach, nearness, gradient, volume, turning * shared)
-            drag = pair_terms.shear_viscosity(distance2, nearness, gradient, volume, sheared * shared)
-            jump = density_j - density
+            push += pair_terms.central_viscosity(approach, nearness, steep, volume, turning * shared)
+            drag = pair_terms.shear_viscosity(distance2, nearness, steep, volume, sheared * shared)
+            jump = beside - density
             ex, ey, ez = gx + fields.slope_x[j], gy + fields.slope_y[j], gz + side * fields.slope_z[j]
             rise = -0.5 * (ex * dx + ey * dy + ez * dz)
-            rate += diffusion * pair_terms.density_diffusion(jump, rise, gradient, volume)
-            weight = gradient * volume
-            concentration = weight * pair_terms.crowding(peak * shape(law.kernel, line, q))
+            rate += diffusion * pair_terms.density_diffusion(jump, rise, steep, volume)
+            weight = steep * volume
+            crowd = weight * pair_terms.crowding(peak * shape(law.kernel, line, q))
             ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
-            cx, cy, cz = cx + concentration * dx, cy + concentration * dy, cz + concentration * dz
+            cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
             bx, by, bz = bx + jump * weight * dx, by + jump * weight * dy, bz + jump * weight * dz
             xx, yy, zz = xx - weight * dx * dx, yy - weight * dy * dy, zz - weight * dz * dz
             xy, yz, xz = xy - weight * dx * dy, yz - weight * dy * dz, xz - weight * dx * dz
@@ -185,10 +186,10 @@ def _by_liquid(i, neighbours, fields, law):
 def _by_walls(i, fluids, neighbours, fields, law):
     """Return sums over wall particles and their images: density rate, acceleration, concentration gradient."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
-    density, pressure, specific_volume = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
+    density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
     own = positive(pressure) if pulls_not(law) else pressure
-    viscosity = own_viscosity(i, fields, law) * specific_volume if law.no_slip else 0.0
+    viscosity = own_viscosity(i, fields, law) * lightness if law.no_slip else 0.0
     rate = ax = ay = az = cx = cy = cz = 0.0
     for image in range(1 + (law.mirror if z < 2.0 * law.length else 0)):
         side = 1.0 - 2.0 * image
@@ -199,20 +200,18 @@ def _by_walls(i, fluids, neighbours, fields, law):
             dx, dy, dz = apart((x, y, z), j, side, fields, periods)
             distance2 = dx * dx + dy * dy + dz * dz
             q = sqrt(distance2) * inverse
-            gradient = scale * slope(law.kernel, line, q)
-            density_j = fields.density[j]
-            volume = fields.mass[j] / density_j * fields.wall_share[j - fluids]
+            steep = scale * slope(law.kernel, line, q)
+            beside = fields.density[j]
+            volume = fields.mass[j] / beside * fields.wall_share[j - fluids]
             du, dv, dw = u - hold * fields.u[j], v - hold * fields.v[j], w - side * fields.w[j]
             closing = closing_in(j - fluids, (u, v, w), (dx, dy, dz), fields)
-            rate += pair_terms.continuity(closing, gradient, volume, density)
-            other = fields.pressure[j] + weight_below * fields.z[j] * density_j
-            push = pair_terms.pressure(own, other, gradient, volume, specific_volume)
-            drag = pair_terms.shear_viscosity(
-                distance2, 1.0 / (distance2 + softening), gradient, volume, 2.0 * viscosity
-            )
-            concentration = gradient * volume * pair_terms.crowding(peak * shape(law.kernel, line, q))
+            rate += pair_terms.continuity(closing, steep, volume, density)
+            other = fields.pressure[j] + weight_below * fields.z[j] * beside
+            push = pair_terms.pressure(own, other, steep, volume, lightness)
+            drag = pair_terms.shear_viscosity(distance2, 1.0 / (distance2 + softening), steep, volume, 2.0 * viscosity)
+            crowd = steep * volume * pair_terms.crowding(peak * shape(law.kernel, line, q))
             ax, ay, az = ax + push * dx + drag * du, ay + push * dy + drag * dv, az + push * dz + drag * dw
-            cx, cy, cz = cx + concentration * dx, cy + concentration * dy, cz + concentration * dz
+            cx, cy, cz = cx + crowd * dx, cy + crowd * dy, cz + crowd * dz
     return rate, ax, ay, az, cx, cy, cz
 
 

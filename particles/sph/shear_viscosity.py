@@ -55,8 +55,8 @@ def viscosity_of(i, fluids, neighbours, fields, law):
         for n in range(count):
             j = uint32(neighbours[n])
             dx, dy, dz = apart((x, y, z), j, side, fields, periods)
-            gradient = scale * slope(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
-            weight = gradient * fields.mass[j] / fields.density[j]
+            steep = scale * slope(law.kernel, law.dimension == 1, sqrt(dx * dx + dy * dy + dz * dz) * inverse)
+            weight = steep * fields.mass[j] / fields.density[j]
             ju, jv, jw = hold * fields.u[j] - u, hold * fields.v[j] - v, side * fields.w[j] - w
             ux, uy, uz = ux + weight * ju * dx, uy + weight * ju * dy, uz + weight * ju * dz
             vx, vy, vz = vx + weight * jv * dx, vy + weight * jv * dy, vz + weight * jv * dz

@@ -67,6 +67,6 @@ def beyond_plane(kernel: int, distance: Floats) -> Floats:
 @lru_cache
 def _table_beyond_plane(kernel: int) -> tuple[Floats, Floats]:
     radius = np.linspace(0.0, SUPPORT, 801)
-    level = norm(kernel, 3, 1.0) * np.array([shape(kernel, False, q) for q in radius])
+    level = norm(kernel, 3, 1.0) * np.array([shape(kernel, False, one) for one in radius])
     area = 2.0 * pi * radius * np.maximum(radius - radius[:, None], 0.0)
     return radius, trapezoid(level * area, radius, axis=1)

@@ -248,17 +248,17 @@ def _find_rates(fluids, lists, fields, law, rates):
     rows, counts = lists
     for k in prange(fluids):
         i = np.uint64(k)
-        sums = rates_of(i, fluids, rows[i, : counts[i]], fields, law)
+        found = rates_of(i, fluids, rows[i, : counts[i]], fields, law)
         for row in range(10):
-            rates[row, i] = sums[row]
+            rates[row, i] = found[row]
 
 
 @threaded
-def _find_viscosities(fluids, lists, fields, law, viscosities):
+def _find_viscosities(fluids, lists, fields, law, found):
     rows, counts = lists
     for k in prange(fluids):
         i = np.uint64(k)
-        viscosities[i] = viscosity_of(i, fluids, rows[i, : counts[i]], fields, law)
+        found[i] = viscosity_of(i, fluids, rows[i, : counts[i]], fields, law)
 
 
 @threaded
