@@ -44,9 +44,9 @@ from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
 from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
-from benchmarks.support.kept_rows import KeptRows
 from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
+from benchmarks.support.stored_rows import StoredRows
 from benchmarks.support.whole_runs import found_in_runs
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
@@ -330,12 +330,12 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
 
     Each pair is kept in ``build`` when it is done: a run that was broken off goes on there.
     """
-    stored_rows = KeptRows(BUILD / f"growth-{formulation}.jsonl", formulation)
+    stored_rows = StoredRows(BUILD / f"growth-{formulation}.jsonl", formulation)
     growth_rates: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
     for number, (pair, fraction) in enumerate(list(grid())[::every], 1):
         label = f"{pair!r} at {fraction}"
-        row = stored_rows.found(label, partial(window_growth, pair, fraction, formulation))
+        row = stored_rows.get(label, partial(window_growth, pair, fraction, formulation))
         for name, values in growth_rates.items():
             values[label] = row[name]
         levels[label] = row["levels"]

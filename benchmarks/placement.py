@@ -92,9 +92,9 @@ def placed(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
 def main(counts: list[int]) -> None:
     table: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
-        found, path = requests(Path(folder)), Path(folder) / "requests.json"
+        inputs, path = requests(Path(folder)), Path(folder) / "requests.json"
         for count in counts:
-            path.write_text(json.dumps(placed(found, count)))
+            path.write_text(json.dumps(placed(inputs, count)))
             program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
             command = mpi_command(count, program, oversubscribe=True)
             subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.DEVNULL, check=True)

@@ -14,35 +14,39 @@ NAME = "remeshing"
 WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviation", "tries")
 
 
-def summary(kind: str, outcomes: list[dict]) -> dict:
+def summary(kind: str, joints: list[dict]) -> dict:
     """The worst of one kind."""
-    meshed = [outcome for outcome in outcomes if outcome["method"] != "refused"]
+    meshed = [joint for joint in joints if joint["method"] != "refused"]
     return {
         "kind": kind,
-        "count": len(outcomes),
-        **{way: sum(outcome["method"] == way for outcome in outcomes) for way in ("swept", "free-form", "refused")},
-        **{name: max((outcome[name] for outcome in meshed), default=None) for name in WORST},
-        "scaled_jacobian": min((outcome["scaled_jacobian"] for outcome in meshed), default=None),
-        "smallest_length": min((outcome["smallest_length"] for outcome in meshed), default=None),
-        "seconds": sum(outcome["seconds"] for outcome in outcomes) / len(outcomes),
+        "count": len(joints),
+        **{way: sum(joint["method"] == way for joint in joints) for way in ("swept", "free-form", "refused")},
+        **{name: max((joint[name] for joint in meshed), default=None) for name in WORST},
+        "scaled_jacobian": min((joint["scaled_jacobian"] for joint in meshed), default=None),
+        "smallest_length": min((joint["smallest_length"] for joint in meshed), default=None),
+        "seconds": sum(joint["seconds"] for joint in joints) / len(joints),
     }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    found = [outcome(sample) for sample in samples(8 if parser.parse_args().quick else 1)]
-    table = [summary(kind, own) for kind in COUNTS if (own := [one for one in found if one["kind"] == kind])]
+    joints = [outcome(sample) for sample in samples(8 if parser.parse_args().quick else 1)]
+    table = [
+        summary(kind, joints_of_kind)
+        for kind in COUNTS
+        if (joints_of_kind := [joint for joint in joints if joint["kind"] == kind])
+    ]
     for row in table:
         print(
             "  ".join(
                 f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}" for name, value in row.items()
             )
         )
-    for one in found:
-        if one["method"] == "refused":
-            print(f"refused: {one['kind']}: {one['reason']}")
-    results.write_figures(NAME, {"kinds": table, "joints": found})
+    for joint in joints:
+        if joint["method"] == "refused":
+            print(f"refused: {joint['kind']}: {joint['reason']}")
+    results.write_figures(NAME, {"kinds": table, "joints": joints})
 
 
 if __name__ == "__main__":

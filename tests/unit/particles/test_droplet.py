@@ -258,14 +258,14 @@ def test_friction_takes_less_than_the_velocity_of_a_contact_line_in_a_step(acros
 
 
 def test_threads_change_no_droplet(every_thread):
-    found = []
+    results = []
     for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation = droplet(drop(speed=3.0))
         for _ in range(15):
             simulation.step(simulation.time_step())
-        found.append(np.array(simulation.fields[:8]))
-    assert np.array_equal(*found)
+        results.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*results)
 
 
 def test_a_droplet_continues_to_the_same_bits(tmp_path):
@@ -293,8 +293,8 @@ def test_a_droplet_continues_to_the_same_bits(tmp_path):
 
 def test_effects_of_a_droplet_follow_from_its_numbers():
     small = drop(diameter=1e-4, density=1e3, surface_tension=0.07, viscosity=1e-3, contact_angle=1.0)
-    told = decide_flow(small)
-    assert not told["droplet_gravity"]["on"] and told["droplet_tension"]["on"]
+    decisions = decide_flow(small)
+    assert not decisions["droplet_gravity"]["on"] and decisions["droplet_tension"]["on"]
     large = small.model_copy(update={"diameter": 2e-3})
     assert decide_flow(large)["droplet_gravity"]["on"]
     assert not decide_flow(large.model_copy(update={"contact_angle": None}))["droplet_gravity"]["on"]

@@ -87,10 +87,10 @@ def test_vertices_that_particles_pass_or_leave_behind_follow_them():
     assert not strays((surface.points, normals), lists, simulation.fields, spacing).any()
     for shift, sign in ((-0.8, 1.0), (1.8, -1.0)):
         moved = surface.points + shift * spacing * normals
-        found = strays((moved, normals), lists, simulation.fields, spacing)
-        assert (sign * found >= 0.0).all() and (found != 0.0).mean() > 0.3
+        stray = strays((moved, normals), lists, simulation.fields, spacing)
+        assert (sign * stray >= 0.0).all() and (stray != 0.0).mean() > 0.3
         depth = (
-            np.linalg.norm(moved + found[:, None] * normals, axis=1)
+            np.linalg.norm(moved + stray[:, None] * normals, axis=1)
             - np.linalg.norm(np.array(simulation.fields[:3]), axis=0).max()
         )
         assert depth.min() > -spacing and depth.max() < 2.0 * spacing
