@@ -53,7 +53,7 @@ def derivative_errors(basis: str, count: int) -> dict:
     neighbours = NeighbourList(SUPPORT[basis] * spacing, 0.0)
     neighbours.update(points)
     start = perf_counter()
-    found = derivatives(points, inner, neighbours, basis)
+    operators = derivatives(points, inner, neighbours, basis)
     microseconds = 1e6 * (perf_counter() - start) / len(inner)
     x, y, z = points.T
     field = np.sin(2 * x) * np.cos(y) * np.exp(z)
@@ -61,8 +61,8 @@ def derivative_errors(basis: str, count: int) -> dict:
     return {
         "basis": basis,
         "per_edge": count,
-        "gradient_error": np.linalg.norm(found.gradient[0] @ field - slope) / np.linalg.norm(slope),
-        "laplacian_error": np.linalg.norm(found.laplacian @ field - laplacian) / np.linalg.norm(laplacian),
+        "gradient_error": np.linalg.norm(operators.gradient[0] @ field - slope) / np.linalg.norm(slope),
+        "laplacian_error": np.linalg.norm(operators.laplacian @ field - laplacian) / np.linalg.norm(laplacian),
         "microseconds_a_particle": microseconds,
     }
 

@@ -57,15 +57,15 @@ def stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
     Its viscosity is a tenth of the ink's, so that sound and not viscosity bounds the time step of all sizes.
     """
     scene = ink("off", across)
-    places = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
-    lattice = np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1)
+    coordinates = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
+    lattice = np.stack(np.meshgrid(coordinates, coordinates, coordinates, indexing="ij")).reshape(3, -1)
     points = lattice[:, (lattice**2).sum(axis=0) < (0.5 * scene.diameter) ** 2]
     law = liquid_of(scene, scene.spacing)[0]._replace(
         tracked=0, shifting=0.0, mirror=0, viscosity=0.1 * scene.viscosity
     )
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
-    for speed, share, place in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
-        speed[:] = share * scene.impact_speed * place / (0.5 * scene.diameter)
+    for speed, share, coordinate in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
+        speed[:] = share * scene.impact_speed * coordinate / (0.5 * scene.diameter)
     return Simulation(fields, points.shape[1], law, device=device)
 
 
@@ -91,11 +91,11 @@ def measure(simulation: Simulation) -> dict[str, float]:
     seconds(simulation, most)
     turns = [(seconds(simulation, 1), seconds(simulation, min(2, most))) for _ in range(TURNS)]
     set_num_threads(most)
-    one = min(processor for (_, processor), _ in turns)
-    speedup = min(one[0] for one, _ in turns) / min(two[0] for _, two in turns)
+    single_seconds = min(processor for (_, processor), _ in turns)
+    speedup = min(single[0] for single, _ in turns) / min(double[0] for _, double in turns)
     return {
         "particles": simulation.fluids, "neighbours_listed": simulation.particles.neighbours,
-        "particle_steps_per_second": simulation.fluids * STEPS / one, "two_threads_over_one": speedup,
+        "particle_steps_per_second": simulation.fluids * STEPS / single_seconds, "two_threads_over_one": speedup,
     }  # fmt: skip
 
 
@@ -107,7 +107,7 @@ def measure_gpu() -> dict[str, Any] | None:
 
     if not cuda.is_available():
         return None
-    found: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
+    figures: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
     for across, steps in SIZES.items():
         free = cuda.current_context().get_memory_info()[0]
         simulation = stretched_drop(across, CudaParticles)
@@ -116,19 +116,19 @@ def measure_gpu() -> dict[str, Any] | None:
         rate = simulation.fluids * steps / go_on(simulation, steps)
         lists = simulation.particles.builds - lists
         used = (free - cuda.current_context().get_memory_info()[0]) / simulation.fluids
-        found["sizes"][simulation.fluids] = {
+        figures["sizes"][simulation.fluids] = {
             "particle_steps_per_second": rate, "steps_of_a_list": steps / max(1, lists), "bytes_of_particle": used,
         }  # fmt: skip
         if across == SHARED:
-            found["gpu"] = rate
+            figures["gpu"] = rate
         del simulation
     shared, most = stretched_drop(SHARED, ThreadParticles), get_num_threads()
     go_on(shared, 5)
     for threads in (most, 2, 1):
         set_num_threads(threads)
-        found[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
+        figures[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
     set_num_threads(most)
-    return found
+    return figures
 
 
 def main() -> None:

@@ -40,15 +40,15 @@ def equality(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
     """Return how much the histories of each placement differ from those of one rank."""
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     reference, _ = launch(request, {"total": 1, "placement": "shared"}, folder / f"{scheme}_1")
-    found = {}
+    differences = {}
     for total in (2, 3, 4):
         for placement in ("shared", "disjoint"):
             name = f"{scheme}, {total} ranks {placement}"
             ranks = {"total": total, "placement": placement}
             history, _ = launch(request, ranks, folder / f"{scheme}_{total}_{placement}")
-            found[name] = largest_difference(history, reference)
-            print(f"{name}: {found[name]:.2e}", flush=True)
-    return found
+            differences[name] = largest_difference(history, reference)
+            print(f"{name}: {differences[name]:.2e}", flush=True)
+    return differences
 
 
 def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
@@ -60,10 +60,10 @@ def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def own_bars(found: dict[str, dict]) -> dict[str, dict]:
+def own_bars(figures: dict[str, dict]) -> dict[str, dict]:
     """Return the bars of ranks with what was measured."""
-    bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in found["equality"].items()}
-    for scheme, values in found["balance"].items():
+    bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in figures["equality"].items()}
+    for scheme, values in figures["balance"].items():
         bars[f"coupling overhead, {scheme}, 2 ranks shared"] = turns.bar(values["coupling_overhead"], OVERHEAD, False)
         bars[f"busy share, {scheme}, 2 ranks shared"] = turns.bar(values["busy_share"], BUSY)
     return bars
@@ -82,13 +82,13 @@ def table(bars: dict[str, dict[str, dict]]) -> str:
 
 def other_bars() -> dict[str, dict[str, dict]]:
     """Return the bars in the results of the other benchmarks."""
-    found = {}
+    bars = {}
     for name in SOURCES:
         if figures := results.read_figures(name):
-            found[name] = figures["bars"]
+            bars[name] = figures["bars"]
         else:
             print(f"no results of {name}: run benchmarks/{name}.py")
-    return found
+    return bars
 
 
 def main() -> None:
@@ -98,12 +98,12 @@ def main() -> None:
         for name in ("small", "reduced"):
             (folder / name).mkdir()
         small, reduced = DropScene.write(folder / "small", SMALL), DropScene.write(folder / "reduced", REDUCED)
-        found = {
+        figures = {
             "equality": {k: value for scheme in schemes for k, value in equality(small, scheme, folder).items()},
             "balance": {scheme: balance(reduced, scheme, folder) for scheme in schemes[:2]},
         }
-    bars = own_bars(found)
-    results.write_and_print("coupling", found | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
+    bars = own_bars(figures)
+    results.write_and_print("coupling", figures | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
     print(table({"coupling": bars} | other_bars()))
 
 

@@ -54,21 +54,26 @@ def table(rows: list[dict]) -> dict[str, dict]:
     """Return per scheme how many samples grow, and the worst of them."""
     result = {}
     for name in (*SCHEMES, PRINTED):
-        found = {row["pair"]: row["growth"][name] for row in rows if name in row["growth"]}
-        worst = max(found, key=lambda pair: found[pair])
-        unstable = sum(value > GROWTH for value in found.values())
-        result[name] = {"samples": len(found), "unstable": unstable, "worst": found[worst], "where": worst}
+        growth_of_pair = {row["pair"]: row["growth"][name] for row in rows if name in row["growth"]}
+        worst = max(growth_of_pair, key=lambda pair: growth_of_pair[pair])
+        unstable = sum(value > GROWTH for value in growth_of_pair.values())
+        result[name] = {
+            "samples": len(growth_of_pair),
+            "unstable": unstable,
+            "worst": growth_of_pair[worst],
+            "where": worst,
+        }
     return result
 
 
 def bars_of(result: dict) -> dict[str, dict]:
     """Return the bars with what was measured."""
-    schemes, kept = result["schemes"], result["momentum_error"]
+    schemes, momentum_errors = result["schemes"], result["momentum_error"]
     bars = {f"growth of a window, {name}": turns.bar(schemes[name]["worst"], GROWTH, False) for name in SCHEMES}
     bars[f"growth of a window, {PRINTED}"] = turns.bar(schemes[PRINTED]["worst"], GROWTH)
     for name, run in result["long_runs"].items():
         bars[f"energy drift, {name}, {run['windows']} windows"] = turns.bar(run["energy_drift"], DRIFT, False)
-    return bars | {f"momentum, {name}": turns.bar(value, MOMENTUM, False) for name, value in kept.items()}
+    return bars | {f"momentum, {name}": turns.bar(value, MOMENTUM, False) for name, value in momentum_errors.items()}
 
 
 def long_runs(windows: int) -> dict[str, dict]:

@@ -84,15 +84,15 @@ MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
 
 def impact() -> dict:
     """Every impact by both, and their widths over time as a picture."""
-    found = {name: one_impact(given) for name, given in IMPACTS.items()}
-    draw(found)
-    return found
+    spreads = {name: one_impact(impact_scene) for name, impact_scene in IMPACTS.items()}
+    draw(spreads)
+    return spreads
 
 
-def draw(found: dict) -> None:
+def draw(spreads: dict) -> None:
     """Draw widths over time, a panel an impact, and where the correlations of measured drops lie."""
-    figure, panels = plt.subplots(1, len(found), figsize=(3.2 * len(found), 3.2), sharey=True, layout="constrained")
-    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+    figure, panels = plt.subplots(1, len(spreads), figsize=(3.2 * len(spreads), 3.2), sharey=True, layout="constrained")
+    for panel, (name, sides) in zip(panels, spreads.items(), strict=True):
         for side, label, line in (("delta_sph", "delta-SPH, 3D", "-"), ("interfoam", "interFoam, wedge", "--")):
             row = sides[side]
             if row is not None and "time" in row:
@@ -106,18 +106,20 @@ def draw(found: dict) -> None:
     figure.savefig(results.path_of(NAME).with_suffix(".png"), dpi=100)
 
 
-def one_impact(given: Impact) -> dict:
+def one_impact(impact_scene: Impact) -> dict:
     """Width over time by both, in diameters and D / U, and its largest."""
-    scene = struck(given, ANGLES[0])
+    scene = struck(impact_scene, ANGLES[0])
     return {"delta_sph": impact_by_particles(scene), "interfoam": impact_by_interfoam(scene, CELLS)}
 
 
-def struck(given: Impact, advancing: float) -> Droplet:
+def struck(impact_scene: Impact, advancing: float) -> Droplet:
     """A drop that strikes a wall; where its contact line advances, the angle there is so many degrees."""
-    numerics = DropletNumerics(particles_per_diameter=given.across)
+    numerics = DropletNumerics(particles_per_diameter=impact_scene.across)
     angles = {"contact_angle": np.radians(ANGLES[0]), "advancing_angle": np.radians(advancing)}
-    scene = Droplet(weber=given.weber, reynolds=given.reynolds, **angles, **given.liquid, numerics=numerics)
-    return scene.model_copy(update={"duration": given.units * scene.unit_of_time})
+    scene = Droplet(
+        weber=impact_scene.weber, reynolds=impact_scene.reynolds, **angles, **impact_scene.liquid, numerics=numerics
+    )
+    return scene.model_copy(update={"duration": impact_scene.units * scene.unit_of_time})
 
 
 def impact_by_particles(scene: Droplet) -> dict:
@@ -134,8 +136,8 @@ def impact_by_particles(scene: Droplet) -> dict:
 def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
     """What is kept of a width over time."""
     widest = int(np.argmax(spread))
-    kept = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
-    return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | kept
+    figures = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
+    return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | figures
 
 
 def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
@@ -145,7 +147,7 @@ def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
         return None
     cell, units = scene.diameter / cells, scene.until / scene.unit_of_time
     wedge = Wedge(cell, columns=int((0.8 + 0.45 * units) * cells), rows=int(1.3 * cells))
-    given = {
+    parameters = {
         "contactAngle": np.degrees(scene.advancing),
         "onWall": "noSlip",
         "solderViscosity": scene.liquid_viscosity / scene.density,
@@ -161,12 +163,12 @@ def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
         f"fieldValues ( volScalarFieldValue alpha.solder 1 volVectorFieldValue U (0 0 {-scene.impact_speed}) ); }}"
     )
     with tempfile.TemporaryDirectory() as name:
-        log = interfoam.run(Path(name), wedge, given, start)
-        found = list(interfoam.states(Path(name), log, wedge))
-    time = np.array([state.time for state in found]) / scene.unit_of_time
-    spread = np.array([2.0 * reach(state.alpha, wedge) for state in found]) / scene.diameter
+        log = interfoam.run(Path(name), wedge, parameters, start)
+        states = list(interfoam.states(Path(name), log, wedge))
+    time = np.array([state.time for state in states]) / scene.unit_of_time
+    spread = np.array([2.0 * reach(state.alpha, wedge) for state in states]) / scene.diameter
     return {"version": interfoam.version(log), "cells": wedge.rows * wedge.columns} | row(
-        time, spread, found[-1].seconds
+        time, spread, states[-1].seconds
     )
 
 
@@ -185,34 +187,41 @@ def reach(alpha: np.ndarray, wedge: Wedge) -> float:
 
 def widths() -> dict:
     """Largest widths of the fastest impacts: with more cells, with the angle that advances, by correlations."""
-    found = {name: widths_of(IMPACTS[name]) for name in FAST}
-    draw_widths(found)
-    return found
+    largest_widths = {name: widths_of(IMPACTS[name]) for name in FAST}
+    draw_widths(largest_widths)
+    return largest_widths
 
 
-def widths_of(given: Impact) -> dict:
+def widths_of(impact_scene: Impact) -> dict:
     """Of one impact: by both with both angles, by interFoam with fewer and more cells, by correlations."""
-    numbers, static = given[1:3], ANGLES[0]
-    found: dict = {one.__name__: one(*numbers) for one in (roisman, laan)}
+    numbers, static = impact_scene[1:3], ANGLES[0]
+    largest_widths: dict = {correlation.__name__: correlation(*numbers) for correlation in (roisman, laan)}
     for angle in ANGLES:
-        scene, fineness = struck(given, angle), FINENESS if angle == static else (CELLS,)
-        found[f"{angle:.0f} degrees"] = {
+        scene, fineness = struck(impact_scene, angle), FINENESS if angle == static else (CELLS,)
+        largest_widths[f"{angle:.0f} degrees"] = {
             "delta_sph": impact_by_particles(scene),
             "interfoam": {cells: impact_by_interfoam(scene, cells) for cells in fineness},
-        } | {one.__name__: one(*numbers, np.radians(angle)) for one in (pasandideh_fard, wildeman)}
-    return found
+        } | {
+            correlation.__name__: correlation(*numbers, np.radians(angle))
+            for correlation in (pasandideh_fard, wildeman)
+        }
+    return largest_widths
 
 
-def draw_widths(found: dict) -> None:
+def draw_widths(largest_widths: dict) -> None:
     """Draw largest widths over the contact angle that advances, a panel an impact."""
-    figure, panels = plt.subplots(1, len(found), figsize=(4.0 * len(found), 3.4), layout="constrained")
+    figure, panels = plt.subplots(
+        1, len(largest_widths), figsize=(4.0 * len(largest_widths), 3.4), layout="constrained"
+    )
     degrees = np.linspace(ANGLES[0], 180.0, 46)
-    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+    for panel, (name, sides) in zip(panels, largest_widths.items(), strict=True):
         numbers = IMPACTS[name][1:3]
-        for one, label in ((pasandideh_fard, "measured: Pasandideh-Fard"), (wildeman, "computed: Wildeman")):
-            panel.plot(degrees, [one(*numbers, np.radians(angle)) for angle in degrees], label=label)
-        for one, line in ((roisman, ":"), (laan, "-.")):
-            panel.axhline(one(*numbers), color="C0", linestyle=line, label=f"measured: {one.__name__.title()}")
+        for correlation, label in ((pasandideh_fard, "measured: Pasandideh-Fard"), (wildeman, "computed: Wildeman")):
+            panel.plot(degrees, [correlation(*numbers, np.radians(angle)) for angle in degrees], label=label)
+        for correlation, line in ((roisman, ":"), (laan, "-.")):
+            panel.axhline(
+                correlation(*numbers), color="C0", linestyle=line, label=f"measured: {correlation.__name__.title()}"
+            )
         for angle in ANGLES:
             row, first = sides[f"{angle:.0f} degrees"], angle == ANGLES[0]
             panel.plot(angle, row["delta_sph"]["spread_max"], "C3o", label="delta-SPH" if first else None)
@@ -256,16 +265,21 @@ def dam_by_pysph(count: int) -> dict:
             [*command, str(spacing), str(FOLLOWED), name], capture_output=True, text=True, check=True,
             env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
         )  # fmt: skip
-    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
-    place = np.array(found.pop("front"))
-    front = front_errors(np.array(found.pop("time")), place + WIDTH - place[0])
-    return found | rate(found["particles"], found["steps"], found["seconds"]) | front
+    figures = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
+    position = np.array(figures.pop("front"))
+    front = front_errors(np.array(figures.pop("time")), position + WIDTH - position[0])
+    return figures | rate(figures["particles"], figures["steps"], figures["seconds"]) | front
 
 
 def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
     """The front's place over what was measured, less one, at each time measured."""
-    place = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
-    return {"front_error": [float(one / measured - 1.0) for one, (_, measured) in zip(place, MEASURED, strict=True)]}
+    measured_positions = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
+    return {
+        "front_error": [
+            float(position / measured - 1.0)
+            for position, (_, measured) in zip(measured_positions, MEASURED, strict=True)
+        ]
+    }
 
 
 def rate(particles: int, steps: int, seconds: float) -> dict:

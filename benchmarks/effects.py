@@ -113,10 +113,10 @@ def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
 
 def main() -> None:
     seconds = turns.in_turns({name: turns.batch(work) for name, work in sides().items()})
-    found = ratios(seconds)
-    MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": found}, indent=1) + "\n")
+    cost_ratios = ratios(seconds)
+    MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": cost_ratios}, indent=1) + "\n")
     medians = {name: float(np.median(s)) for name, s in seconds.items()}
-    results.write_and_print("effects", {"effects": found, "seconds": medians})
+    results.write_and_print("effects", {"effects": cost_ratios, "seconds": medians})
 
 
 if __name__ == "__main__":

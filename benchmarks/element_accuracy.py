@@ -155,13 +155,13 @@ def explicit_motion(body: Body, step: float) -> ExplicitMotion:
 
 def speeds(cells: tuple[int, int]) -> dict:
     """Element updates per second of whole steps with small and with finite strains, for every kind of element."""
-    found = {}
+    updates = {}
     for kind in KINDS:
         bodies = {name: Problem("plate", 0.3, cells, kind).body(name) for name in KINEMATICS}
-        found[kind] = {
+        updates[kind] = {
             name: len(body.local.cells) / seconds_a_step(explicit_motion(body, 1e-9)) for name, body in bodies.items()
         }
-    return found
+    return updates
 
 
 def costs(body: Body, period: float) -> dict:
@@ -215,8 +215,8 @@ def measure(refinement: Refinement) -> Iterator[dict]:
 def reference_check(refinements: tuple[Refinement, ...]) -> dict:
     """How far the finest plate is from Mindlin's frequency."""
     plate = next(refinement for refinement in refinements if refinement.problem == "plate")
-    found = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
-    return {"finest_plate_over_mindlin": found / mindlin_frequency(plate.poisson) - 1.0}
+    frequency = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
+    return {"finest_plate_over_mindlin": frequency / mindlin_frequency(plate.poisson) - 1.0}
 
 
 def run_all(refinements: tuple[Refinement, ...]) -> dict:

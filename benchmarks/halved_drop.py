@@ -66,9 +66,9 @@ def measured(size: float) -> dict:
         for name, parts in RESULTANTS.items():
             values[f"{name}@{end}"] = float(np.linalg.norm(section[:, parts], axis=1).max())
         for layer, history in zip(LAYERS, (run.history, *run.others), strict=True):
-            found = history.arrays()
+            averages = history.arrays()
             for name in AVERAGES:
-                values[f"{name}:{1e6 * layer:g}um@{end}"] = float(found[f"{name}_{end}"][:, joint].max())
+                values[f"{name}:{1e6 * layer:g}um@{end}"] = float(averages[f"{name}_{end}"][:, joint].max())
     return {
         "seconds": seconds,
         "elements": run.elements,
@@ -93,17 +93,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("sizes", nargs="*", type=float, help=f"of elements; without, {SIZES}")
     chosen = parser.parse_args().sizes or SIZES
-    found = results.read_figures(RESULTS) or {"meshes": {}}
+    figures = results.read_figures(RESULTS) or {"meshes": {}}
     for size in chosen:
-        found["meshes"][f"{size:g}"] = measured(size)
-        print(f"{size:g}", json.dumps(found["meshes"][f"{size:g}"]), flush=True)
-        sizes = sorted(map(float, found["meshes"]), reverse=True)
-        values = [found["meshes"][f"{size:g}"]["values"] for size in sizes]
-        found["changes"] = {f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)}
+        figures["meshes"][f"{size:g}"] = measured(size)
+        print(f"{size:g}", json.dumps(figures["meshes"][f"{size:g}"]), flush=True)
+        sizes = sorted(map(float, figures["meshes"]), reverse=True)
+        values = [figures["meshes"][f"{size:g}"]["values"] for size in sizes]
+        figures["changes"] = {
+            f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)
+        }
         limits = {key: richardson(sizes[-3:], [value[key] for value in values[-3:]], None) for key in values[0]}
-        found["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
-        results.write_figures(RESULTS, found)
-    print(json.dumps({key: found[key] for key in ("changes", "orders")}, indent=1))
+        figures["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
+        results.write_figures(RESULTS, figures)
+    print(json.dumps({key: figures[key] for key in ("changes", "orders")}, indent=1))
 
 
 if __name__ == "__main__":

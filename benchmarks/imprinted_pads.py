@@ -35,16 +35,16 @@ def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
     if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # then y = 0 is a line of it
         whole = half_of(whole)
     problem = Problem(whole, yields, turned=angle)
-    found = ends(problem, problem.solve(), LAYERS)
-    return {f"{name}@{end}": value for end, values in found for name, value in values.items()}
+    measures = ends(problem, problem.solve(), LAYERS)
+    return {f"{name}@{end}": value for end, values in measures for name, value in values.items()}
 
 
 def described(mesh: Mesh) -> dict:
     """Return what a mesh is like."""
     whole, joint = patch(mesh)
-    own, elements = whole.mesh, Problem(whole, False).elements
-    steps = critical_steps(elements, element_geometry(own.points, own.cells).nodal_volume)
-    parts = {name: own.part == number for number, name in enumerate(own.part_names)}
+    data, elements = whole.mesh, Problem(whole, False).elements
+    steps = critical_steps(elements, element_geometry(data.points, data.cells).nodal_volume)
+    parts = {name: data.part == number for number, name in enumerate(data.part_names)}
     return {
         "elements": {name: int(cells.sum()) for name, cells in parts.items()},
         "scaled_jacobian": min(float(scaled_jacobian(joint.points, cells).min()) for cells in joint.cells.values()),
@@ -74,10 +74,13 @@ def halved() -> dict:
         limits = {key: richardson(SIZES, [row[key] for row in values], None) for key in values[0]}
         result[name] = rows | {
             "changes": [_changes(coarse, fine) for coarse, fine in ((values[0], values[1]), (values[0], values[2]))],
-            "limits": {key: {"value": found[0], "order": found[1]} for key, found in limits.items() if found},
+            "limits": {key: {"value": limit[0], "order": limit[1]} for key, limit in limits.items() if limit},
         }
-        for told in result[name]["changes"]:
-            print(f"{name:9} " + "  ".join(f"{key} {told[key]:+.1%}" for key in told if key.split("@")[0] in PRINTED))
+        for differences in result[name]["changes"]:
+            print(
+                f"{name:9} "
+                + "  ".join(f"{key} {differences[key]:+.1%}" for key in differences if key.split("@")[0] in PRINTED)
+            )
     return result
 
 
@@ -86,8 +89,11 @@ def turned() -> dict:
     rows = {f"{angle:g}": solved(IMPRINTED, False, radians(angle)) for angle in ANGLES}
     first = next(iter(rows.values()))
     changes = {angle: _changes(row, first) for angle, row in rows.items()}
-    for angle, told in changes.items():
-        print(f"{angle:>3} deg " + "  ".join(f"{key} {told[key]:+.2%}" for key in told if key.split("@")[0] in PRINTED))
+    for angle, differences in changes.items():
+        print(
+            f"{angle:>3} deg "
+            + "  ".join(f"{key} {differences[key]:+.2%}" for key in differences if key.split("@")[0] in PRINTED)
+        )
     return {"values": rows, "changes": changes}
 
 

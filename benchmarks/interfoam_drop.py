@@ -68,12 +68,12 @@ def parameters(solder: Solder) -> dict[str, float | str]:
 
 def samples(states: Iterable[State], solder: Solder) -> list[Sample]:
     """The drop at each time that was written."""
-    found = []
+    drop_samples = []
     for state in states:
         fastest = float(state.speed[state.alpha > 0.9].max())
         number = solder.viscosity * fastest / solder.surface_tension
-        found.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
-    return found
+        drop_samples.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
+    return drop_samples
 
 
 def extent(alpha: np.ndarray) -> tuple[float, float, float]:
@@ -86,25 +86,25 @@ def extent(alpha: np.ndarray) -> tuple[float, float, float]:
     return WEDGE.cell * float(alpha[:, 0].sum()), 2.0 * float(1.5 * radius[0] - 0.5 * radius[1]), volume
 
 
-def settled(found: list[Sample]) -> tuple[Sample | None, list[Sample]]:
+def settled(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
     """The first sample from which on height and width stay near their means over the last third, and that third."""
-    third = found[-len(found) // 3 :]
+    third = drop_samples[-len(drop_samples) // 3 :]
     means = {name: np.mean([getattr(sample, name) for sample in third]) for name in ("height", "width")}
     moving = [
         number
-        for number, sample in enumerate(found)
+        for number, sample in enumerate(drop_samples)
         if any(abs(getattr(sample, name) / mean - 1.0) > STILL for name, mean in means.items())
     ]
     first = moving[-1] + 1 if moving else 0
-    return (found[first] if first < len(found) - len(third) else None), third
+    return (drop_samples[first] if first < len(drop_samples) - len(third) else None), third
 
 
 def by_interfoam(solder: Solder, exact: Meridian) -> dict:
     """Time to rest and errors of interFoam."""
     with tempfile.TemporaryDirectory() as name:
         log = interfoam.run(Path(name), WEDGE, parameters(solder), START)
-        found = samples(interfoam.states(Path(name), log, WEDGE), solder)
-    rest, third = settled(found)
+        drop_samples = samples(interfoam.states(Path(name), log, WEDGE), solder)
+    rest, third = settled(drop_samples)
     volume, height, width, number = np.mean(
         [(sample.volume, sample.height, sample.width, sample.capillary_number) for sample in third], axis=0
     )
@@ -112,7 +112,7 @@ def by_interfoam(solder: Solder, exact: Meridian) -> dict:
     return {
         "version": interfoam.version(log),
         "cells": WEDGE.rows * WEDGE.columns,
-        "seconds": found[-1].seconds,
+        "seconds": drop_samples[-1].seconds,
         "physical_time_to_rest": rest and rest.time,
         "seconds_to_rest": rest and rest.seconds,
         "height_swing": float(np.ptp([sample.height for sample in third]) / height / 2.0),
@@ -167,14 +167,14 @@ def main() -> None:
     exact = sessile_meridian(VOLUME, solder.pad_contact_angle, solder.surface_tension)
     foam, particles = by_interfoam(solder, exact), by_particles(exact)
     spent = foam["seconds_to_rest"] or foam["seconds"]
-    found = {
+    figures = {
         "interfoam": foam,
         "particles": particles,
         "interfoam_came_to_rest": foam["seconds_to_rest"] is not None,
         "interfoam_over_particles": spent / particles["seconds_to_rest"],
     }
-    results.write_figures(NAME, found)
-    print(json.dumps(found, indent=1))
+    results.write_figures(NAME, figures)
+    print(json.dumps(figures, indent=1))
 
 
 if __name__ == "__main__":

@@ -52,8 +52,8 @@ HEAVY = 4.985 / (8930.0 * 1e-6)
 
 def drop(count: int, degrees: float, *settings: str, name: str = "") -> Row:
     """Example 4.1 at another angle and resolution."""
-    given = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
-    return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *given))
+    drop_settings = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
+    return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *drop_settings))
 
 
 def heavy(count: int, degrees: float, bond: float, *settings: str) -> Row:
@@ -72,8 +72,8 @@ def between(count: int, receding: float, advancing: float, wall: str = "free sli
 
 def ball(volume: float, count: int, wall: str = "free slip") -> Row:
     """Example 4.2 at another resolution."""
-    given = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
-    return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *given))
+    ball_settings = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
+    return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *ball_settings))
 
 
 def joint(spacing: float, name: str, *settings: str) -> Row:
@@ -99,8 +99,10 @@ def pulled(spacing: float, speed: float) -> Row:
 def swing(shells: int, steps: int) -> Row:
     """A free drop of real solder, 0.1 R, two periods."""
     count = 1 + sum(10 * shell**2 + 2 for shell in range(1, shells + 1))
-    given = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
-    return Row(f"{count}, {steps} steps a period", "oscillating_drop", ("oscillation.scheme=ispg", *given))
+    oscillation_settings = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
+    return Row(
+        f"{count}, {steps} steps a period", "oscillating_drop", ("oscillation.scheme=ispg", *oscillation_settings)
+    )
 
 
 def section(count: int, degrees: float, bond: float = 0.0) -> Row:
@@ -116,8 +118,8 @@ def ridge(count: int, degrees: float) -> Row:
 
 def real(count: int) -> Row:
     """Example 4.1 with real solder, nothing set but inertia."""
-    given = ("drop.contact_angle=60 deg", f"drop.particles_per_edge={count}")
-    return Row(f"{count}, 60 deg", "sessile_drop", (*MOVES[:2], *given))
+    drop_settings = ("drop.contact_angle=60 deg", f"drop.particles_per_edge={count}")
+    return Row(f"{count}, 60 deg", "sessile_drop", (*MOVES[:2], *drop_settings))
 
 
 def merging(spacing: float, on_wall: bool) -> Row:
@@ -207,17 +209,17 @@ def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]
     """Compute a case: its metrics under the program's names, and its health checks."""
     match case:
         case DropCase():
-            found = drop_to_rest(case.drop, case.molten)
-            findings = stages.judge_drop(found.shape.metrics, found.shape.verdict, found.effects)
+            solution = drop_to_rest(case.drop, case.molten)
+            findings = stages.judge_drop(solution.shape.metrics, solution.shape.verdict, solution.effects)
         case JointCase():
-            found = joint_to_rest(case.joint, case.molten)
-            findings = stages.judge_joint(found.shape.metrics, found.shape.verdict, found.effects)
+            solution = joint_to_rest(case.joint, case.molten)
+            findings = stages.judge_joint(solution.shape.metrics, solution.shape.verdict, solution.effects)
         case DropsCase():
-            found = pair_to_rest(case.drops, case.molten)
-            findings = stages.judge_drops(found.shape.metrics, 1, found.effects)
+            solution = pair_to_rest(case.drops, case.molten)
+            findings = stages.judge_drops(solution.shape.metrics, 1, solution.effects)
         case OscillationCase():
-            found = solve_oscillation(case.oscillation, case.molten)
-            findings = stages.judge_oscillation(found.metrics, {})
+            solution = solve_oscillation(case.oscillation, case.molten)
+            findings = stages.judge_oscillation(solution.metrics, {})
     return findings.metrics, findings.health
 
 
@@ -228,17 +230,17 @@ def compute(row: Row) -> dict[str, Any]:
         metrics, health = judged(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
     except (CaseError, RuntimeError) as error:  # refused, no rest, or a solve that failed: a row, too
         return {"error": f"{type(error).__name__}: {error}", "core_seconds": process_time() - begin}
-    found: dict[str, Any] = {name: given["value"] for name, given in metrics.items()}
+    figures: dict[str, Any] = {name: metric["value"] for name, metric in metrics.items()}
     unmet = [name for name, check in health.items() if not check["ok"]]
-    return found | {"core_seconds": process_time() - begin, "unmet": unmet}
+    return figures | {"core_seconds": process_time() - begin, "unmet": unmet}
 
 
-def line(name: str, found: dict[str, Any]) -> str:
+def line(name: str, figures: dict[str, Any]) -> str:
     """A row as it is printed."""
-    if "error" in found:
-        return f"| {name} | {found['error'][:120]} ({found['core_seconds']:.0f} core-s)"
-    cells = [f"{head} {text.format(factor * found[key])}" for key, head, factor, text in COLUMNS if key in found]
-    return f"| {name} | " + " | ".join(cells) + (f" | NOT MET: {found['unmet']}" if found["unmet"] else "")
+    if "error" in figures:
+        return f"| {name} | {figures['error'][:120]} ({figures['core_seconds']:.0f} core-s)"
+    cells = [f"{head} {text.format(factor * figures[key])}" for key, head, factor, text in COLUMNS if key in figures]
+    return f"| {name} | " + " | ".join(cells) + (f" | NOT MET: {figures['unmet']}" if figures["unmet"] else "")
 
 
 def warm() -> None:
@@ -253,17 +255,17 @@ def main() -> None:
     parser.add_argument("--only", default="", metavar="BEGINNING", help="of the names of rows")
     parser.add_argument("--again", action="store_true", help="rows that are stored, too")
     parser.add_argument("--list", action="store_true", help="print what there is and compute nothing")
-    given = parser.parse_args()
-    unknown = set(given.tables) - set(TABLES)
+    options = parser.parse_args()
+    unknown = set(options.tables) - set(TABLES)
     if unknown:
         parser.error(f"no table {', '.join(sorted(unknown))}; there are {', '.join(TABLES)}")
     stored = results.read_figures(NAME)
-    is_warm = given.list
-    for table in given.tables or TABLES:
+    is_warm = options.list
+    for table in options.tables or TABLES:
         print(table, flush=True)
         rows = stored.setdefault(table, {})
-        for row in (row for row in TABLES[table] if row.name.startswith(given.only)):
-            if (row.name not in rows or given.again) and not given.list:
+        for row in (row for row in TABLES[table] if row.name.startswith(options.only)):
+            if (row.name not in rows or options.again) and not options.list:
                 if not is_warm:
                     warm()
                     is_warm = True

@@ -142,9 +142,9 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
     return costs, history.arrays()
 
 
-def with_errors(found: tuple[dict, dict], reference: dict) -> dict:
+def with_errors(costs_and_history: tuple[dict, dict], reference: dict) -> dict:
     """Return the costs of a run with its differences to a reference history."""
-    costs, history = found
+    costs, history = costs_and_history
     errors = solver_differences(history, reference)
     named = {name: errors[f"{name}_difference@centre"] for name in ("displacement", "strain")}
     row = costs | {f"{name}_error": value for name, value in named.items()}

@@ -46,9 +46,9 @@ def program(mesh: str | float, course: Course) -> ProgramPatch:
     return ProgramPatch(PATCH, data, course)
 
 
-def peaks(found: list[Measures]) -> Measures:
+def peaks(history: list[Measures]) -> Measures:
     """Return the value of each measure where its absolute value is largest."""
-    return {name: max((row[name] for row in found), key=abs) for name in found[0] if name != "time"}
+    return {name: max((row[name] for row in history), key=abs) for name in history[0] if name != "time"}
 
 
 def elastic() -> dict[str, Callable[[], Measures]]:
@@ -109,10 +109,10 @@ def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
         first = next(iter(table.values()))["values"] if table else values
         differences = {key: value / first[key] - 1.0 for key, value in values.items() if first.get(key)}
         table[name] = {"seconds": seconds, "values": values, "differences": differences}
-        told = "  ".join(
+        printed = "  ".join(
             f"{key} {values[key]:.4g} ({differences[key]:+.1%})" for key in PRINTED if differences.get(key) is not None
         )
-        print(f"{name:32} {seconds:6.1f} s  {told}", flush=True)
+        print(f"{name:32} {seconds:6.1f} s  {printed}", flush=True)
     return table
 
 

@@ -56,8 +56,8 @@ def viscosity(ohnesorge: float) -> float:
 def ink(ohnesorge: float, across: int, **more) -> Droplet:
     """A ball of the liquid for delta-SPH."""
     numerics = DropletNumerics(particles_per_diameter=across)
-    given = PAPER | {"diameter": 2.0 * RADIUS, "viscosity": viscosity(ohnesorge), "gravity": 0.0}
-    return Droplet(**given | {"duration": 1.0} | more, numerics=numerics)
+    parameters = PAPER | {"diameter": 2.0 * RADIUS, "viscosity": viscosity(ohnesorge), "gravity": 0.0}
+    return Droplet(**parameters | {"duration": 1.0} | more, numerics=numerics)
 
 
 def solder(ohnesorge: float) -> Fluid:
@@ -106,9 +106,9 @@ def merging_by_sph(ohnesorge: float, across: int) -> dict:
         simulation.step(simulation.time_step())
         surface, grown = simulation.surface, bool(rows) and rows[-1][1] > 1.0
         rows.append(state(simulation.time, surface.points, surface.triangles, grown))
-    found = merged(rows, surface.points, process_time() - begin)
+    figures = merged(rows, surface.points, process_time() - begin)
     volume = surface.volume / (2.0 * VOLUME) - 1.0
-    return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | found
+    return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | figures
 
 
 def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
@@ -119,20 +119,20 @@ def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
     liquid = solder(ohnesorge).resolve(scene, "off")
     acting = switched(decide_drop(liquid, True))
     old = [start_flow(cloud, liquid, acting, ()) for cloud in start_clouds(scene)]
-    made = rebuild(*(one.body for one in old)).cloud
+    made = rebuild(*(flow.body for flow in old)).cloud
     start_flow(made, liquid, acting, ()).step()  # compiled
     begin, rows, steps = process_time(), [], 0
-    one = start_flow(made, liquid, acting, ())
-    hand_over(old, [one])
-    while one.time < FOLLOWED * UNIT:
-        one.step()
+    flow = start_flow(made, liquid, acting, ())
+    hand_over(old, [flow])
+    while flow.time < FOLLOWED * UNIT:
+        flow.step()
         steps += 1
-        grown, count = bool(rows) and rows[-1][1] > 1.0, one.body.cloud.surface_count
-        rows.append(state(one.time, one.body.points[:count], one.body.triangles, grown))
-    surface = one.body.points[: one.body.cloud.surface_count]
-    found = merged(rows, surface, process_time() - begin)
-    volume = one.body.volume()[0] / (2.0 * VOLUME) - 1.0
-    return {"particles": len(one.body.points), "steps": steps, "volume_error": float(volume)} | found
+        grown, count = bool(rows) and rows[-1][1] > 1.0, flow.body.cloud.surface_count
+        rows.append(state(flow.time, flow.body.points[:count], flow.body.triangles, grown))
+    surface = flow.body.points[: flow.body.cloud.surface_count]
+    figures = merged(rows, surface, process_time() - begin)
+    volume = flow.body.volume()[0] / (2.0 * VOLUME) - 1.0
+    return {"particles": len(flow.body.points), "steps": steps, "volume_error": float(volume)} | figures
 
 
 def cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
@@ -140,8 +140,8 @@ def cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
     scene = ink(ohnesorge, across, contact_angle=radians(degrees), duration=FOLLOWED * UNIT)
     begin = process_time()
     metrics = {name: value for name, (value, _) in solve_droplet(scene).metrics.items()}
-    kept = {"height_error": metrics["height_error"], "base_error": metrics["base_error"]}
-    return {"particles": int(metrics["particles"]), "seconds": process_time() - begin} | kept
+    errors = {"height_error": metrics["height_error"], "base_error": metrics["base_error"]}
+    return {"particles": int(metrics["particles"]), "seconds": process_time() - begin} | errors
 
 
 def cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
@@ -149,11 +149,11 @@ def cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
     drop = Drop(volume=VOLUME, contact_angle=radians(degrees), particles_per_edge=per_edge)
     begin = process_time()
     metrics = drop_to_rest(drop, solder(ohnesorge).resolve(drop, "off")).shape.metrics
-    kept = {name: metrics[name][0] for name in ("height_error", "max_width_error", "at_rest")}
-    return {"particles": per_edge**3, "seconds": process_time() - begin} | kept
+    figures = {name: metrics[name][0] for name in ("height_error", "max_width_error", "at_rest")}
+    return {"particles": per_edge**3, "seconds": process_time() - begin} | figures
 
 
-def told(name: str, row: dict) -> dict:
+def print_row(name: str, row: dict) -> dict:
     """Print a row and return it."""
     words = (f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items())
     print(f"  {name}:", "  ".join(words), flush=True)
@@ -162,23 +162,23 @@ def told(name: str, row: dict) -> dict:
 
 def merging() -> dict:
     """Merging by both."""
-    found = {}
+    rows = {}
     for ohnesorge in OHNESORGE:
         for scheme, run, sizes in (("delta-SPH", merging_by_sph, ACROSS), ("ISPG", merging_by_ispg, IN_RADIUS)):
             for size in sizes:
                 name = f"Oh {ohnesorge:g}, {scheme}, {size}"
-                found[name] = told(name, run(ohnesorge, size))
-    return found
+                rows[name] = print_row(name, run(ohnesorge, size))
+    return rows
 
 
 def caps() -> dict:
     """Caps by both, of the more viscous liquid: the other one still swings by delta-SPH."""
-    found, ohnesorge = {}, OHNESORGE[-1]
+    rows, ohnesorge = {}, OHNESORGE[-1]
     for degrees in ANGLES:
         for scheme, run, size in (("delta-SPH", cap_by_sph, ACROSS[-1]), ("ISPG", cap_by_ispg, PER_EDGE)):
             name = f"{degrees:g} degrees, {scheme}, {size}"
-            found[name] = told(name, run(ohnesorge, degrees, size))
-    return found
+            rows[name] = print_row(name, run(ohnesorge, degrees, size))
+    return rows
 
 
 if __name__ == "__main__":

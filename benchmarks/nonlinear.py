@@ -44,9 +44,9 @@ from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
 from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
-from benchmarks.support.kept_rows import KeptRows
 from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
+from benchmarks.support.stored_rows import StoredRows
 from benchmarks.support.whole_runs import found_in_runs
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
@@ -149,13 +149,13 @@ def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
 
 def against_peers() -> tuple[Bars, dict]:
     """Return whole steps in finite rotation over those of peers, from places where all must have the same forces."""
-    mesh, found = cube(distorted=True, edge=12), peers.install()
+    mesh, installed = cube(distorted=True, edge=12), peers.install()
     bars, rest = {}, {}
     for law, (material, strain, names, kinds) in PEERS.items():
         displacement = mesh.points @ (TURN @ (np.eye(3) + strain * STRETCHED) - np.eye(3)).T
         motions = {kind: moved_body(mesh, material, kind, displacement) for kind in kinds}
-        given = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
-        running = {name: peers.Peer(name, given) for name in names if name in found}
+        problem_file = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
+        running = {name: peers.Peer(name, problem_file) for name in names if name in installed}
         force = np.zeros_like(displacement)
         force[motions[kinds[0]].body.local.nodes] = motions[kinds[0]].force
         batches = {kind: turns.batch(partial(motion.take_steps, 1)) for kind, motion in motions.items()}
@@ -255,7 +255,7 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
         "pulse_duration": PULSE,
         "duration": DURATION,
     }
-    found: dict[str, dict] = {}
+    rows: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*SHORT, MATERIAL))
         requests = {name: ("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
@@ -263,22 +263,22 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
         for name, (mode, coupling) in requests.items():
             arrays, seconds = ProgramRun(scene.request(mode, coupling, shock)).to_end()
             np.savez(Path(folder) / f"{name}.npz", **arrays)
-            found[name] = {"seconds": seconds}
+            rows[name] = {"seconds": seconds}
         for name, fine in FINE.items():
-            found[name] |= compare_histories(Path(folder) / f"{name}.npz", Path(folder) / "dns.npz", list(fine))
+            rows[name] |= compare_histories(Path(folder) / f"{name}.npz", Path(folder) / "dns.npz", list(fine))
     limits = {"three_joints": ("3 fine joints", 0.03), "one_joint": ("1 fine joint", 0.05)}
     bars = {
-        f"{words}, {formulation}: {metric}": turns.bar(found[name][metric], limit, False)
+        f"{words}, {formulation}: {metric}": turns.bar(rows[name][metric], limit, False)
         for name, (words, limit) in limits.items()
         for metric in ("critical_joint_peel_error", "critical_joint_work_error")
-        if metric in found[name]
+        if metric in rows[name]
     }
-    return bars, found
+    return bars, rows
 
 
 def implicit() -> tuple[Bars, dict]:
     """Return what implicit steps cost and miss, of the pulse of ``errors`` and of one five times as long."""
-    found: dict[str, dict] = {}
+    rows: dict[str, dict] = {}
     for pulse in (PULSE, 5.0 * PULSE):
         shock = FINITE | {"peak_acceleration": PEAK, "pulse_duration": pulse, "history_samples": SPARSE}
         with tempfile.TemporaryDirectory() as folder:
@@ -287,9 +287,9 @@ def implicit() -> tuple[Bars, dict]:
             runs = {"explicit": request("dns", HELD | {"fine_joints": "all"})}
             runs |= {name: request("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
             runs |= {f"{count} steps a pulse": runs["explicit"] for count in STEPS_A_PULSE}
-            for name, given in runs.items():
-                run = ProgramRun(given)
-                if given is runs["explicit"] and name != "explicit":
+            for name, request_of_run in runs.items():
+                run = ProgramRun(request_of_run)
+                if request_of_run is runs["explicit"] and name != "explicit":
                     take_implicit_steps(run, pulse / int(name.split()[0]))
                 arrays, seconds = run.to_end()
                 path = Path(folder) / f"{name}.npz"
@@ -297,14 +297,14 @@ def implicit() -> tuple[Bars, dict]:
                 errors_found = compare_histories(
                     path, Path(folder) / "explicit.npz", list(FINE.get(name, CRITICAL[:1]))
                 )
-                found[f"{name}, pulse of {pulse:g} s"] = {"seconds": seconds, **errors_found}
+                rows[f"{name}, pulse of {pulse:g} s"] = {"seconds": seconds, **errors_found}
                 print(name, pulse, seconds, errors_found, flush=True)
-    return {}, found
+    return {}, rows
 
 
 def drift() -> tuple[Bars, dict]:
     """Return the drift of energy over many windows in finite rotation, of each scheme."""
-    bars, found = {}, {}
+    bars, rows = {}, {}
     for name, pair in DRIFTING.items():
         models = pair.divided(SCHEMES[name])
         response = ForceOptions("corotational", models.division.meso_step)
@@ -316,13 +316,13 @@ def drift() -> tuple[Bars, dict]:
         coupled.swing(PUSH)
         change, interface = coupled.drift(WINDOWS, SAMPLES)
         bars[f"1e5 windows, elastic finite, no damping: energy drift, {name}"] = turns.bar(change, 1e-3, False)
-        found[name] = {
+        rows[name] = {
             "interface_energy": interface,
             "substeps": models.division.ratios,
             "elements": {role: len(body.elements.cells) for role, body in bodies.items()},
         }
-        print(name, change, found[name], flush=True)
-    return bars, found
+        print(name, change, rows[name], flush=True)
+    return bars, rows
 
 
 def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
@@ -330,34 +330,34 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
 
     Each pair is kept in ``build`` when it is done: a run that was broken off goes on there.
     """
-    kept = KeptRows(BUILD / f"growth-{formulation}.jsonl", formulation)
-    found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
+    stored_rows = StoredRows(BUILD / f"growth-{formulation}.jsonl", formulation)
+    growth_rates: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
     for number, (pair, fraction) in enumerate(list(grid())[::every], 1):
         label = f"{pair!r} at {fraction}"
-        row = kept.found(label, partial(window_growth, pair, fraction, formulation))
-        for name, values in found.items():
+        row = stored_rows.get(label, partial(window_growth, pair, fraction, formulation))
+        for name, values in growth_rates.items():
             values[label] = row[name]
         levels[label] = row["levels"]
         print(number, label, f"{max(row[name] for name in ALONG_PATHS):.1e}", flush=True)
-    grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
+    grown = {name: sum(value > GROWTH for value in values.values()) for name, values in growth_rates.items()}
     bars = {
         f"nonlinear windows that grow by more than {GROWTH:g}, {formulation}, {name}": turns.bar(count, 0, False)
         for name, count in grown.items()
     }
-    worst = {name: max(values.values()) for name, values in found.items()}
+    worst = {name: max(values.values()) for name, values in growth_rates.items()}
     return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
 
 
 def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
     """Return by how much a window of each scheme grows, and in how many levels the first one is."""
-    found: dict[str, float] = {}
+    growth_rates: dict[str, float] = {}
     for name in ALONG_PATHS:
         coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)
-        found[name] = coupled.spectral_radius() - 1.0
+        growth_rates[name] = coupled.spectral_radius() - 1.0
         if name == ALONG_PATHS[0]:
-            found["levels"] = len(coupled.meso.motion.body.schedule)
-    return found
+            growth_rates["levels"] = len(coupled.meso.motion.body.schedule)
+    return growth_rates
 
 
 PARTS = {
@@ -374,14 +374,14 @@ def main() -> None:
     options = parser.parse_args()
     parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
-    found = results.read_figures("nonlinear") or {"bars": {}}
+    figures = results.read_figures("nonlinear") or {"bars": {}}
     for name in chosen:
         bars, rest = parts[name]()
-        found["bars"] |= bars
-        found[name] = rest
-        bars, found["not_measured"] = found_in_runs()
-        found["bars"] |= bars
-        results.write_and_print("nonlinear", found)
+        figures["bars"] |= bars
+        figures[name] = rest
+        bars, figures["not_measured"] = found_in_runs()
+        figures["bars"] |= bars
+        results.write_and_print("nonlinear", figures)
 
 
 if __name__ == "__main__":

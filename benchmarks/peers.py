@@ -47,12 +47,12 @@ ROUNDS = 7
 class Peer:
     """A process that works in a peer's environment when asked."""
 
-    def __init__(self, name: str, given: Path) -> None:
+    def __init__(self, name: str, problem_file: Path) -> None:
         """Start it and wait until it has written its ``force``."""
-        self._force = given.with_suffix(f".{name}.npy")
+        self._force = problem_file.with_suffix(f".{name}.npy")
         script = Path(__file__).parent / "support" / f"peer_{name}.py"
         self._process = subprocess.Popen(
-            [str(PYTHON), str(script), str(given), str(self._force)],
+            [str(PYTHON), str(script), str(problem_file), str(self._force)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -82,15 +82,15 @@ def install() -> list[str]:
     """Install the peers; return those that are there."""
     if not PYTHON.exists():
         venv.create(FOLDER / "venv", with_pip=True)
-    found = []
+    installed = []
     for name, packages in PACKAGES.items():
         command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode == 0:
-            found.append(name)
+            installed.append(name)
         else:
             print(f"{name} is left out, pip cannot install it: {done.stderr.strip().splitlines()[-1]}")
-    return found
+    return installed
 
 
 def write_problem(
@@ -153,8 +153,8 @@ def main() -> None:
     gradient = np.random.default_rng(2).uniform(-1e-3, 1e-3, (3, 3))
     displacement = mesh.points @ gradient.T
     batches, force, step = own_batches(mesh, displacement)
-    given = write_problem(mesh, displacement, step)
-    peers = {name: Peer(name, given) for name in names}
+    problem_file = write_problem(mesh, displacement, step)
+    peers = {name: Peer(name, problem_file) for name in names}
     for name, peer in peers.items():
         difference = float(np.abs(peer.force - force).max() / np.abs(force).max())
         if not difference < SAME:

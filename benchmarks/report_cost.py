@@ -28,11 +28,11 @@ def small_run() -> Path:
 def cost(run: Path) -> dict:
     """Write the report of a run once, in a process of its own."""
     line = [sys.executable, __file__, "--one", str(run)]
-    told = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
-    return json.loads(told.splitlines()[-1])
+    output = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
+    return json.loads(output.splitlines()[-1])
 
 
-def one(run: Path) -> dict:
+def render_once(run: Path) -> dict:
     """Write the report of a run into a temporary folder; return what that took."""
     from reflowshock.workflow.pipeline.points import read_case_of_run
     from reflowshock.workflow.pipeline.report import write_report
@@ -46,7 +46,7 @@ def one(run: Path) -> dict:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        print(json.dumps(one(Path(sys.argv[2]))))
+        print(json.dumps(render_once(Path(sys.argv[2]))))
         raise SystemExit
     rows = [cost(run) for run in map(Path, sys.argv[1:])] or [cost(small_run())]
     results.write_figures(NAME, {"reports": rows})

@@ -50,19 +50,19 @@ def strength() -> float:
 @cache
 def calibrated() -> float:
     """Strength as it was found last."""
-    kept = results.read_figures(NAME)
-    return kept.get("strength") or strength()
+    figures = results.read_figures(NAME)
+    return figures.get("strength") or strength()
 
 
 def models(scene, sizes: tuple[int, ...]) -> dict:
     """The scene with each model and size."""
-    found = {}
+    rows = {}
     for model in MODELS:
-        found[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
-        for size, row in found[model].items():
-            told = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
-            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in told.items()), flush=True)
-    return found
+        rows[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
+        for size, row in rows[model].items():
+            printed = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in printed.items()), flush=True)
+    return rows
 
 
 def cost() -> dict:
@@ -74,21 +74,21 @@ def cost() -> dict:
     drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
     seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
     tracked = seconds[TRACKED]
-    found = {
+    figures = {
         model: {
             "us_per_particle_step": 1e6 * float(np.median(seconds[model])) / drops[model].fluids,
             "over_tracked": float(np.median(seconds[model] / tracked)),
         }
         for model in MODELS
     }  # fmt: skip
-    print(json.dumps(found, indent=1))
-    return found
+    print(json.dumps(figures, indent=1))
+    return figures
 
 
-def draw(found: dict) -> None:
+def draw(figures: dict) -> None:
     """Draw errors against core-seconds, a panel a scene; what was torn apart or cannot be computed has no point."""
-    figure, panels = plt.subplots(1, len(found), figsize=(3.4 * len(found), 3.2), layout="constrained")
-    for panel, (scene, sides) in zip(np.atleast_1d(panels), found.items(), strict=True):
+    figure, panels = plt.subplots(1, len(figures), figsize=(3.4 * len(figures), 3.2), layout="constrained")
+    for panel, (scene, sides) in zip(np.atleast_1d(panels), figures.items(), strict=True):
         name, exact, title = DRAWN[scene]
         for model, marker in zip(MODELS, "so^D", strict=True):
             rows = [row for row in sides[model].values() if name in row]
@@ -119,5 +119,5 @@ if __name__ == "__main__":
         },
         NAME,
     )
-    kept = results.read_figures(NAME)
-    draw({scene: kept[scene] for scene in DRAWN if scene in kept})
+    figures = results.read_figures(NAME)
+    draw({scene: figures[scene] for scene in DRAWN if scene in figures})

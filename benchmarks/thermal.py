@@ -60,15 +60,15 @@ def package(cells: int, layers: int) -> MeshData:
     points, hexahedra = grid(x, x, np.linspace(0.0, 2.0 * THICKNESS, 2 * layers + 1))
     centre = points[hexahedra].mean(axis=1)
     upper = centre[:, 2] > THICKNESS
-    kept = ~upper | (centre[:, :2] < DIE).all(axis=1)
-    part = np.where(upper, "die", "substrate")[kept]
+    is_filled = ~upper | (centre[:, :2] < DIE).all(axis=1)
+    part = np.where(upper, "die", "substrate")[is_filled]
     planes = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, 0.0)}
-    return without_unused_nodes(mesh_of(points, hexahedra[kept], part, planes))[0]
+    return without_unused_nodes(mesh_of(points, hexahedra[is_filled], part, planes))[0]
 
 
 def warpage(points: np.ndarray, displacement: np.ndarray) -> float:
     """Return the height that the corner of the lower face gains over its centre [m]."""
-    ends = [np.argmin(np.linalg.norm(points - place, axis=1)) for place in ([SUBSTRATE, SUBSTRATE, 0.0], [0.0] * 3)]
+    ends = [np.argmin(np.linalg.norm(points - corner, axis=1)) for corner in ([SUBSTRATE, SUBSTRATE, 0.0], [0.0] * 3)]
     return float(displacement[ends[0], 2] - displacement[ends[1], 2])
 
 
@@ -105,8 +105,8 @@ def peer(mesh: MeshData, degree: int) -> tuple[float, dict]:
     dolfinx.fem.petsc.set_bc(right, held)
     solution, factor = right.duplicate(), Factorisation(matrix)
     factor.solve(right, solution)
-    found = warpage(space.tabulate_dof_coordinates(), solution.array.reshape(-1, 3))
-    return found, {"equations": matrix.size[0], "factor_bytes": factor.cost.memory}
+    warpage_value = warpage(space.tabulate_dof_coordinates(), solution.array.reshape(-1, 3))
+    return warpage_value, {"equations": matrix.size[0], "factor_bytes": factor.cost.memory}
 
 
 def strain(field: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
@@ -138,9 +138,16 @@ def solved(kind: str, cells: int, layers: int) -> dict:
     """Solve on a mesh; return warpage and costs."""
     mesh = package(cells, layers)
     begin = process_time()
-    found, costs = SOLVERS[kind](mesh)
+    warpage_value, costs = SOLVERS[kind](mesh)
     seconds = process_time() - begin
-    return {"kind": kind, "cells": cells, "layers": layers, "warpage_um": 1e6 * found, "seconds": seconds, **costs}
+    return {
+        "kind": kind,
+        "cells": cells,
+        "layers": layers,
+        "warpage_um": 1e6 * warpage_value,
+        "seconds": seconds,
+        **costs,
+    }
 
 
 def meshes(quick: bool) -> list[dict]:

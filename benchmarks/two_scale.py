@@ -110,15 +110,15 @@ def history_of(run: ProgramRun, path: Path) -> tuple[Path, float]:
 
 def bars_of(costs: dict[str, dict], errors: dict) -> dict:
     """Return the issue's bars with what was measured."""
-    found = {}
+    bars = {}
     for name in set(BARS) & set(errors):
         limits = BARS[name]
         for kernels, table in costs.items():
-            found[f"{name}: time ratio, {kernels} kernels"] = turns.bar(table[name]["time_ratio"], limits[0], False)
+            bars[f"{name}: time ratio, {kernels} kernels"] = turns.bar(table[name]["time_ratio"], limits[0], False)
         for metric, limit in zip(("critical_joint_stress_error", "die_displacement_error"), limits[1:], strict=True):
             if np.isfinite(limit):
-                found[f"{name}: {metric}"] = turns.bar(errors[name][metric], limit, False)
-    return found
+                bars[f"{name}: {metric}"] = turns.bar(errors[name][metric], limit, False)
+    return bars
 
 
 def main() -> None:

@@ -57,7 +57,7 @@ def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
     }
 
 
-def shown(item: dict) -> str:
+def table_row(item: dict) -> str:
     """Return a row of the table for people."""
     errors = " | ".join(f"{100.0 * item[metric]:.3f}" for metric in ERRORS)
     return (
@@ -68,13 +68,13 @@ def shown(item: dict) -> str:
 
 def orders(rows: list[dict]) -> dict[str, dict[str, float]]:
     """Return by setting and metric the power of the window with which the error falls, fitted."""
-    found: dict[str, dict[str, float]] = {}
+    fitted_orders: dict[str, dict[str, float]] = {}
     for name in dict.fromkeys(item["setting"] for item in rows):
         mine = [item for item in rows if item["setting"] == name]
         windows = np.log([item["window_ns"] for item in mine])
         fits = {metric: np.polyfit(windows, np.log([item[metric] for item in mine]), 1)[0] for metric in ERRORS}
-        found[name] = {metric: float(value) for metric, value in fits.items()}
-    return found
+        fitted_orders[name] = {metric: float(value) for metric, value in fits.items()}
+    return fitted_orders
 
 
 def main() -> None:
@@ -92,7 +92,7 @@ def main() -> None:
                 item = row(name, scene, fraction, folder)
                 item["time_ratio"] = item["seconds"] / dns["seconds"]
                 rows.append(item)
-                print(shown(item), flush=True)
+                print(table_row(item), flush=True)
     results.write_and_print("two_scale_accuracy", {"rows": rows, "orders": orders(rows)})
 
 

@@ -141,19 +141,19 @@ def compared(scene: Scene) -> tuple[dict, dict]:
         runs = {mode: ProgramRun(scene.request(mode, path)) for mode in MODES}
         plan, histories = runs["dns"].plan, {mode: run.to_end()[0] for mode, run in runs.items()}
         reference = CubicSpline(exact["time"], centres(exact))(histories["dns"]["time"])
-        found = {mode: centres(arrays) for mode, arrays in histories.items()}
+        heights = {mode: centres(arrays) for mode, arrays in histories.items()}
         peer = Peer(f"{scene.peer}_shock", scene.problem(path, runs["dns"]))
-        found[scene.peer] = peer.force
+        heights[scene.peer] = peer.force
         batches = {mode: lambda run=run: run.step(STRETCH) for mode, run in runs.items()}
         seconds = turns.in_turns(batches | {scene.peer: lambda: peer.ask("step") / plan.step})
         peer.end()
-    errors = {name: relative_error(values, reference) for name, values in found.items()}
+    errors = {name: relative_error(values, reference) for name, values in heights.items()}
     rest = {
         "elements": runs["two_scale"].elements,
         "substeps": runs["two_scale"].plan.substeps,
         "seconds_per_simulated_us": {name: 1e-6 * float(np.median(values)) for name, values in seconds.items()},
         "errors": errors,
-        "difference_of_peer_and_dns": relative_error(found[scene.peer], found["dns"]),
+        "difference_of_peer_and_dns": relative_error(heights[scene.peer], heights["dns"]),
         "largest_plastic_strain": float(histories["dns"].get("plastic_strain_max", np.zeros(1)).max()),
     }
     bars = {f"{mode} / {scene.peer}": turns.bar(turns.ratio(seconds, mode, scene.peer), BAR) for mode in MODES}

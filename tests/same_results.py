@@ -119,10 +119,10 @@ def compare(first: Path, second: Path, names: list[str]) -> int:
     count = 0
     for name in names:
         ours, theirs = (json.loads((folder / name / "summary.json").read_text()) for folder in (first, second))
-        found = list(differences(ours, theirs))
-        worst = max(found, key=lambda item: item[3])
-        print(f"{name:18}{len(found):4} metrics, most apart {worst[0]}: {worst[3] * TOLERANCE:.1e}")
-        for metric, value, other, excess in found:
+        metrics = list(differences(ours, theirs))
+        worst = max(metrics, key=lambda item: item[3])
+        print(f"{name:18}{len(metrics):4} metrics, most apart {worst[0]}: {worst[3] * TOLERANCE:.1e}")
+        for metric, value, other, excess in metrics:
             if not excess <= 1.0:  # nan is no agreement
                 count += 1
                 print(f"    {metric}: {value} and {other}, {excess * TOLERANCE:.1e} apart")

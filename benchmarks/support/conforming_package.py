@@ -28,14 +28,14 @@ def conforming_package(refinement: int = 1) -> MeshData:
     x, y = (in_plane(length, refinement) for length in (LENGTH, WIDTH))
     points, cells = grid(x, y, z)
     part = parts(points[cells].mean(axis=1), top)
-    kept = part != ""
+    is_filled = part != ""
     facets = {
         "symmetry_x": on(0, 0.0),
         "symmetry_y": on(1, 0.0),
         "mounting_holes": lambda c: (np.abs(c[:, 0] - LENGTH) < 1e-9) & (c[:, 2] < 0.0),
         "board_bottom": on(2, -THICKNESS),
     }
-    return without_unused_nodes(with_pads(mesh_of(points, cells[kept], part[kept], facets)))[0]
+    return without_unused_nodes(with_pads(mesh_of(points, cells[is_filled], part[is_filled], facets)))[0]
 
 
 def in_plane(length: float, refinement: int) -> np.ndarray:

@@ -51,8 +51,8 @@ class DropScene:
         displacement = prescribed(case.package, case.warpage)
         side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
         (folder / "flat.msh").unlink()
-        own = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
-        fine = [joint(case, site, partial(mesh_joint, columns=own[site.name]), side) for site in sites(case)]
+        columns = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
+        fine = [joint(case, site, partial(mesh_joint, columns=columns[site.name]), side) for site in sites(case)]
         write_joints(fine, folder / "joints.msh")
         coarse = [joint(case, site, mesh_coarse_joint, side) for site in sites(case)]
         write_joints(coarse, folder / "coarse_joints.msh")

@@ -78,8 +78,8 @@ class NewtonMotion(ImplicitMotion):
 
     def _add_internal(self, field: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Evaluate as ``ImplicitMotion`` does, from the path at the start of the step."""
-        for values, kept in zip(self._histories, self._kept, strict=True):
-            values[...] = kept
+        for values, start_values in zip(self._histories, self._kept, strict=True):
+            values[...] = start_values
         return super()._add_internal(field, force)
 
     def _solve(self, before: np.ndarray) -> None:
@@ -95,12 +95,12 @@ class NewtonMotion(ImplicitMotion):
             raise ArithmeticError(f"Newton's method stops at {self.time:g} s: {self._newton.reason}")
         self._unbalanced(self._newton, self._solution, self._right)
 
-    def _unbalanced(self, _newton: PETSc.SNES, given: PETSc.Vec, result: PETSc.Vec) -> None:
+    def _unbalanced(self, _newton: PETSc.SNES, accelerations: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the forces out of balance at given accelerations, for PETSc; move there."""
         h, scheme = self.step, self._scheme
-        place, speed, before = self._start
-        self._equations.spread(given, self._acceleration)
-        self.displacement[:] = place + h**2 * scheme.beta * self._acceleration
+        displacement, speed, before = self._start
+        self._equations.spread(accelerations, self._acceleration)
+        self.displacement[:] = displacement + h**2 * scheme.beta * self._acceleration
         self.velocity[:] = speed + h * scheme.gamma * self._acceleration
         self._update_force()
         forces = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before

@@ -5,16 +5,16 @@ import numpy as np
 from kratos_model import explicit_model
 from peer_loop import problem, serve
 
-given = problem()
-body, advance = explicit_model(given)
-for node, held in zip(body.Nodes, given["held"].tolist(), strict=True):
+inputs = problem()
+body, advance = explicit_model(inputs)
+for node, held in zip(body.Nodes, inputs["held"].tolist(), strict=True):
     for variable, fixed in zip(
         (Kratos.DISPLACEMENT_X, Kratos.DISPLACEMENT_Y, Kratos.DISPLACEMENT_Z), held, strict=True
     ):
         if fixed:
             node.Fix(variable)
-watched = [body.Nodes[int(number) + 1] for number in given["watched"]]
-pulse, peak, step = (float(given[name]) for name in ("pulse", "peak", "step"))
+watched = [body.Nodes[int(number) + 1] for number in inputs["watched"]]
+pulse, peak, step = (float(inputs[name]) for name in ("pulse", "peak", "step"))
 
 
 def advance_under_load() -> None:
@@ -26,8 +26,8 @@ def advance_under_load() -> None:
 
 
 history = [np.zeros(len(watched))]
-for _ in range(int(given["samples"])):
-    for _ in range(int(given["stride"])):
+for _ in range(int(inputs["samples"])):
+    for _ in range(int(inputs["stride"])):
         advance_under_load()
     history.append([node.GetSolutionStepValue(Kratos.DISPLACEMENT_Z) for node in watched])
 serve(np.array(history), {"step": advance_under_load})

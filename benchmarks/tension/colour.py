@@ -69,9 +69,9 @@ def _smooth(lists, fields, law, colour, layer):
 
 
 @looped
-def _gradients(lists, fields, law, found, gradient):
+def _gradients(lists, fields, law, smoothed, gradient):
     """The corrected gradient of the smoothed colour `(3, n)`; that of the colour where neighbours do not resolve it."""
-    (offsets, indices), (colour, layer) = lists, found
+    (offsets, indices), (colour, layer) = lists, smoothed
     for i in prange(colour.shape[0]):
         bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
         for image in range(1 + (law.mirror if fields.z[i] < SUPPORT * law.length else 0)):

@@ -73,9 +73,9 @@ def _lacks(lists, fields, law, lack):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def level_at(place, row, fields, support):
+def level_at(point, row, fields, support):
     """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a place."""
-    x, y, z = place
+    x, y, z = point
     level = gx = gy = gz = xx = yy = zz = xy = yz = xz = 0.0
     for j in row:
         dx, dy, dz = x - fields.x[j], y - fields.y[j], z - fields.z[j]
@@ -92,16 +92,16 @@ def level_at(place, row, fields, support):
 
 
 @looped
-def _curvatures(lists, feet, at_surface, fields, found):
+def _curvatures(lists, feet, at_surface, fields, result):
     """Curvature [1/m] of the level at the feet of particles, and their offsets after a step of Newton's method [m]."""
-    spacing, curvature, offset = found
+    spacing, curvature, offset = result
     offsets, indices = lists
     for i in prange(feet.shape[0]):
         if not at_surface[i]:
             continue
         row = indices[offsets[i] : offsets[i + 1]]
-        place = (feet[i, 0], feet[i, 1], feet[i, 2])
-        level, gx, gy, gz, xx, yy, zz, xy, yz, xz = level_at(place, row, fields, COLOUR_SUPPORT * spacing)
+        foot = (feet[i, 0], feet[i, 1], feet[i, 2])
+        level, gx, gy, gz, xx, yy, zz, xy, yz, xz = level_at(foot, row, fields, COLOUR_SUPPORT * spacing)
         square = gx * gx + gy * gy + gz * gz
         if square * spacing * spacing < 1e-8:  # a particle by itself has no surface
             curvature[i] = 0.0
@@ -122,9 +122,9 @@ def _curvatures(lists, feet, at_surface, fields, found):
 @looped
 def _smooth(lists, at_surface, fields, law, values):
     """Mean of the values of the surface's particles over the kernel, the first of the pair into the second."""
-    given, found = values
+    values_in, values_out = values
     offsets, indices = lists
-    for i in prange(given.shape[0]):
+    for i in prange(values_in.shape[0]):
         total = weights = 0.0
         for k in range(offsets[i], offsets[i + 1]):
             j = indices[k]
@@ -133,5 +133,5 @@ def _smooth(lists, at_surface, fields, law, values):
             dx, dy, dz = fields.x[i] - fields.x[j], fields.y[i] - fields.y[j], fields.z[i] - fields.z[j]
             level = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) / law.length)
             weight = level * fields.mass[j] / fields.density[j]
-            total, weights = total + weight * given[j], weights + weight
-        found[i] = total / weights if weights > 0.0 else 0.0
+            total, weights = total + weight * values_in[j], weights + weight
+        values_out[i] = total / weights if weights > 0.0 else 0.0

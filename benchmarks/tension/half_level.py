@@ -38,9 +38,9 @@ def level_points(points: Floats, volume: Floats, spacing: float, half: bool) -> 
     centre = volume @ points / volume.sum()
     if half:
         centre[2] = 0.0
-    found, directions = np.empty(RAYS), rays(half)
-    _cross(points, volume, (centre, SUPPORT * spacing, STEP * spacing, half), directions, found)
-    return centre + found[:, None] * directions
+    distances, directions = np.empty(RAYS), rays(half)
+    _cross(points, volume, (centre, SUPPORT * spacing, STEP * spacing, half), directions, distances)
+    return centre + distances[:, None] * directions
 
 
 def filled(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
@@ -53,16 +53,16 @@ def filled(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True)
-def _colour_at(place, points, volume, support, half):
+def _colour_at(point, points, volume, support, half):
     """The colour at a place, with that of the images of particles that stand on the mirror."""
     total = 0.0
     for j in range(points.shape[0]):
-        dx, dy, dz = place[0] - points[j, 0], place[1] - points[j, 1], place[2] - points[j, 2]
+        dx, dy, dz = point[0] - points[j, 0], point[1] - points[j, 1], point[2] - points[j, 2]
         across2 = dx * dx + dy * dy
         if across2 >= support * support:
             continue
         for image in range(1 + half):
-            height = dz if image == 0 else place[2] + points[j, 2]
+            height = dz if image == 0 else point[2] + points[j, 2]
             q = sqrt(across2 + height * height) / support
             if q < 1.0:
                 total += volume[j] * (1.0 - q) ** 6 * (1.0 + 6.0 * q + 35.0 / 3.0 * q * q)
@@ -70,7 +70,7 @@ def _colour_at(place, points, volume, support, half):
 
 
 @njit(cache=True, parallel=True)
-def _cross(points, volume, how, directions, found):
+def _cross(points, volume, how, directions, distances):
     """Distances from the centre at which rays meet the level; the outermost of the first liquid that they cross."""
     centre, support, step, half = how
     for r in prange(directions.shape[0]):
@@ -83,4 +83,4 @@ def _cross(points, volume, how, directions, found):
                 low = middle
             else:
                 high = middle
-        found[r] = 0.5 * (low + high)
+        distances[r] = 0.5 * (low + high)

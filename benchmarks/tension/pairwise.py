@@ -74,11 +74,15 @@ class Pairwise(Untracked):
         It balances a pressure of the equation of state many times that of the drop, so that what the sums over pairs
         make of the latter counts: its own virial in place of it.
         """
-        lists, virial, own = self.lists.update(points, points), np.empty(len(points)), np.empty(len(points))
+        lists, virial, pressure_virial = self.lists.update(points, points), np.empty(len(points)), np.empty(len(points))
         _pair_forces(lists, points, self.lists.reach, np.empty((3, len(points))), virial)
-        _virials_of_pressure(lists, fields, self.law, own)
+        _virials_of_pressure(lists, fields, self.law, pressure_virial)
         per_volume = fields.density / fields.mass
-        return self.factor * strength(self.law, self.tension) * virial * per_volume / 6.0 + own - fields.pressure
+        return (
+            self.factor * strength(self.law, self.tension) * virial * per_volume / 6.0
+            + pressure_virial
+            - fields.pressure
+        )
 
 
 def _wall_force(reach: float, spacing: float) -> Floats:
@@ -92,10 +96,10 @@ def _wall_force(reach: float, spacing: float) -> Floats:
 
 
 @looped
-def _virials_of_pressure(lists, fields, law, found):
+def _virials_of_pressure(lists, fields, law, virials):
     """A sixth of the virials of the forces of pressure, times particles a volume `(n,)` [Pa]."""
     offsets, indices = lists
-    for i in prange(found.shape[0]):
+    for i in prange(virials.shape[0]):
         total = 0.0
         for k in range(offsets[i], offsets[i + 1]):
             j = indices[k]
@@ -103,7 +107,7 @@ def _virials_of_pressure(lists, fields, law, found):
             distance2 = dx * dx + dy * dy + dz * dz
             weight = slope(law.kernel, False, sqrt(distance2) / law.length) * fields.mass[j] / fields.density[j]
             total -= (fields.pressure[i] + fields.pressure[j]) * weight * distance2
-        found[i] = law.norm / law.length**2 * total / 6.0
+        virials[i] = law.norm / law.length**2 * total / 6.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -59,13 +59,13 @@ def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
 
 def untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
     """Particles without a tracked surface."""
-    given = (law, scene.surface_tension, cos(scene.angle))
+    parameters = (law, scene.surface_tension, cos(scene.angle))
     if model == "pairwise":
-        surface = Pairwise(*given, factor=strength)
+        surface = Pairwise(*parameters, factor=strength)
         rest = law.rest_density + strength * cohesion(law, scene.surface_tension) / law.sound**2
         law = law._replace(rest_density=rest)
     else:
-        surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*given)
+        surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*parameters)
     return Simulation(fields, len(fields.x), law, surface)
 
 
@@ -89,8 +89,8 @@ def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], 
     except (SurfaceLost, FloatingPointError) as error:
         torn = {"torn_apart_at": simulation.time, "why": str(error)}
     count = simulation.fluids
-    found = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
-    return found | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
+    figures = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
+    return figures | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
 
 
 def stray(simulation: Simulation) -> int:
@@ -120,9 +120,9 @@ def volumes(fields: Fields) -> Floats:
 def core_pressure(simulation: Simulation, radius: float) -> float:
     """Mean pressure within half a radius of the centre, with that of the model's own forces [Pa]."""
     points = np.stack(simulation.fields[:3], axis=1)
-    own = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
+    model_pressure = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
     core = np.linalg.norm(points - points.mean(axis=0), axis=1) < 0.5 * radius
-    return float((simulation.pressures + own)[core].mean())
+    return float((simulation.pressures + model_pressure)[core].mean())
 
 
 def radii(simulation: Simulation) -> Floats:
@@ -141,16 +141,20 @@ def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> di
     """A cube becomes a sphere: pressure, roundness, capillary number at rest."""
     scene = unit_drop(across, 0.2, start=shape)
 
-    def sample(one):
-        return one.time, core_pressure(one, 0.5) if one.steps % 10 == 0 else np.nan, one.fastest
+    def sample(flow_state):
+        return (
+            flow_state.time,
+            core_pressure(flow_state, 0.5) if flow_state.steps % 10 == 0 else np.nan,
+            flow_state.fastest,
+        )
 
     simulation = start(scene, model, strength)
-    found = follow(simulation, 2.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 2.0, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     radius = radii(simulation)
-    return found | {
+    return figures | {
         "pressure_error": float(np.nanmean(late(rows)[:, 1])) / scene.laplace_pressure - 1.0,
         "pressure_drift": float(np.nanstd(late(rows)[:, 1])) / scene.laplace_pressure,
         "roundness": float(radius.max() / radius.min()),
@@ -165,10 +169,10 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
         return {"why": "the model has no contact angle; beside a mirror its angle is 90 degrees"}
     scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
     simulation = start(scene, model, strength)
-    found = follow(simulation, 2.5, lambda one: (one.time, one.fastest))
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 2.5, lambda flow_state: (flow_state.time, flow_state.fastest))
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     spacing, angle = simulation.law.spacing, scene.angle
     radius = 0.5 * (4.0 / ((2.0 + cos(angle)) * (1.0 - cos(angle)) ** 2)) ** (1.0 / 3.0)
 
@@ -179,9 +183,9 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
     points = np.stack(simulation.fields[:3], axis=1)
     level = level_points(points, volumes(simulation.fields), spacing, half=True)
     exact = level_points(*filled(inside, 2.0 * radius, spacing), spacing, half=True)
-    bases = [base_width(one, spacing) for one in (level, exact)]
-    tops = [one[: RAYS // TOP, 2].mean() for one in (level, exact)]
-    return found | {
+    bases = [base_width(shape, spacing) for shape in (level, exact)]
+    tops = [shape[: RAYS // TOP, 2].mean() for shape in (level, exact)]
+    return figures | {
         "height_error": float(tops[0] / tops[1] - 1.0),
         "base_error": bases[0] / bases[1] - 1.0,
         "capillary_number": float(late(rows)[:, 1].max()) * scene.viscosity / scene.surface_tension,
@@ -205,14 +209,14 @@ def swing(model: str, across: int, strength: float) -> dict:
     frequency = rayleigh_frequency(2, 0.5, 1.0, 1.0)
     decay, exact = viscous_oscillation(2, frequency, scene.viscosity / 0.25)
 
-    def sample(one):
-        x, y, z = one.fields[:3]
-        return one.time * frequency, float(one.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
+    def sample(flow_state):
+        x, y, z = flow_state.fields[:3]
+        return flow_state.time * frequency, float(flow_state.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
 
-    found = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     time, moment = rows[rows[:, 0] > 0.5].T
 
     def damped(t, rate, turn, *parts):
@@ -222,9 +226,9 @@ def swing(model: str, across: int, strength: float) -> dict:
     try:
         fit, _ = curve_fit(damped, time, moment / rows[0, 1], first)
     except RuntimeError:
-        return found | {"why": "what it does is no damped swing"}
+        return figures | {"why": "what it does is no damped swing"}
     left = np.std(moment / rows[0, 1] - damped(time, *fit)) / np.std(moment / rows[0, 1])
-    return found | {
+    return figures | {
         "period_error": float(exact / frequency / fit[1] - 1.0),
         "decay_error": float(fit[0] * frequency / decay - 1.0),
         "not_a_swing": float(left),
@@ -233,21 +237,21 @@ def swing(model: str, across: int, strength: float) -> dict:
 
 def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
     """Two drops beside each other along x, a gap [spacings] between them, that fly at each other at a speed [m/s]."""
-    one = droplet(scene)
-    aside = np.array([0.5 * scene.diameter + 0.5 * gap * one.law.spacing, 0.0, 0.0])
-    points, surface = np.array(one.fields[:3]), one.surface
+    drop = droplet(scene)
+    aside = np.array([0.5 * scene.diameter + 0.5 * gap * drop.law.spacing, 0.0, 0.0])
+    points, surface = np.array(drop.fields[:3]), drop.surface
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
     if model != TRACKED:
-        law = one.law._replace(tracked=0, shifting=0.0)
+        law = drop.law._replace(tracked=0, shifting=0.0)
         fields = fields_at(scene, law, both)
         fields.u[:] = -speed * np.sign(both[0])
         return untracked(law, fields, scene, model, strength)
     corners, triangles = surface.points.copy(), surface.triangles.copy()
     surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = -speed * np.sign(both[0])
-    return Simulation(fields, both.shape[1], one.law, surface)
+    return Simulation(fields, both.shape[1], drop.law, surface)
 
 
 def merging(model: str, across: int, strength: float) -> dict:
@@ -255,20 +259,20 @@ def merging(model: str, across: int, strength: float) -> dict:
     scene = unit_drop(across, 0.2)
     simulation = pair(scene, model, strength)
 
-    def sample(one):
-        x, y, z = (axis - axis.mean() for axis in one.fields[:3])
-        return one.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), one.fastest
+    def sample(flow_state):
+        x, y, z = (axis - axis.mean() for axis in flow_state.fields[:3])
+        return flow_state.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), flow_state.fastest
 
-    found = follow(simulation, 3.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 3.0, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     radius, spacing = np.cbrt(0.25), simulation.law.spacing
     exact = filled(lambda points: np.linalg.norm(points, axis=1) < radius, radius, spacing)
     distance = radii(simulation)
     level = np.linalg.norm(level_points(*exact, spacing, half=False), axis=1).mean()
     longer = np.flatnonzero(rows[:, 1] > ROUND)
-    return found | {
+    return figures | {
         "radius_error": float(distance.mean() / level - 1.0),
         "roundness": float(distance.max() / distance.min()),
         "pressure_error": core_pressure(simulation, radius) * radius / 2.0 - 1.0,

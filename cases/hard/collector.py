@@ -57,8 +57,8 @@ class HardFile(pytest.File):
         return HardItem.from_parent(self, name=case.tried or case.name, case=case)
 
     def _number(self, option: str) -> int | None:
-        given = dict(text.split("=") for text in self.config.getoption(option, []))
-        return int(given[self.path.stem]) if self.path.stem in given else None
+        numbers = dict(text.split("=") for text in self.config.getoption(option, []))
+        return int(numbers[self.path.stem]) if self.path.stem in numbers else None
 
 
 class MissError(Exception):
@@ -104,5 +104,5 @@ class Search(pytest.Item):
     def runtest(self) -> None:
         """Search."""
         count, number = self.drawn
-        found = self.file.simplest(count, self.config.getoption("random_seed"), number)
-        self.user_properties.append(("simplest", found))
+        table = self.file.simplest(count, self.config.getoption("random_seed"), number)
+        self.user_properties.append(("simplest", table))

@@ -25,9 +25,9 @@ def quantities(low: float, high: float, unit: str) -> st.SearchStrategy[str]:
 
 def tables(*parts: Table, **values: Any) -> Table:
     """Draw a table of all parts and of values, each a strategy or what it always is."""
-    drawn = {name: one if isinstance(one, st.SearchStrategy) else st.just(one) for name, one in values.items()}
+    drawn = {name: value if isinstance(value, st.SearchStrategy) else st.just(value) for name, value in values.items()}
     return st.tuples(*parts, st.fixed_dictionaries(drawn)).map(
-        lambda found: {name: value for part in found for name, value in part.items()}
+        lambda tables_of_parts: {name: value for part in tables_of_parts for name, value in part.items()}
     )
 
 

@@ -74,7 +74,7 @@ class HardCase:
     title: str
     why: str
     trial: Trial
-    given: dict[str, Any]
+    table: dict[str, Any]
     parameters: BaseModel
     bounds: tuple[Bound, ...]
     expect: str
@@ -112,7 +112,7 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
             name=name,
             tried=tried,
             trial=trial,
-            given=values,
+            table=values,
             parameters=parameters,
             bounds=bounds,
             **head.model_dump(include={"family", "title", "why", "expect", "deadline", "long"}),
@@ -128,8 +128,10 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
 def _read_head(table: dict, source: str) -> HardCaseFile:
     """Read all but what is in the tables of the trial."""
     problems: list[Problem] = []
-    own = {name: value for name, value in table.items() if name not in FREE_TABLES}
-    values = fields.to_si_table(HardCaseFile, own, "", problems) | {n: table[n] for n in FREE_TABLES if n in table}
+    head_values = {name: value for name, value in table.items() if name not in FREE_TABLES}
+    values = fields.to_si_table(HardCaseFile, head_values, "", problems) | {
+        n: table[n] for n in FREE_TABLES if n in table
+    }
     head = None
     try:
         head = HardCaseFile.model_validate(values, strict=True)
@@ -144,11 +146,11 @@ def _read_head(table: dict, source: str) -> HardCaseFile:
 
 
 def _trial_of(head: HardCaseFile, source: str) -> Trial:
-    known = trials()
-    if head.trial not in known:
-        choice, hint = "one of " + ", ".join(known), nearest(head.trial, known)
+    all_trials = trials()
+    if head.trial not in all_trials:
+        choice, hint = "one of " + ", ".join(all_trials), nearest(head.trial, all_trials)
         raise CaseError(source, [Problem("trial", "unknown trial", head.trial, choice, hint)])
-    return known[head.trial]
+    return all_trials[head.trial]
 
 
 def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterator[Bound]:
@@ -157,15 +159,15 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
         problems.append(Problem("bounds", "nothing is judged: give bounds, or expect", None))
     if head.bounds and head.expect:
         problems.append(Problem("bounds", "nothing is measured of a case that must be refused", None, "expect alone"))
-    for measure, given in head.bounds.items():
+    for measure, values in head.bounds.items():
         key, names = f"bounds.{measure}", trial.measures
         if names is not None and measure not in names:
             choice, hint = "one of " + ", ".join(names), nearest(measure, names)
-            problems.append(Problem(key, f"the trial {head.trial} measures no such thing", given, choice, hint))
+            problems.append(Problem(key, f"the trial {head.trial} measures no such thing", values, choice, hint))
             continue
-        texts = given if isinstance(given, list) else [given]
+        texts = values if isinstance(values, list) else [values]
         if not texts:
-            problems.append(Problem(key, "nothing is judged: give a bound, or a list of some", given))
+            problems.append(Problem(key, "nothing is judged: give a bound, or a list of some", values))
         for text in texts:
             try:
                 yield read_bound(measure, text, None if names is None else names[measure])
@@ -202,12 +204,12 @@ def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple
 
 def _parameters(trial: Trial, table: dict, folder: Path, problems: list[Problem]) -> BaseModel | None:
     """Convert and check the parameters of a trial; None, and problems added, where that cannot be."""
-    found: list[Problem] = []
-    values = trial.located(fields.to_si_table(trial.parameters, table, "", found), folder)
+    found_problems: list[Problem] = []
+    values = trial.located(fields.to_si_table(trial.parameters, table, "", found_problems), folder)
     parameters = None
     try:
         parameters = trial.parameters.model_validate(values, strict=True)
     except ValidationError as error:
-        found += translate(trial.parameters, error, table, {problem.key for problem in found})
-    problems += [replace(problem, key=f"parameters.{problem.key}".rstrip(".")) for problem in found]
-    return None if found else parameters
+        found_problems += translate(trial.parameters, error, table, {problem.key for problem in found_problems})
+    problems += [replace(problem, key=f"parameters.{problem.key}".rstrip(".")) for problem in found_problems]
+    return None if found_problems else parameters

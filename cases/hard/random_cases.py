@@ -67,7 +67,7 @@ class RandomFile:
 
     def simplest(self, count: int, seed: int, number: int) -> dict[str, Any]:
         """Draw again, and let hypothesis simplify the parameters of a case that missed for as long as it misses."""
-        first, end = self.cases(count, seed)[number].given, time.monotonic() + LONGEST_SEARCH
+        first, end = self.cases(count, seed)[number].table, time.monotonic() + LONGEST_SEARCH
         missed: list[dict[str, Any]] = []
         survived: dict[str, bool] = {str(first): False}
 
@@ -122,10 +122,10 @@ def read_random_file(path: Path) -> RandomFile | None:
 
 def shares(files: Sequence[RandomFile], count: int) -> Iterator[tuple[RandomFile, int]]:
     """Divide a number of cases among the random files of a family by their shares."""
-    whole, given, weight = sum(file.share for file in files), 0, 0
+    whole, assigned, weight = sum(file.share for file in files), 0, 0
     for file in files:
         weight += file.share
-        own = round(count * weight / whole) - given
-        given += own
-        if own:
-            yield file, own
+        cases_of_file = round(count * weight / whole) - assigned
+        assigned += cases_of_file
+        if cases_of_file:
+            yield file, cases_of_file

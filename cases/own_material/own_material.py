@@ -73,12 +73,12 @@ def mesh() -> MeshData:
     points = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
     centre = points[cells].mean(axis=1)
     part = np.select([centre[:, 2] < 0, centre[:, 2] < 1.4 * MM], [0, 1], 2).astype(np.int32)
-    kept = (part == 0) | (np.abs(centre[:, 0]) < 4 * MM)
-    used, cells = np.unique(cells[kept], return_inverse=True)
+    is_filled = (part == 0) | (np.abs(centre[:, 0]) < 4 * MM)
+    used, cells = np.unique(cells[is_filled], return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 8).astype(np.int32)
     faces = boundary_facets(cells)
     clamped = faces[np.isclose(np.abs(points[faces, 0].mean(axis=1)), 20 * MM)]
-    return MeshData(points, cells, part[kept], ("board", "potting", "part"), {"mounting_holes": clamped})
+    return MeshData(points, cells, part[is_filled], ("board", "potting", "part"), {"mounting_holes": clamped})
 
 
 def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -> dict[str, np.ndarray]:
@@ -105,8 +105,8 @@ def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -
 def sample(comm: MPI.Comm, motion: ExplicitMotion, top: np.ndarray) -> tuple[float, ...]:
     """Return time, mean displacement of the part's top along z, and energies of all ranks; collective."""
     internal = motion.internal_energy()
-    own = [motion.displacement[top, 2].sum(), top.sum(), motion.kinetic_energy(), internal.strain, internal.plastic]
-    way, count, *energies = comm.allreduce(np.array([*own, motion.external_work]))
+    row = [motion.displacement[top, 2].sum(), top.sum(), motion.kinetic_energy(), internal.strain, internal.plastic]
+    way, count, *energies = comm.allreduce(np.array([*row, motion.external_work]))
     return motion.time, way / count, *energies
 
 

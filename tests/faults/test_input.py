@@ -70,8 +70,8 @@ def mutant(text: str, draw: random.Random) -> bytes:
         lines.insert(draw.randrange(len(lines)), draw.choice(lines))
     else:
         for _ in range(draw.choice((1, 1, 2, 4))):
-            place = draw.choice([k for k, line in enumerate(lines) if re.match(r'\s*[\w."]+\s*=', line)])
-            lines[place] = changed(*lines[place].split("=", 1), draw)
+            line_number = draw.choice([k for k, line in enumerate(lines) if re.match(r'\s*[\w."]+\s*=', line)])
+            lines[line_number] = changed(*lines[line_number].split("=", 1), draw)
     return "\n".join(lines).encode()
 
 
@@ -112,10 +112,10 @@ def tabulated(tmp_path) -> Path:
     return tmp_path / "case.toml"
 
 
-@pytest.mark.parametrize(("content", "told"), BAD_TABLES.values(), ids=BAD_TABLES.keys())
-def test_a_bad_table_is_refused_in_one_line(tabulated, content, told):
+@pytest.mark.parametrize(("content", "message"), BAD_TABLES.values(), ids=BAD_TABLES.keys())
+def test_a_bad_table_is_refused_in_one_line(tabulated, content, message):
     (tabulated.parent / "pulse.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(CaseError, match=rf"case\.toml:\d+:1: shock\.table.*{told}") as caught:
+    with pytest.raises(CaseError, match=rf"case\.toml:\d+:1: shock\.table.*{message}") as caught:
         planned(tabulated)
     assert len(caught.value.lines()) == 1
 
@@ -162,11 +162,11 @@ NO_CASES = {
 }
 
 
-@pytest.mark.parametrize(("content", "told"), NO_CASES.values(), ids=NO_CASES.keys())
-def test_files_that_are_no_cases(tmp_path, content, told):
+@pytest.mark.parametrize(("content", "message"), NO_CASES.values(), ids=NO_CASES.keys())
+def test_files_that_are_no_cases(tmp_path, content, message):
     path = tmp_path / "case.toml"
     path.write_bytes(content)
-    with pytest.raises(CaseError, match=told) as caught:
+    with pytest.raises(CaseError, match=message) as caught:
         read_case(path)
     assert len(caught.value.lines()) == 1
 

@@ -34,14 +34,14 @@ def undisturbed(first_run):
     return folder, sum(seconds) + STAGE_START * len(seconds)
 
 
-def same(found: dict[str, object], expected: dict[str, object]) -> None:
-    assert found.keys() == expected.keys()
+def same(actual: dict[str, object], expected: dict[str, object]) -> None:
+    assert actual.keys() == expected.keys()
     for name, value in expected.items():
         if isinstance(value, float):
             least = OF_ROUNDING if any(word in name for word in EXACTLY_ZERO) else 1e-12
-            assert found[name] == pytest.approx(value, rel=ROUNDING, abs=least), name
+            assert actual[name] == pytest.approx(value, rel=ROUNDING, abs=least), name
         else:
-            assert found[name] == value, name
+            assert actual[name] == value, name
 
 
 def whom(process: subprocess.Popen, choice: random.Random) -> list[psutil.Process]:

@@ -72,13 +72,13 @@ if world.rank == 0:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory) -> dict[int, dict]:
+def sums_by_ranks(tmp_path_factory) -> dict[int, dict]:
     return {ranks: run_script(SCRIPT, tmp_path_factory.mktemp(f"ranks{ranks}"), ranks) for ranks in (1, 4)}
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "local_steps", "gravouil_combescure"])
-def test_corner_of_the_cut_where_three_ranks_meet(found, scheme):
-    (alone, _, _), (together, holders, exact) = found[1][scheme], found[4][scheme]
+def test_corner_of_the_cut_where_three_ranks_meet(sums_by_ranks, scheme):
+    (alone, _, _), (together, holders, exact) = sums_by_ranks[1][scheme], sums_by_ranks[4][scheme]
     assert holders >= 3
     assert exact < 1e-12
     assert max(abs(a - b) for a, b in zip(alone, together, strict=True)) < 1e-10 * alone[-1]

@@ -72,11 +72,11 @@ def test_sections_are_in_balance(ended):
 
 @pytest.mark.parametrize(("run", "share"), [("two", 1e-7), ("scales", 0.01)])
 def test_other_ranks_and_two_scales_find_the_same(ended, run, share):
-    expected, found = ended["one"][0], ended[run][0]
+    expected, actual = ended["one"][0], ended[run][0]
     for name in FOUND:
         scale = np.abs(expected[name]).max()
         assert scale > 0.0
-        assert np.abs(found[name] - expected[name]).max() <= share * scale, name
+        assert np.abs(actual[name] - expected[name]).max() <= share * scale, name
 
 
 def test_all_runs_rank_both_joints_alike(ended):

@@ -35,10 +35,10 @@ def write_march(path: str) -> None:
     comm = MPI.COMM_WORLD
     nodes, displacement = (comm.gather(values) for values in moved(comm))
     if comm.rank == 0:
-        found: dict[int, np.ndarray] = {}
+        displacement_of_node: dict[int, np.ndarray] = {}
         for number, value in zip(np.concatenate(nodes), np.concatenate(displacement), strict=True):
-            assert np.array_equal(found.setdefault(int(number), value), value), number
-        np.save(path, np.array([found[number] for number in sorted(found)]))
+            assert np.array_equal(displacement_of_node.setdefault(int(number), value), value), number
+        np.save(path, np.array([displacement_of_node[number] for number in sorted(displacement_of_node)]))
 
 
 @pytest.fixture(scope="module")

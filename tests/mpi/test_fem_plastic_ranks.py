@@ -37,9 +37,9 @@ def test_flow_is_the_same_on_more_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
     inputs = [(1 + meso, request(meshes, 1, meso)) for meso in (1, 2)]
     run_programs(inputs)
-    (expected, result), (found, other) = (outcome(path.with_suffix("")) for _, path in inputs)
+    (expected, result), (actual, other) = (outcome(path.with_suffix("")) for _, path in inputs)
     for name in (*FLOWS, "plastic_strain_max", "von_mises_max", "plastic", "section_board", "section_package"):
         scale = np.abs(expected[name]).max()
         assert scale > 0.0
-        assert np.abs(found[name] - expected[name]).max() <= 1e-8 * scale, name
+        assert np.abs(actual[name] - expected[name]).max() <= 1e-8 * scale, name
     assert all(check["ok"] for check in (result["health"] | other["health"]).values())

@@ -91,9 +91,9 @@ def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
     assert done.returncode != 0
     assert time.time() - float((checkpoints.parent / "begin").read_text()) < 30.0
     said = (directory / "out" / ERROR).read_text()
-    told = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
-    assert told[0] == said.splitlines()[:1], said
-    assert told[1] == told[0] or (not told[1] and what == "exit" and loses_words()), done.stderr
+    error_lines = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
+    assert error_lines[0] == said.splitlines()[:1], said
+    assert error_lines[1] == error_lines[0] or (not error_lines[1] and what == "exit" and loses_words()), done.stderr
     return said
 
 

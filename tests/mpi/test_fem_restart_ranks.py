@@ -156,10 +156,10 @@ def scenes(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("name, ways", [("package", 3), ("yielding", 2), ("implicit", 1)])
 def test_run_continues_on_other_ranks(scenes, name, ways):
-    told, energies = json.loads((scenes / name / "told.json").read_text())
-    assert len(told) == ways
+    continuations, energies = json.loads((scenes / name / "told.json").read_text())
+    assert len(continuations) == ways
     assert (energies["plastic"] > 0.0) == (name != "implicit")
-    for difference, window, folders, fields in told:
+    for difference, window, folders, fields in continuations:
         assert difference <= 1e-10
         assert 11 < window <= 11 + 4  # the latest that is sampled before the second break
         assert folders == 1

@@ -20,9 +20,9 @@ def own_material(path: Path, ranks: int) -> dict[str, np.ndarray]:
 
 @pytest.mark.long
 def test_two_ranks_equal_one(tmp_path):
-    expected, found = (own_material(tmp_path / f"{ranks}.npz", ranks) for ranks in (1, 2))
+    expected, actual = (own_material(tmp_path / f"{ranks}.npz", ranks) for ranks in (1, 2))
     assert len(expected["time"]) > 10
     for name, values in expected.items():
         scale = np.abs(expected[name if name in ("time", "part") else "given"]).max()
         assert np.abs(values).max() > 0.0
-        assert np.abs(found[name] - values).max() <= 1e-9 * scale, name
+        assert np.abs(actual[name] - values).max() <= 1e-9 * scale, name

@@ -89,8 +89,8 @@ def test_a_run_that_fails_says_why(tmp_path):
 
 
 def test_a_run_its_metrics_and_its_report_show_themselves(run):
-    shown = run._repr_html_()
-    assert run.summary["answer"] in shown and "data:image/png;base64," in shown
+    html = run._repr_html_()
+    assert run.summary["answer"] in html and "data:image/png;base64," in html
     assert "<td>critical joint</td>" in run.metrics._repr_html_()
     frame = run.report._repr_html_()
     assert frame.startswith("<iframe") and 'sandbox="allow-scripts"' in frame and frame.count("<") == 2

@@ -23,14 +23,14 @@ def critical_run(first_run, tmp_path_factory) -> Path:
 
 
 def test_a_coarse_run_finds_the_critical_joint_of_the_dns(critical_run):
-    found = json.loads((critical_run / "shock/fine_joints.json").read_text())
+    fine_joints = json.loads((critical_run / "shock/fine_joints.json").read_text())
     with np.load(critical_run / "shock/dns/history.npz") as dns:
         peel = np.maximum(dns["peel_board"], dns["peel_package"]).max(axis=0)
         pressed = np.maximum(dns["von_mises_board"], dns["von_mises_package"]).max(axis=0)
         names = [str(name) for name in dns["joints"]]
-    assert found["names"] == [names[np.argmax(peel)]] == ["B3"]  # under the die, which pulls
+    assert fine_joints["names"] == [names[np.argmax(peel)]] == ["B3"]  # under the die, which pulls
     assert names[np.argmax(pressed)] == "A4"  # in the first 30 us the corner is pressed: peel stress leaves it out
-    assert "run with coarse joints" in found["why"]
+    assert "run with coarse joints" in fine_joints["why"]
 
 
 def test_coarse_joints_have_coarse_meshes_and_checks(critical_run):

@@ -49,14 +49,14 @@ def test_pads_joints_and_structure_tell_the_same(folder):
     structure = np.load(folder / "reflow/structure.npz")
     last = dict(zip(structure["joints"], structure["pad_motion"][-1], strict=True))
     for pad in pads:
-        place = joints[pad.name]["place"]
-        assert (pad.gap, *pad.offset, *pad.tilt) == (place["gap"], *place["offset"], *place["tilt"])
+        joint_place = joints[pad.name]["place"]
+        assert (pad.gap, *pad.offset, *pad.tilt) == (joint_place["gap"], *joint_place["offset"], *joint_place["tilt"])
         board, package = last[pad.name]
         assert pad.gap - drawn[pad.name].gap == pytest.approx(package[2] - board[2], abs=1e-8)
         assert np.hypot(*pad.tilt) > 0.0
     assert np.ptp([pad.gap for pad in pads]) > 1e-6
-    shown = meshio.read(folder / "reflow/structure.vtu")
-    assert abs(shown.point_data["displacement"][:, 2]).max() == pytest.approx(
+    pictured = meshio.read(folder / "reflow/structure.vtu")
+    assert abs(pictured.point_data["displacement"][:, 2]).max() == pytest.approx(
         abs(structure["displacement"][:, 2]).max(), rel=1e-6
     )
 
@@ -70,11 +70,11 @@ def test_a_kill_in_the_midst_of_an_exchange_changes_nothing(folder, tmp_path):
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in " ".join(result.stdout.split())
     assert not list((tmp_path / ".store/work").iterdir())
-    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (folder, tmp_path))
-    assert found.keys() == expected.keys()
+    expected, actual = (read_shapes(run / "reflow/shapes.h5") for run in (folder, tmp_path))
+    assert actual.keys() == expected.keys()
     for name, shape in expected.items():
-        assert np.array_equal(found[name].points, shape.points)
-        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
+        assert np.array_equal(actual[name].points, shape.points)
+        assert np.array_equal(actual[name].history["energy"], shape.history["energy"])
     assert (tmp_path / "reflow/pads.json").read_bytes() == (folder / "reflow/pads.json").read_bytes()
     fields = [np.load(run / "reflow/structure.npz") for run in (folder, tmp_path)]
     for key in ("displacement", "pad_motion", "iterations", "force_residual"):

@@ -41,18 +41,18 @@ def test_a_joint_that_breaks_is_the_verdict_of_a_healthy_run(plastic_run):
     assert "some break" in page and "plastic work density, solder layer at this pad" in page
     assert "Largest plastic work density of the layer first" in page
     failed = [name for name, joint in verdict["joints"].items() if joint["verdict"] == "FAIL"]
-    told = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]
-    assert all(name in told for name in failed) and verdict["joint"] in failed
+    verdict_text = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]
+    assert all(name in verdict_text for name in failed) and verdict["joint"] in failed
 
 
 def test_a_verdict_ends_a_run_with_3_where_that_is_asked_for(plastic_run, tmp_path):
     folder = shutil.copytree(plastic_run[0], tmp_path / "small")
-    shown = (folder / "shock/stage.json").read_text()
+    stage_text = (folder / "shock/stage.json").read_text()
     assert reflowshock("run", folder, "--fail-on-verdict", settings=SETTINGS).returncode == 3
     held = (*SETTINGS[:-1], SETTINGS[-1].replace("0.2 MJ", "3000 MJ"))
     other = reflowshock("run", folder, "--fail-on-verdict", settings=held)
     assert other.returncode == 0 and ", PASS; " in other.stdout.splitlines()[-1]
-    assert (folder / "shock/stage.json").read_text() == shown  # judged again, not computed again
+    assert (folder / "shock/stage.json").read_text() == stage_text  # judged again, not computed again
     assert reflowshock("run", folder, "--fail-on-verdict", "--until", "shock", settings=SETTINGS).returncode == 2
 
 

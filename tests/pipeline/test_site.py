@@ -68,26 +68,26 @@ def test_commands_of_a_page_run(page, scratch, monkeypatch):
             continue
         if "gerbers" in line:
             pytest.importorskip("gerbonara")
-        command, given = parse(line) if "--install-completion" not in line else ("", {})
+        command, options = parse(line) if "--install-completion" not in line else ("", {})
         if command in WRITES_A_CASE:
             run_here(line, monkeypatch)
-        elif command in READS_A_CASE and given["case"] is not None:
-            read_case(Path(given["case"]), given["settings"] or [], True)
+        elif command in READS_A_CASE and options["case"] is not None:
+            read_case(Path(options["case"]), options["settings"] or [], True)
         elif command == "study":
-            assert read_points_of(Path(given["study"]), True, False).possible
+            assert read_points_of(Path(options["study"]), True, False).possible
 
 
 def is_known(line: str) -> bool:
     """Whether another command is one whose files, targets or extras exist."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    if found := re.fullmatch(r"make ([a-z-]+)", line):
-        return f"\n{found[1]}: " in (ROOT / "Makefile").read_text()
-    if found := re.fullmatch(r"pip install 'reflowshock\[(\w+)\]'", line):
-        return found[1] in extras
+    if match := re.fullmatch(r"make ([a-z-]+)", line):
+        return f"\n{match[1]}: " in (ROOT / "Makefile").read_text()
+    if match := re.fullmatch(r"pip install 'reflowshock\[(\w+)\]'", line):
+        return match[1] in extras
     if line.startswith("python -m "):
         return (ROOT / line.split()[2].replace("reflowshock.", "").replace(".", "/")).with_suffix(".py").exists()
-    if found := re.search(r"docs/install/\S+", line):
-        return (ROOT / found[0]).exists()
+    if match := re.search(r"docs/install/\S+", line):
+        return (ROOT / match[0]).exists()
     return line.startswith(KNOWN)
 
 
@@ -96,11 +96,11 @@ def test_commands_of_readmes_are_taken():
     lines = {line: path for path, line in in_readmes()}
     assert len(lines) > 30
     for line, path in lines.items():
-        _, given = parse(line)
-        case = given.get("case")
+        _, options = parse(line)
+        case = options.get("case")
         if case is not None and str(case).startswith("cases/") and "/your/" not in line:
             try:
-                read_case(ROOT / case, given.get("settings") or [], True)
+                read_case(ROOT / case, options.get("settings") or [], True)
             except CaseError as error:
                 raise AssertionError(f"{path}: {line}") from error
 

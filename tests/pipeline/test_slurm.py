@@ -46,8 +46,8 @@ def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
 
 
 def metrics(folder: Path) -> dict[str, object]:
-    found = json.loads((folder / "summary.json").read_text())["metrics"]
-    return {name: entry["value"] for name, entry in found.items() if not any(word in name for word in TIMES)}
+    metrics_by_name = json.loads((folder / "summary.json").read_text())["metrics"]
+    return {name: entry["value"] for name, entry in metrics_by_name.items() if not any(word in name for word in TIMES)}
 
 
 def at_work(folder: Path) -> bool:

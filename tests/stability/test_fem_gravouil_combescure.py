@@ -95,14 +95,14 @@ def test_solder_that_yields_is_linked_stably():
     assert coupled.plan.substeps > 1
     for part in coupled.parts:
         part.motion.launch(np.array([0.0, 0.0, 20.0]))
-    given = coupled.energies()["kinetic"]
+    initial = coupled.energies()["kinetic"]
     for _ in range(300):
         coupled.run()
     energies = coupled.energies()
-    assert energies["plastic"] > 1e-3 * given
+    assert energies["plastic"] > 1e-3 * initial
     held = sum(energies[name] for name in ("kinetic", "internal", "plastic", "hourglass", "interface"))
-    assert held == pytest.approx(given, rel=5e-3)
-    assert energies["interface"] > -1e-3 * given
+    assert held == pytest.approx(initial, rel=5e-3)
+    assert energies["interface"] > -1e-3 * initial
 
 
 def test_one_way_is_refused():

@@ -39,20 +39,20 @@ def chain_effective(
     """Return K_eff of a chain by the substeps themselves, all columns at a time."""
 
     def effective(number: int, around: float) -> np.ndarray:
-        own = chain_stiffness(levels, stiffness, number)
+        level_matrix = chain_stiffness(levels, stiffness, number)
         inner = around / ratios[number - 1] if number else around
-        matrix = own + (effective(number + 1, inner) if number < len(ratios) else 0.0)
+        matrix = level_matrix + (effective(number + 1, inner) if number < len(ratios) else 0.0)
         if number == 0:
             return matrix
         outer = np.zeros(ELEMENTS + 1, dtype=bool)
         outer[CELLS[levels < number]] = True
-        steps, place = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
-        change, total = np.zeros_like(place), np.zeros_like(place)
+        steps, displacement = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
+        change, total = np.zeros_like(displacement), np.zeros_like(displacement)
         for memory, rate, weight in zip(steps.memory, steps.rate, steps.weight, strict=True):
-            force = matrix @ place
+            force = matrix @ displacement
             total += weight * force
             change = memory * change - rate * around**2 * np.where(outer, 0.0, 1.0 / mass)[:, None] * force
-            place = place + change
+            displacement = displacement + change
         return total
 
     return effective(0, pace.window)
@@ -81,8 +81,8 @@ def extreme_eigenvalues(
 def grown(fraction: float, ratios: tuple[int, ...], damping: float = 0.0) -> int:
     """Return how many of some random chains grow; damping half a step late needs z (1 + 2 damping) <= 4."""
     random = np.random.default_rng(sum(ratios))
-    found = [extreme_eigenvalues(random, ratios, fraction, damping) for _ in range(SAMPLES)]
-    return sum(high * (1.0 + 2.0 * damping) > 4.0 or low < -4e-9 for low, high in found)
+    extremes = [extreme_eigenvalues(random, ratios, fraction, damping) for _ in range(SAMPLES)]
+    return sum(high * (1.0 + 2.0 * damping) > 4.0 or low < -4e-9 for low, high in extremes)
 
 
 @pytest.mark.parametrize("fraction", [0.5, 0.9, 0.95])
@@ -132,13 +132,13 @@ def test_energy_stays_over_many_windows():
     body = model.body
     motion = ExplicitMotion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
-    found = []
+    energies = []
     for _ in range(50):
-        found.append(motion.kinetic_energy() + motion.internal_energy().strain)
+        energies.append(motion.kinetic_energy() + motion.internal_energy().strain)
         for _ in range(200):
             motion.advance()
             motion.update_force()
-    assert np.ptp(found) <= 1e-10 * found[0]
+    assert np.ptp(energies) <= 1e-10 * energies[0]
 
 
 @pytest.mark.parametrize("damping", [0.006, 0.03])

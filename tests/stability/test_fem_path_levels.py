@@ -91,8 +91,8 @@ def thrown(pace: int, speed: float) -> ExplicitMotion:
 
 def momentum(motion: ExplicitMotion) -> np.ndarray:
     """Return linear and angular momentum (6,) about the origin in the present configuration."""
-    place = motion.body.local.points + motion.displacement
-    return net_load(place, motion.body.mass[:, None] * motion.present_velocity())
+    position = motion.body.local.points + motion.displacement
+    return net_load(position, motion.body.mass[:, None] * motion.present_velocity())
 
 
 def test_free_joint_that_flows_keeps_momentum_and_energy_and_flows_as_in_one_step_for_all():

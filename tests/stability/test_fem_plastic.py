@@ -105,8 +105,8 @@ def test_copper_rod_that_strikes_a_rigid_wall(formulation):
     while motion.time < 80e-6:
         motion.advance()
         motion.update_force()
-    held, place = motion.internal_energy(), body.local.points + motion.displacement
+    held, position = motion.internal_energy(), body.local.points + motion.displacement
     assert motion.kinetic_energy() + held.total == pytest.approx(first, rel=1e-3)
-    assert 6.8e-3 < np.linalg.norm(place[foot, :2], axis=1).max() < 7.7e-3
+    assert 6.8e-3 < np.linalg.norm(position[foot, :2], axis=1).max() < 7.7e-3
     assert held.hourglass < 0.01 * held.total
-    assert place[:, 2].max() == pytest.approx(21.45e-3, rel=0.015)
+    assert position[:, 2].max() == pytest.approx(21.45e-3, rel=0.015)

@@ -44,8 +44,8 @@ MESHES = {"sandwich": sandwich(), "blocks": blocks()}
 
 def estimates(name: str) -> tuple[Body, dict[str, float]]:
     body, element = dns_body(MESHES[name], materials=Materials(substrate=SOFT))
-    found = highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass)
-    return body, {"element": element, "power_iteration": found.critical_step}
+    estimate = highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass)
+    return body, {"element": element, "power_iteration": estimate.critical_step}
 
 
 def random_start(motion: ExplicitMotion) -> None:

@@ -19,9 +19,9 @@ def spread(per_edge, degrees=60.0, end=0.1, **values):
     numerics = SolderNumerics(time_step_limit=100, max_steps=1000, spacing=EDGE / (per_edge - 1))
     effects = SolderEffects(inertia="on", viscosity="on", gravity="off")
     angle = np.radians(degrees)
-    given = PAPER | values
+    parameters = PAPER | values
     solder = Solder(
-        volume=EDGE**3, pad_contact_angle=angle, process_time=end, effects=effects, numerics=numerics, **given
+        volume=EDGE**3, pad_contact_angle=angle, process_time=end, effects=effects, numerics=numerics, **parameters
     )
     flow, run = solve_drop(solder, per_edge)
     assert np.isfinite(flow.body.points).all()

@@ -20,9 +20,9 @@ def flipped(add):
     """Return a force term's method with the other sign."""
 
     def wrong(self, displacement, force):
-        own = 0.0 * force
-        add(self, displacement, own)
-        force -= own
+        contribution = 0.0 * force
+        add(self, displacement, contribution)
+        force -= contribution
 
     return wrong
 

@@ -17,7 +17,7 @@ from reflowshock.particles.steps.inertial_step import InertialFlow
 def flip(patch, owner, name):
     """Let a method return its result with the other sign."""
     whole = getattr(owner, name)
-    patch.setattr(owner, name, lambda *given: -whole(*given))
+    patch.setattr(owner, name, lambda *arguments: -whole(*arguments))
 
 
 def double_step(patch):
@@ -36,7 +36,7 @@ def forget_volume(patch):
 
 
 def forget_check(patch):
-    patch.setattr(user_surface, "check_triangulation", lambda *given: None)
+    patch.setattr(user_surface, "check_triangulation", lambda *arguments: None)
 
 
 FAULTS = [
@@ -66,6 +66,6 @@ def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
 
 def test_a_run_that_fails_is_told_in_its_own_words():
     (case,) = read_hard_cases(HARD / "reflow_run.toml")
-    given = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
-    verdict = attempt(replace(case, parameters=given))
+    parameters = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
+    verdict = attempt(replace(case, parameters=parameters))
     assert "drop.particles_per_edge = 1: is out of range" in verdict.message, verdict

@@ -53,8 +53,8 @@ def interface(
     corner = np.arange(25).reshape(5, 5)
     quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
     arrays: dict[str, np.ndarray] = {"times": times}
-    for name, place in zip(names, np.column_stack([x, y]), strict=True):
-        points = np.column_stack([grid + place, np.full(25, 0.4 * MILLI)])
+    for name, position in zip(names, np.column_stack([x, y]), strict=True):
+        points = np.column_stack([grid + position, np.full(25, 0.4 * MILLI)])
         middle = points[quads].mean(axis=1)
         stress = factor * 2e6 * (middle[:, 0] + middle[:, 1]) / MILLI
         arrays |= {f"points@{name}": points, f"quads@{name}": quads}

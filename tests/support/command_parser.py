@@ -13,7 +13,7 @@ from reflowshock.workflow import cli
 def commands() -> Mapping[str, Any]:
     """Return the commands that a user sees, by name."""
     group = typer.main.get_command(cli.app)
-    return {name: found for name, found in group.commands.items() if not found.hidden}
+    return {name: command for name, command in group.commands.items() if not command.hidden}
 
 
 def parse(line: str) -> tuple[str, dict]:

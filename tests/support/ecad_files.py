@@ -21,14 +21,14 @@ NAMES = {joint_name(row, column): (row, column) for row in range(10) for column 
 
 def pads(quarter_turns: int = 0) -> dict[str, tuple[float, float]]:
     """Return where the pads of U8 are, turned counterclockwise about its centre."""
-    found = {}
+    pad_lines = {}
     for name, (row, column) in NAMES.items():
         if name not in MISSING:
             x, y = (column - 4.5) * PITCH, (4.5 - row) * PITCH
             for _ in range(quarter_turns):
                 x, y = -y, x
-            found[name] = (CENTRE[0] + x, CENTRE[1] + y)
-    return found
+            pad_lines[name] = (CENTRE[0] + x, CENTRE[1] + y)
+    return pad_lines
 
 
 def kicad(path: Path, quarter_turns: int = 0, extra: str = "") -> Path:

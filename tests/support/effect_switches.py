@@ -64,26 +64,28 @@ ELSEWHERE_ON = {
 
 def calls(work: Callable[[], object]) -> Counter:
     """Return how often each Python function is called, and how often compiled ones are, by a piece of work."""
-    found: Counter = Counter()
+    counter: Counter = Counter()
 
     def count(frame, event: str, argument) -> None:
         if event == "call":
-            found[(frame.f_globals.get("__name__", ""), frame.f_code.co_qualname)] += 1
+            counter[(frame.f_globals.get("__name__", ""), frame.f_code.co_qualname)] += 1
         elif event == "c_call":
-            found[("", getattr(argument, "__qualname__", ""))] += 1
+            counter[("", getattr(argument, "__qualname__", ""))] += 1
 
     sys.setprofile(count)
     try:
         work()
     finally:
         sys.setprofile(None)
-    return found
+    return counter
 
 
-def enters(found: Counter, place: str) -> bool:
+def enters(counted_calls: Counter, dotted_name: str) -> bool:
     """Whether any method of a class, or a function, was called, given by its dotted name."""
-    module, _, name = place.rpartition(".")
-    return any(at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in found)
+    module, _, name = dotted_name.rpartition(".")
+    return any(
+        at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in counted_calls
+    )
 
 
 def flow_with(acting: Mapping[str, bool], count: int = 5, solder: Solder = SOLDER) -> LiquidFlow:
@@ -114,10 +116,10 @@ def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, fl
     return body, 0.5 * critical
 
 
-def loads_of(body: Body, wanted: Shock) -> list[Load]:
+def loads_of(body: Body, settings: Shock) -> list[Load]:
     """Return the loads of a shock on a body without holes to shake."""
     tables: Any = SimpleNamespace(shaken=np.empty(0, np.int32))
-    return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, wanted)
+    return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, settings)
 
 
 def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:

@@ -21,5 +21,5 @@ def run_drop(folder: Path, command: str = "run", *options: str, cwd: Path | None
 
 def answers(folder: Path) -> dict[str, object]:
     """Return the metrics of a run that another run must repeat."""
-    found = json.loads((folder / "summary.json").read_text())["metrics"]
-    return {name: entry["value"] for name, entry in found.items() if not any(word in name for word in TIMES)}
+    metrics = json.loads((folder / "summary.json").read_text())["metrics"]
+    return {name: entry["value"] for name, entry in metrics.items() if not any(word in name for word in TIMES)}

@@ -94,14 +94,14 @@ def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | No
     moves = moving_components(model, number)
     scale = step / np.sqrt(np.repeat(model.body.mass, 3)[moves])
     values, vectors = np.linalg.eigh(scale[:, None] * matrix[np.ix_(moves, moves)] * scale)
-    beside = matrix[np.ix_(~moves, moves)] * scale @ vectors
+    coupling_block = matrix[np.ix_(~moves, moves)] * scale @ vectors
     phi, slope = filter_of(model.ratios[number - 1], stabilisation(number), values)
     back = vectors.T / scale
     result = matrix.copy()
     result[np.ix_(moves, moves)] = back.T * (values * phi) @ back
-    result[np.ix_(~moves, moves)] = beside * phi @ back
+    result[np.ix_(~moves, moves)] = coupling_block * phi @ back
     result[np.ix_(moves, ~moves)] = result[np.ix_(~moves, moves)].T
-    result[np.ix_(~moves, ~moves)] += beside * slope @ beside.T
+    result[np.ix_(~moves, ~moves)] += coupling_block * slope @ coupling_block.T
     return result
 
 

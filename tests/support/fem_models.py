@@ -48,9 +48,9 @@ def package_mesh(size: float = 0.5e-3) -> MeshData:
     points, cells = grid(x, x, low + np.array([0.0, 0.2e-3, 0.4e-3, 0.6e-3, 0.8e-3]))
     centre = points[cells].mean(axis=1)
     die = centre[:, 2] > low + 0.4e-3
-    kept = ~die | ((centre[:, 0] < 2e-3) & (centre[:, 1] < 2e-3))
+    is_filled = ~die | ((centre[:, 0] < 2e-3) & (centre[:, 1] < 2e-3))
     facets = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, low)}
-    mesh = mesh_of(points, cells[kept], np.where(die, "die", "substrate")[kept], facets)
+    mesh = mesh_of(points, cells[is_filled], np.where(die, "die", "substrate")[is_filled], facets)
     return without_unused_nodes(mesh)[0]
 
 

@@ -69,24 +69,24 @@ class HexahedronTwin:
 
     def force(self, displacement: np.ndarray) -> np.ndarray:
         """Return the internal force (8, 3) of the next step."""
-        place, rotation = self.corners + displacement, np.eye(3)
+        position, rotation = self.corners + displacement, np.eye(3)
         if self.finite:
-            rotation = polar(place.T @ self.centre @ np.linalg.inv(self.corners.T @ self.centre))[0]
-        place = place @ rotation
-        middle = 0.5 * (place + self.place) if self.finite else self.corners
-        strain = self.compatible(middle, place - self.place)
-        self.place = place
+            rotation = polar(position.T @ self.centre @ np.linalg.inv(self.corners.T @ self.centre))[0]
+        position = position @ rotation
+        middle = 0.5 * (position + self.place) if self.finite else self.corners
+        strain = self.compatible(middle, position - self.place)
+        self.place = position
         for point, increment in zip(self.points, strain + self.modes(middle, strain), strict=True):
             point.take(increment)
         stress = np.array([point.stress for point in self.points])
         pressure = stress[:, :3].mean(axis=1)
         loads = symmetric(stress + np.outer(self.fit @ pressure - pressure, [1, 1, 1, 0, 0, 0]))
-        gradients = self.gradients(place if self.finite else self.corners)
+        gradients = self.gradients(position if self.finite else self.corners)
         return np.einsum("g,gij,gaj->ai", self.weight, loads, gradients) @ rotation.T
 
-    def gradients(self, place: np.ndarray) -> np.ndarray:
+    def gradients(self, position: np.ndarray) -> np.ndarray:
         """Return the gradients (8, 8, 3) of the shape functions at the Gauss points of a deformed element."""
-        return self.derivatives @ np.linalg.inv(np.einsum("ai,gad->gid", place, self.derivatives))
+        return self.derivatives @ np.linalg.inv(np.einsum("ai,gad->gid", position, self.derivatives))
 
     def compatible(self, middle: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Return strain increments (8, 6) with fitted dilatation, engineering shear."""

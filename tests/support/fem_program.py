@@ -24,7 +24,7 @@ def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
 
 def run_programs(inputs: list[tuple[int, Path]]) -> None:
     """Run the fem program on several inputs, each with its number of ranks, in one start of all ranks."""
-    words = [str(word) for one in inputs for word in one]
+    words = [str(word) for arguments in inputs for word in arguments]
     run_warm(words, max(ranks for ranks, _ in inputs))
 
 

@@ -30,7 +30,7 @@ class Cooled:
     """
 
     plain: Body
-    found: Equilibrium
+    equilibrium: Equilibrium
     body: Body
     critical: float
     thrust: np.ndarray
@@ -60,12 +60,12 @@ def cooled(
     def body() -> Body:
         return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
 
-    found = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
+    equilibrium = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
     plain = body()
     return Cooled(
         plain,
-        found,
-        with_initial_stress(body(), pieces.materials, found.displacement, change, path=True),
+        equilibrium,
+        with_initial_stress(body(), pieces.materials, equilibrium.displacement, change, path=True),
         float(pieces.steps.min()),
         thermal_force(plain, slice(None), pieces.materials, change),
     )

@@ -48,15 +48,15 @@ def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
     """Return a term with the stiffness that another one has in a step along the path; that one is then at its end."""
     for step in range(1, STEPS + 1):
         term.add(on_path(points, step / STEPS), np.zeros_like(points))
-    kept = {name: values.copy() for name, values in term.history.items()}
-    place, shift = on_path(points, 1.0 + 1.0 / STEPS), SHIFT * np.ptp(points)
+    history = {name: values.copy() for name, values in term.history.items()}
+    displacement, shift = on_path(points, 1.0 + 1.0 / STEPS), SHIFT * np.ptp(points)
     matrix = np.empty((points.size, points.size))
     for column in range(points.size):
         forces = []
         for sign in (1.0, -1.0):
-            for name, values in kept.items():
+            for name, values in history.items():
                 term.history[name][...] = values
-            moved, force = place.copy(), np.zeros_like(points)
+            moved, force = displacement.copy(), np.zeros_like(points)
             moved.reshape(-1)[column] += sign * shift
             term.add(moved, force)
             forces.append(force.ravel())
@@ -78,7 +78,7 @@ def flowing_pair(pair: Pair, coupling: Coupling, fraction: float = FRACTION, for
     response = ForceOptions("corotational", models.division.meso_step)
     bodies = {}
     for role, (pieces, tables) in models.parts.items():
-        own = make_pieces(pieces.local, tables, materials, formulation)
-        body = make_body(MPI.COMM_SELF, own, tables, np.ones(len(own.steps)), response)
+        fresh_pieces = make_pieces(pieces.local, tables, materials, formulation)
+        body = make_body(MPI.COMM_SELF, fresh_pieces, tables, np.ones(len(fresh_pieces.steps)), response)
         bodies[role] = flowing(body)
     return Coupled(bodies, models.division.plan, scheme_of(models.division.scheme))

@@ -39,9 +39,9 @@ def with_digest(content: bytes, rest: bytes) -> bytes:
     return FORMAT + sha256(new).hexdigest().encode() + b"\n" + new
 
 
-def flipped(content: bytes, place: float) -> bytes:
+def flipped(content: bytes, share: float) -> bytes:
     """Return a file with one bit the other way, at a share of its length."""
-    at = min(int(place * len(content)), len(content) - 1)
+    at = min(int(share * len(content)), len(content) - 1)
     return content[:at] + bytes([content[at] ^ 4]) + content[at + 1 :]
 
 

@@ -74,9 +74,9 @@ class Mesh:
         names = ["core", "rings", "layers", "copper_layers", *(["pad_layers"] if numerics.pad_layer else [])]
         counts = {name: round(getattr(numerics, name) / size) for name in names}
         if imprint is not None:
-            own = Imprint.model_validate(imprint)
-            sized = {"growth": 1.0 + size * (own.growth - 1.0), "first_layer": size * own.first_layer}
-            imprint = imprint | sized | {"rings": round(own.rings / size)}
+            settings = Imprint.model_validate(imprint)
+            sized = {"growth": 1.0 + size * (settings.growth - 1.0), "first_layer": size * settings.first_layer}
+            imprint = imprint | sized | {"rings": round(settings.rings / size)}
         layers = tuple(round(count / size) for count in self.layers)
         return replace(self, box=size * self.box, joint=self.joint | counts, imprint=imprint, layers=layers)
 
@@ -85,18 +85,18 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
     """Mesh the patches, and the joint between them."""
     numerics = {"element_size": mesh.box}
     layer = {"length": SIDE, "width": SIDE, "thickness": 0.4 * MM, "elements": mesh.layers[1]}
-    own = package(
+    package_of_joint = package(
         rows=1, columns=1, standoff=0.30 * MM, board_pad=PADS, package_pad=PADS, joint_numerics=mesh.joint,
         imprint=mesh.imprint, substrate=layer, numerics=numerics,
     )  # fmt: skip
     below = board(symmetry="full", numerics={"layers": mesh.layers[0], "patch_layers": 1})
     lines = box_lines(mesh)
-    levels = underside(own) + layer["thickness"] * np.arange(mesh.layers[1] + 1) / mesh.layers[1]
+    levels = underside(package_of_joint) + layer["thickness"] * np.arange(mesh.layers[1] + 1) / mesh.layers[1]
     at_rest = StructuredFace(lines, lines, np.zeros((len(lines), len(lines), 3)))
     side = PackageSide(float(levels[0]), at_rest, tuple((float(level), at_rest) for level in levels[1:]))
-    site = pad_table(own, below, Warpage())[0]
+    site = pad_table(package_of_joint, below, Warpage())[0]
     how = mesh_joint if mesh.swept else free_form_joint
-    joint = how(barrel(site.gap, 0.0), site, own, side, columns_of(site, own, below, side))
+    joint = how(barrel(site.gap, 0.0), site, package_of_joint, side, columns_of(site, package_of_joint, below, side))
     depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
     pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
     return joined(append(pieces)), joint
@@ -107,9 +107,9 @@ def free_form_joint(
 ) -> JointMesh:
     """Mesh a joint as ``mesh_joint`` does where no sweep serves, although one would."""
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
-    place = JointPlace.of(surface, site, side, copper.thickness)
-    build = partial(build_joint, sites=[site], copper=copper, place=place)
-    return first_good(surface, free_form(surface, whole.joint_numerics, place), site.name, build)
+    joint_place = JointPlace.of(surface, site, side, copper.thickness)
+    build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
+    return first_good(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
 
 
 def box_lines(mesh: Mesh) -> Floats:
@@ -150,7 +150,11 @@ class Problem:
     """The static problem of a mesh with its prescribed motion."""
 
     def __init__(
-        self, whole: Whole, yields: bool, known: dict[str, Material] | None = None, turned: float | None = None
+        self,
+        whole: Whole,
+        yields: bool,
+        materials_by_role: dict[str, Material] | None = None,
+        turned: float | None = None,
     ) -> None:
         """Number the equations; solder yields or does not, unless the materials of all roles are given.
 
@@ -162,8 +166,8 @@ class Problem:
         """
         mesh = whole.mesh
         solder = SOLDER.model_copy(update={"plasticity": HARDENING}) if yields else SOLDER
-        known = known or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
-        materials = [known[role_of_part(name)] for name in mesh.part_names]
+        materials_by_role = materials_by_role or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
+        materials = [materials_by_role[role_of_part(name)] for name in mesh.part_names]
         self.whole, self.yields = whole, yields
         self.elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
         self.hencky = HenckyElements.build(self.elements, materials, np.zeros((len(materials), 3)))
@@ -177,21 +181,21 @@ class Problem:
     def solve(self) -> Floats:
         """Find the displacement ``(n, 3)`` [m] by Newton's method, in shares of the motion where solder yields."""
         shares = SHARES if self.yields else (1.0,)
-        place = self._spread(shares[0] * self.motion)
+        displacement = self._spread(shares[0] * self.motion)
         for share, following in pairwise((*shares, 1.0)):
-            place = self._balanced(place, CONVERGED if share == 1.0 else NEAR) * (following / share)
-        return place
+            displacement = self._balanced(displacement, CONVERGED if share == 1.0 else NEAR) * (following / share)
+        return displacement
 
-    def _balanced(self, place: Floats, tolerance: float) -> Floats:
+    def _balanced(self, displacement: Floats, tolerance: float) -> Floats:
         for _ in range(30):
-            force, tangent = self.hencky.linearised(place)
+            force, tangent = self.hencky.linearised(displacement)
             rest = (self.tie.T @ force.ravel())[self.free]
             error = float(np.linalg.norm(rest) / np.linalg.norm(force))
             if error <= tolerance:
-                return place
-            step = np.zeros(place.size)
+                return displacement
+            step = np.zeros(displacement.size)
             step[self.free] = -solution(self._reduced(tangent), rest)
-            place = place + self._spread(step.reshape(-1, 3))
+            displacement = displacement + self._spread(step.reshape(-1, 3))
         raise RuntimeError(f"forces out of balance by {error:.1e}")
 
     def _spread(self, values: Floats) -> Floats:
@@ -209,13 +213,13 @@ def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
     csr = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data)
     petsc = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
     petsc.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    factor, (place, vector) = Factorisation(petsc), petsc.createVecs()
+    factor, (vector_in, vector) = Factorisation(petsc), petsc.createVecs()
     vector.array = right
-    factor.solve(vector, place)
-    found = np.array(place.array)
+    factor.solve(vector, vector_in)
+    solution_values = np.array(vector_in.array)
     factor.free()
     petsc.destroy()
-    return found
+    return solution_values
 
 
 def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -252,17 +256,19 @@ def is_half(mesh: MeshData) -> bool:
     return bool(mesh.points[:, 1].min() > -SAME)
 
 
-def ends(problem: Problem, place: Floats, layers: Sequence[float] = (LAYER,)) -> Iterator[tuple[str, dict[str, float]]]:
+def ends(
+    problem: Problem, displacement: Floats, layers: Sequence[float] = (LAYER,)
+) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield the measures of both ends: section forces [N, N m], averages over layers of a thickness [Pa, J/m^3]."""
     mesh = problem.whole.mesh
     cells = mesh.in_parts(f"solder@{JOINT}".__eq__)
     solder = replace(problem.hencky, elements=problem.elements.subset(cells))
-    response = solder.respond(place)
+    response = solder.respond(displacement)
     force = np.zeros_like(mesh.points)
     np.add.at(force, mesh.cells[cells], response.force.reshape(-1, 8, 3))
     if is_half(mesh):
         force *= [2.0, 0.0, 2.0]
-    state, corners = solder.points(place), mesh.points[mesh.cells[cells]]
+    state, corners = solder.points(displacement), mesh.points[mesh.cells[cells]]
     plastic = state.plastic_strain
     stress = von_mises(state.stress.reshape(-1, 6)).reshape(plastic.shape)
     work = HARDENING.A * plastic + HARDENING.B * plastic ** (1.0 + HARDENING.n) / (1.0 + HARDENING.n)
@@ -272,16 +278,16 @@ def ends(problem: Problem, place: Floats, layers: Sequence[float] = (LAYER,)) ->
         on_pad = force[nodes]
         arm = mesh.points[nodes] - [0.0, 0.0, level]
         moment = np.cross(arm * [1.0, 0.0, 1.0] if is_half(mesh) else arm, on_pad).sum(axis=0)
-        found = {
+        measures = {
             "axial_force": abs(float(on_pad[:, 2].sum())),
             "shear_force": float(np.linalg.norm(on_pad[:, :2].sum(axis=0))),
             "bending_moment": float(np.linalg.norm(moment[:2])),
         }
         for layer in layers:
             near = octant_volumes(corners, np.array([0.0, 0.0, level]), inward, layer)
-            found[f"von_mises:{1e6 * layer:g}um"] = float(np.average(stress, weights=near))
-            found[f"plastic_work:{1e6 * layer:g}um"] = float(np.average(work, weights=near))
-        yield name, found
+            measures[f"von_mises:{1e6 * layer:g}um"] = float(np.average(stress, weights=near))
+            measures[f"plastic_work:{1e6 * layer:g}um"] = float(np.average(work, weights=near))
+        yield name, measures
 
 
 IMPRINTED = Mesh(0.25 * MM, CHEAPEST, {"size": 1.0 * MM})

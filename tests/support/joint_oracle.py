@@ -117,12 +117,12 @@ class Factor:
 
     def solve(self, right: Floats) -> Floats:
         """Return the solution."""
-        given, solution = self._matrix.createVecs()
-        given.array = right
-        self._solver.solve(given, solution)
-        found = solution.array.copy()
-        given.destroy(), solution.destroy()
-        return found
+        right_vector, solution = self._matrix.createVecs()
+        right_vector.array = right
+        self._solver.solve(right_vector, solution)
+        change = solution.array.copy()
+        right_vector.destroy(), solution.destroy()
+        return change
 
     def free(self) -> None:
         """Give the memory back."""
@@ -200,13 +200,13 @@ class Newton:
 
 def equilibrium(patch: Patch, steps: int = 1) -> list[dict[str, float]]:
     """Return the measures at equal shares of the full motion, at rest."""
-    displacement, nothing, found = np.zeros(len(patch.full)), np.zeros(len(patch.full)), []
+    displacement, nothing, history = np.zeros(len(patch.full)), np.zeros(len(patch.full)), []
     newton = Newton(patch, (0.0, 1.0))
     for step in range(1, steps + 1):
         displacement, _ = newton.solve(displacement, step / steps * patch.full, nothing)
-        found.append(patch.measures(displacement))
+        history.append(patch.measures(displacement))
         patch.settle()
-    return found
+    return history
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,30 +249,30 @@ def steps_in_time(
     displacement, velocity, force = np.zeros((3, len(patch.full)))
     acceleration = motion.acceleration(0.0) * patch.full
     acceleration[patch.free] = _first_acceleration(patch, acceleration)
-    found = []
+    history = []
     for number in range(1, count + 1):
         time = number * step
         guess = displacement + step * velocity + (0.5 - beta) * step**2 * acceleration
         right = inertia * (mass @ guess) + alpha * force
         # The prescribed acceleration enters by M; the guess of its displacement is chosen so that u' gives it.
-        boundary, given = motion.share(time) * patch.full, motion.acceleration(time) * patch.full
-        shift = inertia * (boundary - guess) - given
+        boundary, boundary_acceleration = motion.share(time) * patch.full, motion.acceleration(time) * patch.full
+        shift = inertia * (boundary - guess) - boundary_acceleration
         shift[patch.free] = 0.0
         right += mass @ shift
         displacement, force = newton.solve(displacement, boundary, right)
         new = inertia * (displacement - guess) - shift
         velocity = velocity + step * ((1.0 - gamma) * acceleration + gamma * new)
         acceleration = new
-        found.append({"time": time, **patch.measures(displacement, acceleration)})
+        history.append({"time": time, **patch.measures(displacement, acceleration)})
         patch.settle()
-    return found
+    return history
 
 
 def _first_acceleration(patch: Patch, acceleration: Floats) -> Floats:
     """Return the acceleration of the free components at rest where the others ``(3 n,)`` [m/s^2] begin to move."""
-    given = acceleration.copy()
-    given[patch.free] = 0.0
+    prescribed = acceleration.copy()
+    prescribed[patch.free] = 0.0
     factor = Factor(patch.mass[patch.free][:, patch.free])
-    found = factor.solve(-(patch.mass @ given)[patch.free])
+    free_acceleration = factor.solve(-(patch.mass @ prescribed)[patch.free])
     factor.free()
-    return found
+    return free_acceleration

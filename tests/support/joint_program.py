@@ -56,9 +56,9 @@ def box_mesh(patch: JointPatch, fineness: Fineness, size: float, layers: tuple[i
         ("board", -patch.board, 0.0, layers[0]),
         ("substrate", top, top + patch.substrate, layers[1]),
     ):
-        own, cells = grid(x, x[x > -1e-9], np.linspace(low, high, count + 1))
+        box_points, cells = grid(x, x[x > -1e-9], np.linspace(low, high, count + 1))
         hexahedra[part] = cells + np.int32(len(points))
-        points = np.concatenate([points, own])
+        points = np.concatenate([points, box_points])
     return _assembled(patch, points, hexahedra)
 
 
@@ -201,14 +201,14 @@ class ProgramPatch:
 
     def run(self, samples: int, share: float = 1.0) -> list[dict[str, float]]:
         """Go through a share of the course; return the measures at about so many times."""
-        windows, found = round(share * self.plan.windows), []
+        windows, history = round(share * self.plan.windows), []
         stride = max(1, windows // samples)
         for window in range(1, windows + 1):
             self.participant.begin_window()
             self.participant.finish_window()
             if window % stride == 0 or window == windows:
-                found.append({"time": self.motion.time, **self.measures.take(self.motion.slave_force)})
-        return found
+                history.append({"time": self.motion.time, **self.measures.take(self.motion.slave_force)})
+        return history
 
     def at_rest(self) -> dict[str, float]:
         """Return the measures of linear elastic equilibrium at the full motion."""

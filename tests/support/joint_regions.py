@@ -91,8 +91,8 @@ class Region:
     def among_all(self, form: ufl.Form) -> scipy.sparse.csr_matrix:
         """Return a bilinear form as a matrix of all components of the patch."""
         matrix = dolfinx_api.assembled_csr(dolfinx_api.compiled_form(form, FLAGS)).tocoo()
-        place = self.dofs[matrix.row], self.dofs[matrix.col]
-        return scipy.sparse.coo_matrix((matrix.data, place), shape=(self.count, self.count)).tocsr()
+        row_and_column = self.dofs[matrix.row], self.dofs[matrix.col]
+        return scipy.sparse.coo_matrix((matrix.data, row_and_column), shape=(self.count, self.count)).tocsr()
 
     @cached_property
     def mass(self) -> scipy.sparse.csr_matrix:
@@ -153,16 +153,16 @@ class YieldingRegion(Region):
         """Return the internal force of all components ``(3 n,)`` [N] at a displacement ``(3 n,)`` [m]."""
         self._latest = self._returned(self.strain(displacement))
         self._set("stress", self._latest[0][..., MATRIX])
-        own, result = np.zeros(len(self.dofs)), np.zeros(self.count)
-        dolfinx.fem.assemble_vector(own, self._force)
-        result[self.dofs] = own
+        local_force, result = np.zeros(len(self.dofs)), np.zeros(self.count)
+        dolfinx.fem.assemble_vector(local_force, self._force)
+        result[self.dofs] = local_force
         return result
 
     def tangent(self) -> scipy.sparse.csr_matrix:
         """Return the derivative [N/m] of the latest force."""
         self._set("tangent", self._latest[1])
-        own = ufl.dot(self._fields["tangent"], strain_of(self.trial))
-        return self.among_all(ufl.inner(own, strain_of(self.test)) * self.dx)
+        stress_change = ufl.dot(self._fields["tangent"], strain_of(self.trial))
+        return self.among_all(ufl.inner(stress_change, strain_of(self.test)) * self.dx)
 
     def _set(self, name: str, values: Floats) -> None:
         field = self._fields[name]

@@ -15,13 +15,13 @@ class HerePool:
         self.asked, self.fail = [], fail
 
     def run(self, work, jobs, progress):
-        found = {}
+        results = {}
         for name, job in jobs.items():
             self.asked.append((name, job.now.number))
             if self.fail == len(self.asked):
                 raise KeyboardInterrupt
-            found[name] = work(job, lambda share: None)
-        return found
+            results[name] = work(job, lambda share: None)
+        return results
 
 
 def joints_here(solder, folder, fail=None):

@@ -22,10 +22,10 @@ def shared_run(name: str, factory: pytest.TempPathFactory, worker: str) -> tuple
         worker: which of pytest-xdist this is; "master" without it.
     """
     base = factory.getbasetemp() if worker == "master" else factory.getbasetemp().parent
-    folder, told = base / "shared" / name, base / "shared" / f"{name}.pickle"
-    told.parent.mkdir(exist_ok=True)
-    with told.with_suffix(".lock").open("w") as lock:
+    folder, record = base / "shared" / name, base / "shared" / f"{name}.pickle"
+    record.parent.mkdir(exist_ok=True)
+    with record.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not told.exists():
-            told.write_bytes(pickle.dumps(RUNS[name](folder)))
-    return folder, pickle.loads(told.read_bytes())
+        if not record.exists():
+            record.write_bytes(pickle.dumps(RUNS[name](folder)))
+    return folder, pickle.loads(record.read_bytes())

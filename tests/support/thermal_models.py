@@ -53,8 +53,8 @@ def structure_of(
     """Return the structure of a mesh; materials of roles as in a case."""
     path = folder / "assembly.msh"
     write_msh(mesh, path)
-    given = Materials.model_validate(dict(materials))
-    assembly = Assembly(path, pads, given, Thermal.model_validate(dict(thermal or {})), gravity=0.0)
+    materials_of_roles = Materials.model_validate(dict(materials))
+    assembly = Assembly(path, pads, materials_of_roles, Thermal.model_validate(dict(thermal or {})), gravity=0.0)
     return ThermalStructure.build(MPI.COMM_SELF, assembly)
 
 

@@ -66,19 +66,24 @@ def warm_python() -> str:
 def _server() -> Path:
     """Start a server that ends with this process; return its folder."""
     folder = tempfile.TemporaryDirectory()
-    place, support = Path(folder.name), Path(__file__).parent
-    names = {"python": sys.executable, "support": str(support), "address": str(place / "socket"), "modules": MODULES}
+    server_folder, support = Path(folder.name), Path(__file__).parent
+    names = {
+        "python": sys.executable,
+        "support": str(support),
+        "address": str(server_folder / "socket"),
+        "modules": MODULES,
+    }
     client = CLIENT.format(**names)
-    (place / "python").write_text(client)
-    (place / "python").chmod(0o755)
+    (server_folder / "python").write_text(client)
+    (server_folder / "python").chmod(0o755)
     with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(str(place / "socket"))
+        listener.bind(str(server_folder / "socket"))
         listener.listen()
-        line = [sys.executable, "-m", "tests.support.warm_start", str(place / "python"), str(listener.fileno())]
+        line = [sys.executable, "-m", "tests.support.warm_start", str(server_folder / "python"), str(listener.fileno())]
         server = subprocess.Popen(line, stdin=subprocess.PIPE, cwd=ROOT, pass_fds=[listener.fileno()])
     atexit.register(folder.cleanup)
     atexit.register(server.communicate)
-    return place
+    return server_folder
 
 
 def serve(client: str, listener: socket.socket) -> None:

@@ -65,14 +65,14 @@ def on(*names: str) -> Callable[[Check], Check]:
 
 @pytest.mark.parametrize("name", registry())
 def test_off_costs_nothing(name, tmp_path):
-    found = ELSEWHERE_OFF.get(name)
-    exists(found) if found else OFF[name](registry()[name], tmp_path)
+    covering_test = ELSEWHERE_OFF.get(name)
+    exists(covering_test) if covering_test else OFF[name](registry()[name], tmp_path)
 
 
 @pytest.mark.parametrize("name", registry())
 def test_on_where_it_does_not_matter_changes_nothing(name, tmp_path):
-    found = ELSEWHERE_ON.get(name)
-    exists(found) if found else ON[name](registry()[name], tmp_path)
+    covering_test = ELSEWHERE_ON.get(name)
+    exists(covering_test) if covering_test else ON[name](registry()[name], tmp_path)
 
 
 @pytest.mark.parametrize("name", registry())
@@ -116,8 +116,8 @@ def _(effect, _folder):
 @on("gravity")
 def _(_effect, _folder):
     light = scene.SOLDER.model_copy(update={"gravity": 0.25})
-    told = decide_drop(light, is_free=False)["gravity"]
-    assert not told["on"]
+    decision = decide_drop(light, is_free=False)["gravity"]
+    assert not decision["on"]
     switched = light.model_copy(update={"effects": SolderEffects(gravity="on")})
     heights = [solve_drop(solder, 6)[1].history(1.0)["height"][-1] for solder in (light, switched)]
     assert 0.0 < 1.0 - heights[1] / heights[0] < NEGLIGIBLE_SHAPE_CHANGE
@@ -251,10 +251,10 @@ def _(_effect, _folder):
     laws = [law, law.model_copy(update={"C": 0.0})]
     forces = []
     for item in laws:
-        found = terms(SAC305.model_copy(update={"plasticity": item}))[0]
+        plastic_term = terms(SAC305.model_copy(update={"plasticity": item}))[0]
         stretch = 2e-3 * scene.strip()[0].local.points[:, :1] * [1.0, 0.0, 0.0]
         forces.append(np.zeros_like(stretch))
-        found.add(stretch, forces[-1])
+        plastic_term.add(stretch, forces[-1])
     assert np.array_equal(*forces)
 
 
@@ -298,10 +298,10 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    given = scene.shock(damping=Damping(mass_coefficient=rate))
-    drop = SimpleNamespace(shock=given, duration=duration, expected=SimpleNamespace(omega=1.5e4))
+    damped = scene.shock(damping=Damping(mass_coefficient=rate))
+    drop = SimpleNamespace(shock=damped, duration=duration, expected=SimpleNamespace(omega=1.5e4))
     predicted = RayleighEffect().decide(drop)["influence"]
-    both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
+    both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), damped)]
     assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 
 

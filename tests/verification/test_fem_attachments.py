@@ -31,8 +31,8 @@ def run(directory: Path, cells: tuple[int, int, int], **changes) -> tuple[dict, 
     structure = {"length": LENGTH, "width": WIDTH, "cells": cells[:2]} | {
         "layers": {"board": {"material": "steel", "thickness": THICKNESS, "cells": cells[2]}}
     }
-    given = {"structure": structure, "materials": {"steel": BEAM}, "loads": {}, "watch": {}} | changes
-    request = structure_input(directory, strip(cells), **given)
+    inputs = {"structure": structure, "materials": {"steel": BEAM}, "loads": {}, "watch": {}} | changes
+    request = structure_input(directory, strip(cells), **inputs)
     run_structure(MPI.COMM_SELF, request)
     with np.load(request.output / "history.npz") as arrays:
         return json.loads((request.output / "result.json").read_text()), dict(arrays)
@@ -65,14 +65,14 @@ def beam_frequency(rotation: float, mass: float, modes: int) -> list[float]:
         matrix = np.array([*end, *middle])
         return float(np.linalg.det(matrix / np.abs(matrix).max(axis=1)[:, None]))
 
-    found = []
+    frequencies = []
     for symmetric in (True, False):
         grid_of = np.linspace(0.5, 14.0, 2000) / LENGTH
         values = [rows(beta, symmetric) for beta in grid_of]
         for k in np.flatnonzero(np.diff(np.sign(values))):
-            beta = brentq(lambda one, even=symmetric: rows(one, even), grid_of[k], grid_of[k + 1])
-            found.append(beta**2 * np.sqrt(bending / linear) / (2 * np.pi))
-    return sorted(found)[:modes]
+            beta = brentq(lambda wave_number, even=symmetric: rows(wave_number, even), grid_of[k], grid_of[k + 1])
+            frequencies.append(beta**2 * np.sqrt(bending / linear) / (2 * np.pi))
+    return sorted(frequencies)[:modes]
 
 
 @pytest.mark.parametrize(("softness", "share"), [(1e-9, 0.0), (1.0, 0.0), (1.0, 0.5), (5.0, 0.3)])
@@ -95,8 +95,8 @@ def test_beam_with_springs_at_its_ends_and_a_mass(tmp_path, softness, share):
     modes = json.loads((tmp_path / "out" / "modes.json").read_text())
     bending = [mode["frequency"] for mode in modes if mode["mass_fraction"]["y"] < 1e-6]
     exact = beam_frequency(rotation, mass, 2)
-    found = [min(bending, key=lambda one, wanted=wanted: abs(one - wanted)) for wanted in exact]
-    assert found == pytest.approx(exact, rel=0.012)  # Timoshenko's shear takes 0.5 % at mode 1 of this beam, 1 % at 2
+    nearest = [min(bending, key=lambda frequency, target=target: abs(frequency - target)) for target in exact]
+    assert nearest == pytest.approx(exact, rel=0.012)  # Timoshenko's shear takes 0.5 % at mode 1 of this beam, 1 % at 2
     assert result["metrics"]["first_frequency"]["value"] == pytest.approx(modes[0]["frequency"])
     total = BEAM["density"] * AREA * LENGTH + mass
     assert result["metrics"]["model_mass"]["value"] == pytest.approx(total)
@@ -121,8 +121,8 @@ def test_damped_body_on_springs_and_its_reaction(tmp_path):
     damped = rate * np.sqrt(1 - ratio**2)
     time = history["time"]
     exact = 0.1 / damped * np.exp(-ratio * rate * time) * np.sin(damped * time)
-    found = history["displacement@middle"][:, 2]
-    assert np.abs(found - exact).max() < 0.01 * np.abs(exact).max()
+    displacement = history["displacement@middle"][:, 2]
+    assert np.abs(displacement - exact).max() < 0.01 * np.abs(exact).max()
     pull = -stiffness * LENGTH * WIDTH * exact
     assert np.abs(history["reaction@foot"][:, 2] - pull).max() < 0.01 * np.abs(pull).max()
     assert result["health"]["energy_balance_error"]["value"] < 1e-9
@@ -167,7 +167,7 @@ def test_half_a_structure_bears_half_of_a_mass():
     ):
         places = PointMass(mass=1.0, at=at, footprint=footprint).meshed_places(("x",), 1e-9)
         assert sum(part for _, part in places) == pytest.approx(share)
-        assert all(place[0] >= 0.0 for place, _ in places)
+        assert all(position[0] >= 0.0 for position, _ in places)
 
 
 @pytest.mark.parametrize("corners", [3, 4, 6])

@@ -24,8 +24,8 @@ def strip(length: float, width: float, height: float, counts: tuple[int, int, in
 
 def ratio(name: str, size: tuple[float, float, float], counts: tuple[int, int, int], poisson=0.0, move=None) -> float:
     """Tip deflection over the exact one."""
-    found = tip(KINDS[name], strip(*size, counts), [isotropic(1e9, poisson)], move=move or (lambda points: points))
-    return found / beam(*size[:2], np.array(size[2:]), np.array([1e9]), poisson)
+    deflection = tip(KINDS[name], strip(*size, counts), [isotropic(1e9, poisson)], move=move or (lambda points: points))
+    return deflection / beam(*size[:2], np.array(size[2:]), np.array([1e9]), poisson)
 
 
 @NOT_LOCKING
@@ -70,8 +70,8 @@ def test_copper_foil_of_aspect_25_between_layers_of_board(name):
     length, width = 20 * MILLIMETRE, 1 * MILLIMETRE
     z = np.array([0.0, 0.24, 0.48, 0.5, 0.75, 1.0]) * MILLIMETRE
     lines = [*strip(length, width, 1.0, (40, 2, 1))[:2], z]
-    found = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 3]], c))
-    assert found == pytest.approx(beam(length, width, heights, young), rel=0.01)
+    deflection = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 3]], c))
+    assert deflection == pytest.approx(beam(length, width, heights, young), rel=0.01)
 
 
 @NOT_LOCKING
@@ -80,8 +80,8 @@ def test_stiffness_jump_of_100(name):
     length, width = 20 * MILLIMETRE, 1 * MILLIMETRE
     z = np.array([0.0, 0.125, 0.25, 0.5, 0.75, 0.875, 1.0]) * MILLIMETRE
     lines = [*strip(length, width, 1.0, (40, 2, 1))[:2], z]
-    found = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 4]], c))
-    assert found == pytest.approx(beam(length, width, heights, young), rel=0.01)
+    deflection = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 4]], c))
+    assert deflection == pytest.approx(beam(length, width, heights, young), rel=0.01)
 
 
 SIDE, THICKNESS = 0.1, 1e-3

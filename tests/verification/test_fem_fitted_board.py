@@ -37,12 +37,12 @@ def bent(points: np.ndarray, middle: float) -> np.ndarray:
 
 
 def strains_of(mesh: MeshData, displacement: np.ndarray, symmetry: tuple[str, ...] = (), **gauges) -> dict[str, float]:
-    given = TypeAdapter(Fittings).validate_python({"gauges": gauges})
-    table = fitted(mesh, given, symmetry, np.empty(0, np.int32), yields=False).points.gauges
+    fittings = TypeAdapter(Fittings).validate_python({"gauges": gauges})
+    table = fitted(mesh, fittings, symmetry, np.empty(0, np.int32), yields=False).points.gauges
     stretches = np.zeros((len(table.names), 3))
     np.add.at(stretches, table.gauge, table.weight * displacement[table.nodes])
-    found = [table.strains(stretches, turning).tolist() for turning in (False, True)]
-    return dict(zip(table.names, zip(*found, strict=True), strict=True))
+    strains = [table.strains(stretches, turning).tolist() for turning in (False, True)]
+    return dict(zip(table.names, zip(*strains, strict=True), strict=True))
 
 
 @pytest.mark.parametrize("slant", [0.0, 30.0, 90.0])
@@ -56,8 +56,8 @@ def test_gauge_on_a_bent_plate(face, slant):
     exact = (-middle if face == "upper" else middle) * across
     mesh = strip_mesh((8, 3, 2))
     gauge = {"at": [1.3e-3, 0.4e-3], "face": face, "direction": along.tolist(), "length": 4e-3}
-    found = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
-    assert found == pytest.approx(exact, rel=1e-9)
+    strain = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
+    assert strain == pytest.approx(exact, rel=1e-9)
 
 
 def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
@@ -77,9 +77,9 @@ def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
     table = model.tables.fitted.points.gauges
     stretches = np.zeros((2, 3))
     np.add.at(stretches, table.gauge, table.weight * displacement[model.body.local.locate(table.nodes)])
-    for found, (x, face) in zip(table.strains(stretches, False), places.values(), strict=True):
+    for strain, (x, face) in zip(table.strains(stretches, False), places.values(), strict=True):
         bending = force * (0.5 * LENGTH - x) * 0.5 * THICKNESS / (STEEL["young_modulus"] * WIDTH * THICKNESS**3 / 12)
-        assert found == pytest.approx(-bending if face == "upper" else bending, rel=2e-3)
+        assert strain == pytest.approx(-bending if face == "upper" else bending, rel=2e-3)
 
 
 def test_rotation_is_no_strain():
@@ -95,8 +95,8 @@ def test_ends_beyond_a_plane_of_symmetry_are_mirrored():
     mesh = board_mesh(size=1e-3)
     displacement = np.column_stack([2e-3 * mesh.points[:, 0], 5e-3 * mesh.points[:, 1], np.zeros(len(mesh.points))])
     gauges = {"x": {"at": [0.0, 0.0]}, "y": {"at": [3e-3, 0.0], "direction": [0.0, 1.0]}}
-    found = strains_of(mesh, displacement, ("x", "y"), **gauges)
-    assert [found["x"][0], found["y"][0]] == pytest.approx([2e-3, 5e-3])
+    strains = strains_of(mesh, displacement, ("x", "y"), **gauges)
+    assert [strains["x"][0], strains["y"][0]] == pytest.approx([2e-3, 5e-3])
 
 
 def test_gauge_beyond_the_edge_is_refused():
@@ -107,10 +107,10 @@ def test_gauge_beyond_the_edge_is_refused():
 def test_what_is_fitted_to_the_board_keeps_the_numbers_of_the_whole_mesh():
     mesh = board_mesh(size=1e-3)
     upper = mesh.in_parts("board_patch".__eq__)
-    given = TypeAdapter(Fittings).validate_python(
+    fittings = TypeAdapter(Fittings).validate_python(
         {"watch": {"a": {"at": [2e-3, 2e-3, 0.0]}}, "gauges": {"g": {"at": [1e-3, 1e-3], "face": "upper"}}}
     )
-    table = fitted_to(mesh, upper, given, False)
+    table = fitted_to(mesh, upper, fittings, False)
     assert mesh.points[table.points.nodes[0]] == pytest.approx([2e-3, 2e-3, 0.0])
     assert upper[table.points.cells].all()
     assert mesh.points[table.points.gauges.nodes][:, 2].max() == 0.0
@@ -171,14 +171,16 @@ def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, spr
     (drop, first), (structure, second) = (work(tmp_path, kinematics, supports) for work in (dropped, as_structure))
     for name in ("displacement@edge", "gauge@middle", "gauge@slant", "reaction@screws"):
         assert np.abs(first[name] - second[name]).max() < 1e-6 * np.abs(second[name]).max(), name
-    found, wanted = drop["metrics"], structure["metrics"]
-    compared = [name for name in wanted if name.startswith(("peak_strain@", "peak_strain_rate@", "peak_acceleration@"))]
+    metrics, expected = drop["metrics"], structure["metrics"]
+    compared = [
+        name for name in expected if name.startswith(("peak_strain@", "peak_strain_rate@", "peak_acceleration@"))
+    ]
     compared += ["second_peak_acceleration@edge", "first_frequency", "third_frequency"]
     assert len(compared) == 9
     for name in compared:
-        assert found[name]["value"] == pytest.approx(wanted[name]["value"], rel=1e-6), name
+        assert metrics[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-6), name
     assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
-    assert 1500.0 * 0.5 < found["response_at_first_frequency"]["value"] < 1500.0 * 2.0
+    assert 1500.0 * 0.5 < metrics["response_at_first_frequency"]["value"] < 1500.0 * 2.0
     assert drop["health"]["energy_balance_error"]["ok"]
 
 
@@ -195,20 +197,20 @@ def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
     write_msh(mesh, tmp_path / "board.msh")
     both = with_neighbours(mesh, {"pmic": neighbour})
     volume = 2 * 1e-6 * 0.4e-3 + 15e-6 * 0.5e-3 + 3e-6 * 0.3e-3
-    own = both.in_parts(lambda name: name.endswith("_pmic"))
-    assert element_geometry(both.points, both.cells[own]).volume.sum() == pytest.approx(volume)
+    is_neighbour = both.in_parts(lambda name: name.endswith("_pmic"))
+    assert element_geometry(both.points, both.cells[is_neighbour]).volume.sum() == pytest.approx(volume)
     feet = both.facet_nodes("slave@neighbour_pmic")
     distance, below = cKDTree(mesh.points).query(both.points[feet])
     assert distance.max() < 1e-12
     glued, _ = merge_nodes(both, feet, below.astype(np.int32))
     sides = {"x_min": glued.facets["symmetry_x"], "y_min": glued.facets["symmetry_y"]}
-    kept = {name: some for name, some in glued.facets.items() if "@" not in name}
-    write_msh(replace(glued, facets=kept | sides), tmp_path / "box.msh")
+    named_facets = {name: some for name, some in glued.facets.items() if "@" not in name}
+    write_msh(replace(glued, facets=named_facets | sides), tmp_path / "box.msh")
     supports = {"screws": {"on": "mounting_holes", "hold": ["x", "y", "z"]}}
     roles = dict.fromkeys(("board", "solder", "substrate", "die"), STEEL)
-    given, parts = {"gauges": {"below": {"at": [6e-3, 4e-3]}}}, ("board", "board_patch", *glued.part_names[2:])
-    drop, first = dropped(tmp_path, "small", supports, packages={"pmic": GLUED}, materials=roles, **given)
-    structure, second = as_structure(tmp_path, "small", supports, parts, **given)
+    fittings, parts = {"gauges": {"below": {"at": [6e-3, 4e-3]}}}, ("board", "board_patch", *glued.part_names[2:])
+    drop, first = dropped(tmp_path, "small", supports, packages={"pmic": GLUED}, materials=roles, **fittings)
+    structure, second = as_structure(tmp_path, "small", supports, parts, **fittings)
     assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
     assert drop["metrics"]["first_frequency"]["value"] == pytest.approx(
         structure["metrics"]["first_frequency"]["value"], rel=1e-6

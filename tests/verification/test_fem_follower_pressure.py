@@ -14,7 +14,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 from tests.support.fem_bodies import STEEL
 
 PRESSURE = 1e6
-SIDES = {f"{'xyz'[axis]}_{end}": on(axis, place) for axis in range(3) for end, place in (("min", 0.0), ("max", 1e-3))}
+SIDES = {f"{'xyz'[axis]}_{end}": on(axis, level) for axis in range(3) for end, level in (("min", 0.0), ("max", 1e-3))}
 
 
 def cube() -> MeshData:
@@ -51,10 +51,10 @@ def test_closed_surface_of_any_shape_is_in_balance():
     _, motion, loads = pressed(SIDES)
     motion.displacement[:] = np.random.default_rng(4).uniform(-1e-4, 1e-4, motion.displacement.shape)
     force = sum(force_of(load, motion) for load in loads)
-    place = motion.body.local.points + motion.displacement
+    position = motion.body.local.points + motion.displacement
     scale = PRESSURE * 1e-6
     assert np.abs(force.sum(axis=0)).max() < 1e-12 * scale
-    assert np.abs(np.cross(place, force).sum(axis=0)).max() < 1e-12 * scale * 1e-3
+    assert np.abs(np.cross(position, force).sum(axis=0)).max() < 1e-12 * scale * 1e-3
 
 
 def test_its_work_is_that_of_the_motion():

@@ -101,9 +101,9 @@ def test_free_vibration_decays_as_its_ratio_says(terms):
     modes = natural_modes(equations, 12)
     along = int(np.argmax(modes.effective_mass[:, 0]))
     omega, shape = 2 * np.pi * modes.frequency[along], modes.shape[along]
-    given = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
+    rayleigh = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
     ratio, period = sum(terms), 2 * np.pi / omega
-    damping = RayleighDamping.build(body, *given.coefficients)
+    damping = RayleighDamping.build(body, *rayleigh.coefficients)
     motion = ImplicitMotion(MPI.COMM_SELF, body, [damping], period / 400)
     motion.displacement[:] = shape
     motion.restart()
@@ -112,5 +112,5 @@ def test_free_vibration_decays_as_its_ratio_says(terms):
         run(motion, motion.time + 0.7 * period)
         phase = root * omega * motion.time
         exact = np.exp(-ratio * omega * motion.time) * (np.cos(phase) + ratio / root * np.sin(phase))
-        found = np.einsum("ni,n,ni->", motion.displacement, body.mass, shape)
-        assert found == pytest.approx(exact, abs=1e-3)
+        amplitude = np.einsum("ni,n,ni->", motion.displacement, body.mass, shape)
+        assert amplitude == pytest.approx(exact, abs=1e-3)

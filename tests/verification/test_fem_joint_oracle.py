@@ -54,27 +54,27 @@ def test_oracle_balances_its_joint(oracle):
 
 def test_imprinted_pads_agree_with_the_oracle(oracle):
     patch = JointPatch()
-    found = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["middle"]), Course()).at_rest()
+    stiffness = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["middle"]), Course()).at_rest()
     for name in [*RESULTANTS, "von_mises@foot:25um", "von_mises@head:25um"]:
-        assert found[name] == pytest.approx(oracle[name], rel=0.05), name
+        assert stiffness[name] == pytest.approx(oracle[name], rel=0.05), name
 
 
 @pytest.mark.long
 def test_finest_meshes_agree_within_two_per_cent():
     patch = JointPatch()
     reference = equilibrium(Patch(patch, mesh_patch(patch, QUADRATIC["fine"], 2), yields=False))[-1]
-    found = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["fine"]), Course()).at_rest()
+    stiffness = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["fine"]), Course()).at_rest()
     for name in ("axial@foot", "shear@foot", "peel@foot", "von_mises@foot:25um"):  # the foot is the critical end
-        assert found[name] == pytest.approx(reference[name], rel=0.02), name
+        assert stiffness[name] == pytest.approx(reference[name], rel=0.02), name
 
 
 def test_boxes_that_ignore_the_pad_are_too_stiff(oracle):
     """The excess of a joint tied to facets of 0.5 mm, as another model has found it (40, 83-130, 86-181 %)."""
     patch = JointPatch()
-    found = ProgramPatch(patch, box_mesh(patch, TRILINEAR["middle"], 500 * UM, (8, 4)), Course()).at_rest()
+    stiffness = ProgramPatch(patch, box_mesh(patch, TRILINEAR["middle"], 500 * UM, (8, 4)), Course()).at_rest()
     bounds = {"axial@foot": (0.3, 0.5), "moment@foot": (0.8, 1.3), "von_mises@foot:25um": (0.86, 1.81)}
     for name, (least, most) in bounds.items():
-        assert least < found[name] / oracle[name] - 1.0 < most, name
+        assert least < stiffness[name] / oracle[name] - 1.0 < most, name
 
 
 def test_oracle_in_slow_motion_is_at_rest(oracle):

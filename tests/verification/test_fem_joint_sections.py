@@ -117,12 +117,12 @@ def test_sections_balance_the_rate_of_momentum(formulation, kinematics, bulge, s
         assert np.array_equal(row_of(watch, motion)["section_board"], row["section_board"])  # asking changes nothing
         before = motion.velocity.copy()
         after = before + motion.step * motion.acceleration()
-        place = body.local.points + (motion.displacement if kinematics != "small" else 0.0)
+        position = body.local.points + (motion.displacement if kinematics != "small" else 0.0)
         rate = mass[:, None] * ((after - before) / motion.step - motion.gravity)
-        needed = np.concatenate([rate.sum(axis=0), np.cross(place - MIDDLE, rate).sum(axis=0)])
-        given = load_of(row, "package", *frame_of(mesh, body, place, "package"))
-        given -= load_of(row, "board", *frame_of(mesh, body, place, "board"))
-        residuals += [*np.abs(given - needed) / [1, 1, 1, HEIGHT, HEIGHT, HEIGHT], row["section_imbalance"][0]]
+        needed = np.concatenate([rate.sum(axis=0), np.cross(position - MIDDLE, rate).sum(axis=0)])
+        load = load_of(row, "package", *frame_of(mesh, body, position, "package"))
+        load -= load_of(row, "board", *frame_of(mesh, body, position, "board"))
+        residuals += [*np.abs(load - needed) / [1, 1, 1, HEIGHT, HEIGHT, HEIGHT], row["section_imbalance"][0]]
         forces += [*np.abs(row["section_board"][0, :3])]
     assert max(forces) > 0.1
     assert max(residuals) < 1e-6 * max(forces)
@@ -145,10 +145,10 @@ def load_of(row, end, frame, centre):
     return np.concatenate([force, moment + np.cross(centre - MIDDLE, force)])
 
 
-def frame_of(mesh, body, place, end):
+def frame_of(mesh, body, position, end):
     """Return frame and centre of a pad's face with nodes at ``place``, from its triangles."""
     local = body.local.locate(mesh.facets[f"pad_{end}@A1"].ravel()).reshape(-1, 4)
-    corners = place[local]
+    corners = position[local]
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     normals = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
@@ -195,13 +195,13 @@ def test_points_of_an_element_that_yields_are_told_apart():
         motion.displacement[:] = curvature * np.stack([-(z**2) / 2, np.zeros_like(x), x * z], axis=1)
         motion.update_force()
     (term,) = (item for item in body.terms if isinstance(item, NonlinearElements))
-    found = term.points(*term.located(np.arange(len(body.elements.cells))))
-    assert found.plastic_strain.min() == 0.0 < found.plastic_strain.max()
+    located = term.points(*term.located(np.arange(len(body.elements.cells))))
+    assert located.plastic_strain.min() == 0.0 < located.plastic_strain.max()
     row = row_of(watch, motion)
     lowest = body.local.points[body.elements.cells][:, :, 2].max(axis=1) < HEIGHT / 4 + 1e-9
     below = [0, 1, 2, 3]  # points of the lower octants: the layer is thinner than half an element
-    assert row["plastic_strain_board"][0] == pytest.approx(found.plastic_strain[lowest][:, below].mean())
-    mises = von_mises(found.stress[lowest][:, below].reshape(-1, 6))
+    assert row["plastic_strain_board"][0] == pytest.approx(located.plastic_strain[lowest][:, below].mean())
+    mises = von_mises(located.stress[lowest][:, below].reshape(-1, 6))
     assert row["von_mises_board"][0] == pytest.approx(mises.mean())
 
 

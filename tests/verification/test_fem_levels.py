@@ -100,9 +100,9 @@ def test_two_models_that_share_the_levels_move_as_one(ratios):
         alone.advance()
         alone.update_force()
         pair.run()
-    found = {}
+    displacements = {}
     for motion in (pair.macro.motion, pair.meso.motion):
-        found |= dict(zip(map(tuple, motion.body.local.points), motion.displacement, strict=True))
+        displacements |= dict(zip(map(tuple, motion.body.local.points), motion.displacement, strict=True))
     exact = alone.displacement
-    same = np.array([found[tuple(point)] for point in whole.body.local.points])
+    same = np.array([displacements[tuple(point)] for point in whole.body.local.points])
     assert np.abs(same - exact).max() <= 1e-10 * np.abs(exact).max()

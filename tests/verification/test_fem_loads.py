@@ -124,8 +124,8 @@ def test_prescribed_motion_sends_the_exact_wave():
         motion.update_force()
     assert motion.displacement[driven, 0] == pytest.approx(speed * motion.time, rel=1e-12)
     exact = STEEL.density * SPEED * speed**2 * WIDTH**2 * motion.time
-    own = 0.5 * body.mass[driven].sum() * speed**2  # of the driven nodes, which have their velocity from the start
-    assert motion.external_work + own == pytest.approx(exact, rel=0.005)
+    initial_energy = 0.5 * body.mass[driven].sum() * speed**2  # the driven nodes start with their velocity
+    assert motion.external_work + initial_energy == pytest.approx(exact, rel=0.005)
 
 
 def test_large_mass_is_direct_acceleration():

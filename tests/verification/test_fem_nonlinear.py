@@ -52,8 +52,8 @@ def test_bar_that_yields_follows_its_exact_curve(name):
         stress = law.A + law.B * plastic
         elastic = stress / material.young_modulus
         strain = np.diag([elastic + plastic, *[-material.poisson_ratio * elastic - plastic / 2] * 2])
-        found = follow(patch(name, material, finite=False), lambda s, e=strain: np.eye(3) + s * e, 3)
-        assert np.abs(found - np.diag([stress, 0, 0])).max() < 1e-9 * stress
+        curve = follow(patch(name, material, finite=False), lambda s, e=strain: np.eye(3) + s * e, 3)
+        assert np.abs(curve - np.diag([stress, 0, 0])).max() < 1e-9 * stress
 
 
 @every_kind
@@ -83,8 +83,8 @@ def test_large_simple_shear(name, shear):
     rotation = np.array([[np.cos(b), np.sin(b), 0], [-np.sin(b), np.cos(b), 0], [0, 0, 1]])
     errors = []
     for steps in (50, 100):
-        found = follow(patch(name, ELASTIC, finite=True), lambda s: np.eye(3) + s * shear * np.eye(3, k=1) * ROW, steps)
-        errors.append(np.abs(rotation @ found @ rotation.T - exact).max() / across)
+        curve = follow(patch(name, ELASTIC, finite=True), lambda s: np.eye(3) + s * shear * np.eye(3, k=1) * ROW, steps)
+        errors.append(np.abs(rotation @ curve @ rotation.T - exact).max() / across)
     assert errors[1] < 2e-3
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
 
@@ -93,9 +93,9 @@ ROW = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 def test_large_confined_tension():
-    found = follow(patch("one_point", ELASTIC, finite=True), lambda s: np.diag([2.0**s, 1.0, 1.0]), 200)
-    assert found[0, 0] == pytest.approx((LAME + 2 * SHEAR) * np.log(2.0), rel=1e-4)
-    assert found[1, 1] == pytest.approx(LAME * np.log(2.0), rel=1e-4)
+    curve = follow(patch("one_point", ELASTIC, finite=True), lambda s: np.diag([2.0**s, 1.0, 1.0]), 200)
+    assert curve[0, 0] == pytest.approx((LAME + 2 * SHEAR) * np.log(2.0), rel=1e-4)
+    assert curve[1, 1] == pytest.approx(LAME * np.log(2.0), rel=1e-4)
 
 
 @every_kind
@@ -133,14 +133,14 @@ def test_work_of_the_force_is_the_energy(name):
         term = patch(name, LINEAR_HARDENING, finite=True)
         points = term.elements.points
         shape = np.random.default_rng(4).uniform(-0.03, 0.03, points.shape)
-        work, force, place = 0.0, np.zeros_like(points), points
+        work, force, position = 0.0, np.zeros_like(points), points
         for s in np.arange(1, steps + 1) / steps:
             matrix = Rotation.from_rotvec(s * np.array([1.0, 0.5, -0.7])).as_matrix()
             after = (points + s * shape) @ matrix.T
             now = force_of(term, after - points)
-            work += 0.5 * float(np.sum((force + now) * (after - place)))
-            force, place = now, after
-        energy = term.energy(place - points)
+            work += 0.5 * float(np.sum((force + now) * (after - position)))
+            force, position = now, after
+        energy = term.energy(position - points)
         errors.append(abs(work - energy.total) / energy.total)
     assert energy.plastic > 0.005 * energy.total
     assert errors[1] < 3e-3

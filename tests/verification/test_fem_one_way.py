@@ -32,8 +32,8 @@ def driver_of(models: Models) -> tuple[Pieces, Tables]:
     return pieces, replace(tables, interface=pieces.local.nodes[interface].astype(np.int32))
 
 
-def nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    return np.array([np.argmin(np.linalg.norm(points - point, axis=1)) for point in wanted])
+def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    return np.array([np.argmin(np.linalg.norm(points - point, axis=1)) for point in targets])
 
 
 def top(coupled: Coupled) -> np.ndarray:

@@ -59,9 +59,9 @@ def drop(directory: Path, solver: str) -> tuple[dict, Path]:
 def test_explicit_and_implicit_steps_agree(tmp_path):
     (explicit, first), (implicit, second) = (drop(tmp_path / name, name) for name in ("explicit", "implicit"))
     with np.load(first / "history.npz") as ours, np.load(second / "history.npz") as reference:
-        found = solver_differences(dict(ours), dict(reference))
-    assert found["displacement_difference@centre"] <= 0.01
-    assert found["strain_difference@centre"] <= 0.01
+        differences = solver_differences(dict(ours), dict(reference))
+    assert differences["displacement_difference@centre"] <= 0.01
+    assert differences["strain_difference@centre"] <= 0.01
     for result in (explicit, implicit):
         assert all(check["ok"] for check in result["health"].values())
     assert implicit["metrics"]["energy_balance_error"]["value"] < 1e-9

@@ -47,9 +47,9 @@ def flow(material: Isotropic, rate: Callable[[float], np.ndarray], start: np.nda
         direction = 1.5 * deviator / stress
         return np.append((2.0 * shear * (rate(time) - grown * direction)).ravel(), grown)
 
-    found = solve_ivp(slope, (0.0, end), start, method="Radau", rtol=1e-10, atol=np.append(np.full(9, 1e-3), 1e-14))
-    assert found.success
-    return found.y[:, -1]
+    solution = solve_ivp(slope, (0.0, end), start, method="Radau", rtol=1e-10, atol=np.append(np.full(9, 1e-3), 1e-14))
+    assert solution.success
+    return solution.y[:, -1]
 
 
 SHEAR = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) / np.sqrt(2.0)

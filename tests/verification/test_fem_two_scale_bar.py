@@ -43,12 +43,12 @@ def test_what_the_interface_sends_back_is_small(scheme, cells, limit, tmp_path):
 
     The section has 5 x 5 elements in plane between layers of 2 x 2, as long along the bar as these or half as long.
     """
-    result, found = run(tmp_path / "two", bar(cells), {"scheme": scheme, "fine": ["layer_1"]})
+    result, history = run(tmp_path / "two", bar(cells), {"scheme": scheme, "fine": ["layer_1"]})
     assert result["coupling"]["scheme"] == scheme
     even = bar_layers(("FR4", END, 30, (2, 2)), ("FR4", SECTION, 3, (2, 2)), ("FR4", END, 30, (2, 2)))
     _, reference = run(tmp_path / "even", even, explicit_step=result["model"]["window"] * (1.0 + 1e-9))
-    assert len(found["time"]) == len(reference["time"])
-    difference = found["velocity@near"] - reference["velocity@near"]
+    assert len(history["time"]) == len(reference["time"])
+    difference = history["velocity@near"] - reference["velocity@near"]
     assert np.abs(difference).max() < limit * np.abs(reference["velocity@near"]).max()
 
 
@@ -62,9 +62,9 @@ def test_second_order_against_exact_waves(scheme, tmp_path):
     for finer in (1, 2):
         # Windows are whole parts of samples: of so many that these are the windows, then two in each.
         coupling = {"scheme": scheme, "fine": ["layer_1"]}
-        _, found = run(tmp_path / f"{finer}", bar(6, finer), coupling, history_samples=117)
-        values = [found[f"velocity@{name}"][:, 2] for name in HEIGHTS]
-        waves = [exact.velocity(z, found["time"], Haversine(PEAK, PULSE).value) for z in HEIGHTS.values()]
+        _, history = run(tmp_path / f"{finer}", bar(6, finer), coupling, history_samples=117)
+        values = [history[f"velocity@{name}"][:, 2] for name in HEIGHTS]
+        waves = [exact.velocity(z, history["time"], Haversine(PEAK, PULSE).value) for z in HEIGHTS.values()]
         errors.append(relative_error(np.array(values), np.array(waves)))
     assert errors[0] < 0.03
     assert np.log2(errors[0] / errors[1]) > 1.8

@@ -118,11 +118,11 @@ def test_finite_strain_equals_own_elements(name):
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     turn = np.eye(3) + np.sin(2.0) * cross + (1.0 - np.cos(2.0)) * cross @ cross
     displacement = moved @ turn.T - elements.points
-    own = nonlinear(elements, RUBBER, finite=True)
-    ours = force_of(own, displacement)
+    numpy_term = nonlinear(elements, RUBBER, finite=True)
+    ours = force_of(numpy_term, displacement)
     term = term_of(elements, first_step())
     assert force_of(term, displacement) == pytest.approx(ours, abs=1e-10 * np.abs(ours).max())
-    assert term.energy(displacement).strain == pytest.approx(own.energy(displacement).strain, rel=1e-10)
+    assert term.energy(displacement).strain == pytest.approx(numpy_term.energy(displacement).strain, rel=1e-10)
 
 
 def energy_errors(law: Law, fraction: float) -> tuple[float, float]:
@@ -167,11 +167,11 @@ def test_sudden_shear_relaxes_exponentially():
     elements = distorted("tetrahedron", RUBBER)
     term = term_of(elements, own_material.potting(step))
     displacement = rate * elements.points[:, [1, 0, 2]] * [1.0, 1.0, 0.0]
-    found = [np.abs(force_of(term, displacement)).max() for _ in range(40)]
+    forces = [np.abs(force_of(term, displacement)).max() for _ in range(40)]
     slow = np.abs(force_of(term_of(elements, own_material.potting(step, stiffer=0.0)), displacement)).max()
     time = (np.arange(40) + 0.5) * step  # the strain grew in the middle of the first step
     exact = 1.0 + own_material.STIFFER * np.exp(-time / own_material.RELAXATION)
-    assert np.array(found) / slow == pytest.approx(exact, rel=1e-5)
+    assert np.array(forces) / slow == pytest.approx(exact, rel=1e-5)
 
 
 def test_history_continues_to_the_bit():

@@ -67,12 +67,12 @@ def test_a_contact_line_moves_only_beyond_its_advancing_and_receding_angle(reced
 
 
 def test_one_angle_is_what_it_was_without_bounds():
-    one, two = (droplet(ink(8, 1.0, contact_angle=1.2, **more)) for more in ({}, {"advancing_angle": 1.2}))
-    for simulation in (one, two):
+    unbounded, bounded = (droplet(ink(8, 1.0, contact_angle=1.2, **more)) for more in ({}, {"advancing_angle": 1.2}))
+    for simulation in (unbounded, bounded):
         for _ in range(20):
             simulation.step(1e-8)
-    assert two.surface.capillarity.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
-    assert np.allclose(one.surface.points, two.surface.points, rtol=0.0, atol=1e-12 * one.law.spacing)
+    assert bounded.surface.capillarity.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
+    assert np.allclose(unbounded.surface.points, bounded.surface.points, rtol=0.0, atol=1e-12 * unbounded.law.spacing)
 
 
 def test_an_impact_spreads_as_volumes_of_fluid_do():
@@ -86,8 +86,8 @@ def test_an_impact_spreads_as_volumes_of_fluid_do():
 def struck(weber, reynolds, across, units, **angles):
     """What a drop of solder does in so many D / U after it strikes a wall, at 90 degrees if no other are given."""
     numerics = DropletNumerics(particles_per_diameter=across)
-    given = {name: np.radians(angle) for name, angle in angles.items()}
-    scene = Droplet(**SOLDER, weber=weber, reynolds=reynolds, duration=1.0, **given, numerics=numerics)
+    parameters = {name: np.radians(angle) for name, angle in angles.items()}
+    scene = Droplet(**SOLDER, weber=weber, reynolds=reynolds, duration=1.0, **parameters, numerics=numerics)
     return solve_droplet(scene.model_copy(update={"duration": units * scene.unit_of_time}))
 
 
@@ -100,8 +100,8 @@ def test_the_spread_at_weber_30_is_that_of_volumes_of_fluid():
 
 def test_a_contact_line_that_advances_has_its_advancing_angle():
     """InterFoam with 120 degrees: 2.104 D; with a wall that only holds lines at rest, the advancing angle cost 1 %."""
-    given = {"contact_angle": 120.0}, {"contact_angle": 90.0, "advancing_angle": 120.0}
-    always, advancing = (value(struck(30.0, 500.0, 10, 1.5, **one), "spread_max") for one in given)
+    settings = {"contact_angle": 120.0}, {"contact_angle": 90.0, "advancing_angle": 120.0}
+    always, advancing = (value(struck(30.0, 500.0, 10, 1.5, **angles), "spread_max") for angles in settings)
     assert advancing == pytest.approx(always, rel=0.01)
     assert advancing == pytest.approx(2.104, rel=0.03)
 
@@ -171,8 +171,8 @@ def swing(across, viscosity, stretch=1.05, periods=2.5):
     def damped(t, rate, turn, *parts):
         return np.exp(-rate * t) * (parts[0] * np.cos(turn * t) + parts[1] * np.sin(turn * t)) + parts[2]
 
-    found, _ = curve_fit(damped, time, moment / rows[0][1], (decay / frequency, 1.0, 1.0, 0.0, 0.0))
-    return exact / frequency / found[1], found[0] * frequency / decay
+    fit, _ = curve_fit(damped, time, moment / rows[0][1], (decay / frequency, 1.0, 1.0, 0.0, 0.0))
+    return exact / frequency / fit[1], fit[0] * frequency / decay
 
 
 def test_a_coarse_drop_swings_nearly_as_the_exact_one():
@@ -207,9 +207,9 @@ def test_little_weight_does_little():
         value(solve_droplet(ink(8, 40e-6, contact_angle=1.2, effects={"gravity": switch})), "height_over_diameter")
         for switch in ("off", "on")
     ]
-    told = decide_flow(ink(8, 1.0, contact_angle=1.2))["droplet_gravity"]
-    assert not told["on"]
-    assert heights[1] == pytest.approx(heights[0], rel=max(told["influence"], 1e-3))
+    decision = decide_flow(ink(8, 1.0, contact_angle=1.2))["droplet_gravity"]
+    assert not decision["on"]
+    assert heights[1] == pytest.approx(heights[0], rel=max(decision["influence"], 1e-3))
 
 
 def test_little_tension_does_little():
@@ -219,9 +219,9 @@ def test_little_tension_does_little():
         scene = ink(8, 1.0, weber=2e4, reynolds=50.0, effects={"surface_tension": switch})
         scene = scene.model_copy(update={"duration": 0.5 * scene.unit_of_time})
         spreads.append(solve_droplet(scene).history["spread"][-1])
-    told = decide_flow(ink(8, 1.0, weber=2e4, reynolds=50.0))["droplet_tension"]
-    assert not told["on"]
-    assert spreads[1] == pytest.approx(spreads[0], rel=told["influence"])
+    decision = decide_flow(ink(8, 1.0, weber=2e4, reynolds=50.0))["droplet_tension"]
+    assert not decision["on"]
+    assert spreads[1] == pytest.approx(spreads[0], rel=decision["influence"])
 
 
 @pytest.mark.parametrize("reynolds", [5.0, 100.0])

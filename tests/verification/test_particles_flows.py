@@ -34,11 +34,11 @@ def test_a_channel_starts_as_the_exact_one():
 
 def carreau_profile(height, scene):
     """Steady speeds [m/s]: stress is linear across the channel; a root for the rate at each height, then a sum."""
-    law, place = scene.rheology, np.linspace(0.0, 0.5 * scene.width, 1001)
-    stress = scene.density * scene.force * place
+    law, offset = scene.rheology, np.linspace(0.0, 0.5 * scene.width, 1001)
+    stress = scene.density * scene.force * offset
     rates = [brentq(lambda rate, s=s: law.viscosity(rate, scene.viscosity) * rate - s, 0.0, 1e4) for s in stress]
-    below = cumulative_trapezoid(rates, place, initial=0.0)
-    return np.interp(np.abs(height - 0.5 * scene.width), place, below[-1] - below)
+    below = cumulative_trapezoid(rates, offset, initial=0.0)
+    return np.interp(np.abs(height - 0.5 * scene.width), offset, below[-1] - below)
 
 
 def power_law_profile(height, scene):
@@ -142,8 +142,8 @@ def test_diffusion_of_density_takes_the_noise_of_pressure():
 
 def dam_break(across, duration):
     numerics = SphNumerics(particles_across=across)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
-    return solve_dam_break(DamBreak(**given, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
+    return solve_dam_break(DamBreak(**parameters, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
 
 
 def test_a_dam_break_strikes_the_wall_as_measured():
@@ -166,8 +166,8 @@ def test_a_finer_dam_break_strikes_when_and_as_hard_as_measured():
 def test_the_front_of_a_column_is_where_an_independent_code_has_it():
     """Free slip, a column twice as high as wide: interFoam's front; Martin & Moyce measured it 11 to 19 % behind."""
     numerics = SphNumerics(particles_across=40)
-    given = {"height": 2.0, "width": 1.0, "tank_length": 4.0, "sensor_height": 0.4, "duration": 0.47}
-    scene = DamBreak(**given, numerics=numerics)
+    parameters = {"height": 2.0, "width": 1.0, "tank_length": 4.0, "sensor_height": 0.4, "duration": 0.47}
+    scene = DamBreak(**parameters, numerics=numerics)
     history = solve_dam_break(scene).history
     time = history["time"] * sqrt(2.0 * scene.gravity / scene.width)
     front = np.interp(FRONT[0], time, history["front"] + 0.5 * scene.spacing) / scene.width
@@ -178,8 +178,8 @@ def test_the_front_of_a_column_is_where_an_independent_code_has_it():
 def test_a_term_that_is_off_is_not_computed(term):
     """What stands in for it is no number: were it computed, no rate would be one."""
     numerics = SphNumerics(particles_across=10)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 1.0}
-    simulation = dam(DamBreak(**given, numerics=numerics))
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 1.0}
+    simulation = dam(DamBreak(**parameters, numerics=numerics))
     laws = [simulation.law._replace(**{term: value}) for value in (0.0, float("nan"))]
     rates = [Simulation(simulation.fields, simulation.fluids, law).rates for law in laws]
     assert np.isfinite(rates[0]).all()
@@ -194,14 +194,14 @@ def test_a_term_that_is_off_is_not_computed(term):
 
 def test_viscosity_that_is_left_out_changes_nothing():
     numerics = SphNumerics(particles_across=10, artificial_viscosity=0.02)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.4}
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.4}
     fronts = []
     for switch in ("off", "on"):
-        scene = DamBreak(**given, numerics=numerics, effects={"viscosity": switch})
+        scene = DamBreak(**parameters, numerics=numerics, effects={"viscosity": switch})
         fronts.append(solve_dam_break(scene).history["front"][-1])
-    told = decide_flow(scene.model_copy(update={"effects": scene.effects.model_copy(update={"viscosity": "auto"})}))
-    assert not told["flow_viscosity"]["on"]
-    assert fronts[1] == pytest.approx(fronts[0], rel=told["flow_viscosity"]["influence"])
+    decision = decide_flow(scene.model_copy(update={"effects": scene.effects.model_copy(update={"viscosity": "auto"})}))
+    assert not decision["flow_viscosity"]["on"]
+    assert fronts[1] == pytest.approx(fronts[0], rel=decision["flow_viscosity"]["influence"])
 
 
 def test_little_artificial_viscosity_does_little():

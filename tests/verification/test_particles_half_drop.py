@@ -44,8 +44,8 @@ def test_second_mode_of_half_a_drop():
         moments.append((SECOND_MOMENT * body.points * (mass @ body.points)).sum() / mass.sum() / RADIUS**2)
         times.append(flow.time)
         energies.append(physics.energy(body) + flow.solver.kinetic_energy(body))
-    found = fit_oscillation(np.array(times), np.array(moments), omega)
+    fit = fit_oscillation(np.array(times), np.array(moments), omega)
     from_time_step = (2.0 * np.pi / STEPS_PER_PERIOD) ** 2 / 3.0
-    assert frequency / found[1] - 1.0 - from_time_step == pytest.approx(0.0, abs=0.005)
-    assert found[0] == pytest.approx(decay, rel=0.05)
+    assert frequency / fit[1] - 1.0 - from_time_step == pytest.approx(0.0, abs=0.005)
+    assert fit[0] == pytest.approx(decay, rel=0.05)
     assert np.diff(energies).max() < 1e-5 * energies[0]

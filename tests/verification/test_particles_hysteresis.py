@@ -64,12 +64,12 @@ def test_a_drop_that_is_filled_and_emptied(flow):
 COUNT = 6
 
 
-def moving(viscosity, **kept):
+def moving(viscosity, **changes):
     """Solder of the paper's tension with inertia, by the scheme ispg."""
     numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (COUNT - 1), time_step_limit=100.0)
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
     fluid = {"surface_tension": 4.985, "viscosity": viscosity, "process_time": 0.1}
-    return Solder(volume=VOLUME, effects=effects, numerics=numerics, **fluid, **kept)
+    return Solder(volume=VOLUME, effects=effects, numerics=numerics, **fluid, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -103,17 +103,17 @@ def let_go(half_sphere, receding, advancing, viscosity):
 )
 def test_a_line_creeps_to_the_angle_that_it_has_passed(half_sphere, receding, advancing, angle):
     """A half sphere stays, or recedes or spreads in a liquid so thick that it does not swing."""
-    _, found, radius = let_go(half_sphere, receding, advancing, 9.0)
-    assert found == pytest.approx(angle, abs=0.7)
+    _, final_angle, radius = let_go(half_sphere, receding, advancing, 9.0)
+    assert final_angle == pytest.approx(angle, abs=0.7)
     assert radius == pytest.approx(base_radius(VOLUME, np.radians(angle)), rel=6e-3)
 
 
 @pytest.mark.long
 def test_a_line_that_swings_stands_between_its_angles(half_sphere):
     """Inertia takes the half sphere beyond the cap of 100 degrees, from where no force that is left takes it back."""
-    line, found, _ = let_go(half_sphere, 100.0, 130.0, 0.227)
+    line, angle, _ = let_go(half_sphere, 100.0, 130.0, 0.227)
     assert (line.state == PINNED).all()
-    assert found == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 an edge, 105.2 at 7 with steps a quarter as long
+    assert angle == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 an edge, 105.2 at 7 with steps a quarter as long
 
 
 def test_a_cube_comes_to_rest_between_both_angles():

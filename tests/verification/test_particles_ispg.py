@@ -89,10 +89,10 @@ def test_masses_stay_positive_in_a_film_thinner_than_the_particles():
     assert flow.solver.mass.diagonal().min() > 0.0
 
 
-def liquid(**kept):
+def liquid(**changes):
     """Solder with the paper's values and inertia, without gravity."""
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
-    return Solder(effects=effects, process_time=0.1, **PAPER, **kept)
+    return Solder(effects=effects, process_time=0.1, **PAPER, **changes)
 
 
 BALLS = [
@@ -270,8 +270,8 @@ def test_a_free_drop_swings_with_its_period():
         times.append(flow.time)
         amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(flow.body)[2])) / volume)
     exact_decay, exact = viscous_oscillation(2, omega, viscosity)
-    decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
-    assert abs(exact / found - 1.0) < 0.015
+    decay, frequency = fit_oscillation(np.array(times), np.array(amplitudes), exact)
+    assert abs(exact / frequency - 1.0) < 0.015
     assert 1.0 < decay / exact_decay < 1.5
     state, first = flow.solver.state, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
@@ -313,6 +313,6 @@ def test_a_cap_of_90_degrees_swings_as_half_a_free_drop():
         flow.step(size)
         amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(body)[2])) / volume / radius**2)
     exact_decay, exact = viscous_oscillation(2, omega, viscosity / (solder.density * radius**2))
-    decay, found = fit_oscillation(size * np.arange(1, len(amplitudes) + 1), np.array(amplitudes), exact)
-    assert abs(exact / found - 1.0) < 0.01
+    decay, frequency = fit_oscillation(size * np.arange(1, len(amplitudes) + 1), np.array(amplitudes), exact)
+    assert abs(exact / frequency - 1.0) < 0.01
     assert 1.0 < decay / exact_decay < 1.5

@@ -57,13 +57,13 @@ def test_slow_plates_do_the_work_of_the_surface():
     flow, rule = start_joint(START, solder())
     run_to_rest(flow, rule)
     end, plates = place(0.365e-3), flow.body.plates
-    before, given = flow.physics.energy(flow.body), flow.solver.state.losses.plates
+    before, plate_work = flow.physics.energy(flow.body), flow.solver.state.losses.plates
     flow.physics = replace(flow.physics, motions=(Travel(1, joint_plates(end)[1], 0.02, RADIUS),))
     while is_driven(flow.body, flow.physics, flow.time_step.size):
         flow.step()
         heights = flow.body.points[:, 2] * 1e3
         assert heights.min() > -1e-9 and heights.max() < flow.body.plates[1].origin[2] * 1e3 + 1e-9
-    work = given - flow.solver.state.losses.plates
+    work = plate_work - flow.solver.state.losses.plates
     assert flow.body.plates[1].origin - plates[1].origin == pytest.approx([0.0, 0.0, 0.015e-3], abs=1e-12)
     assert work == pytest.approx(flow.physics.energy(flow.body) - before, rel=0.02)
     exact = [named(solve_joint(place(gap), solder("energy")))["axial_force"] for gap in (0.35e-3, 0.3575e-3, 0.365e-3)]
@@ -109,17 +109,17 @@ def joint(spacing=SPACING, **table):
 def test_a_joint_is_pulled_until_it_breaks(speed):
     """Both parts rest as caps on their pads, the upper one where the package goes; fast it breaks later."""
     scene = joint(6e-5, path=PackagePath(standoff=1.2e-3, speed=speed))
-    found = joint_to_rest(scene, solder(spacing=6e-5))
-    metrics = named(found.shape)
-    assert found.shape.verdict == "open"
+    state = joint_to_rest(scene, solder(spacing=6e-5))
+    metrics = named(state.shape)
+    assert state.shape.verdict == "open"
     assert metrics["at_rest"] == 1.0
     assert metrics["particles_lost"] == 0
     assert metrics["standoff_at_break"] == pytest.approx(0.35e-3 + speed * metrics["time_at_break"], rel=1e-6)
     assert 0.8e-3 < metrics["standoff_at_break"] < 1.1e-3
-    assert found.shape.points[:, 2].max() == pytest.approx(1.2e-3)
-    history = found.shape.history
-    known = np.isfinite(history["pull_exact"]) & (history["standoff"] > 0.4e-3)
-    difference = (history["pull"] - history["pull_exact"])[known] / PULL
+    assert state.shape.points[:, 2].max() == pytest.approx(1.2e-3)
+    history = state.shape.history
+    has_exact = np.isfinite(history["pull_exact"]) & (history["standoff"] > 0.4e-3)
+    difference = (history["pull"] - history["pull_exact"])[has_exact] / PULL
     assert np.sqrt(np.mean(difference**2)) < (0.05 if speed == 0.1 else 0.5)
     parts = [metrics[f"volume_{name}"] for name in ("board", "package")]
     assert sum(parts) == pytest.approx(VOLUME, rel=1e-6)

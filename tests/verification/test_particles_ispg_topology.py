@@ -43,7 +43,7 @@ def test_the_neck_of_two_drops_grows_with_the_root_of_time():
     solder = fluid("physical").resolve(scene, "off")
     acting = switched(decide_drop(solder, True))
     old = [start_flow(cloud, solder, acting, ()) for cloud in start_clouds(scene)]
-    flow = start_flow(rebuild(*(one.body for one in old)).cloud, solder, acting, ())
+    flow = start_flow(rebuild(*(drop.body for drop in old)).cloud, solder, acting, ())
     hand_over(old, [flow])
     unit, rows = np.sqrt(solder.density * RADIUS**3 / solder.surface_tension), []
     while not rows or rows[-1][1] < 0.8:
@@ -54,8 +54,8 @@ def test_the_neck_of_two_drops_grows_with_the_root_of_time():
     assert np.sqrt(slope) == pytest.approx(1.1, abs=0.1)
     assert np.sqrt(slope * time + offset) == pytest.approx(neck, rel=5e-3)
     state = flow.solver.state
-    kept = flow.physics.energy(flow.body) + state.kinetic + state.losses.total
-    assert kept == pytest.approx(flow.solver.first_energy, rel=2e-3)
+    balance = flow.physics.energy(flow.body) + state.kinetic + state.losses.total
+    assert balance == pytest.approx(flow.solver.first_energy, rel=2e-3)
     assert flow.body.volume()[0] == pytest.approx(2.0 * BALL, rel=1e-3)  # polyhedra of the balls' volume
     assert np.abs(state.momenta[:3]).max() < 1e-6 * np.sqrt(2.0 * state.kinetic * solder.density * 2.0 * BALL)
 

@@ -15,8 +15,8 @@ BALL, RADIUS, GAMMA = 0.0724e-9, 0.24e-3, 0.4985
 WEIGHT = 8930.0 * 9.81
 
 
-def error(found, expected):
-    return found / expected - 1.0
+def error(actual, expected):
+    return actual / expected - 1.0
 
 
 @pytest.mark.parametrize(

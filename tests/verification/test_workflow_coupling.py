@@ -52,11 +52,11 @@ def test_a_rigid_package_on_joints_comes_to_the_height_of_one(tmp_path, count):
     load = 5e-5
     structure = Bow(SQUARE[:count], rigid_modes(SQUARE[:count], ("z",), count * load))
     fine = SOLDER.model_copy(update={"numerics": SolderNumerics(spacing=5e-5, time_step_limit=100)})
-    found = coupled(tmp_path, structure, solder=fine)
-    assert len(found.joints.left) == 1
-    assert found.places["J0"].gap == pytest.approx(exact_height(load), rel=5e-3)
-    assert found.seen[-1].residual <= 1e-3
-    assert found.state.wrenches[:, 1, 2].sum() == pytest.approx(count * load, abs=1e-3 * count * PULL)
+    reflow = coupled(tmp_path, structure, solder=fine)
+    assert len(reflow.joints.left) == 1
+    assert reflow.places["J0"].gap == pytest.approx(exact_height(load), rel=5e-3)
+    assert reflow.seen[-1].residual <= 1e-3
+    assert reflow.state.wrenches[:, 1, 2].sum() == pytest.approx(count * load, abs=1e-3 * count * PULL)
     assert floating_height(JointGeometry(GAP, RADIUS, RADIUS), SOLDER, load) == pytest.approx(
         exact_height(load), rel=1e-4
     )
@@ -69,12 +69,12 @@ def test_joints_that_flow_with_inertia_bear_a_package_at_the_height_of_the_defau
     relaxing = {"numerics": SolderNumerics(spacing=1e-4, time_step_limit=100), "effects": {"gravity": "off"}}
     for name, settings in {"ispg": flowing, "energy": relaxing}.items():
         structure = Bow(SQUARE, rigid_modes(SQUARE, ("z",), 4 * load))
-        found = coupled(tmp_path / name, structure, solder=Solder(volume=BALL, **settings))
-        assert found.seen[-1].residual <= 1e-3
-        assert found.state.wrenches[:, 1, 2].sum() == pytest.approx(4 * load, abs=4e-3 * PULL)
-        shape = found.joints.shapes()["J0"]
+        reflow = coupled(tmp_path / name, structure, solder=Solder(volume=BALL, **settings))
+        assert reflow.seen[-1].residual <= 1e-3
+        assert reflow.state.wrenches[:, 1, 2].sum() == pytest.approx(4 * load, abs=4e-3 * PULL)
+        shape = reflow.joints.shapes()["J0"]
         assert shape.metrics["at_rest"][0] == 1.0 and abs(shape.metrics["volume_drift"][0]) < 1e-9
-        gaps[name] = found.places["J0"].gap
+        gaps[name] = reflow.places["J0"].gap
     assert abs(shape.metrics.get("energy_imbalance", (0.0, ""))[0]) < 1e-6
     assert gaps["ispg"] == pytest.approx(gaps["energy"], rel=5e-4)
 
@@ -82,27 +82,27 @@ def test_joints_that_flow_with_inertia_bear_a_package_at_the_height_of_the_defau
 def test_a_package_that_starts_tilted_and_shifted_levels_and_centres_itself(tmp_path):
     """Six rigid motions: 0.2 radii aside, a degree tilted, a degree turned; a micrometre of it is left."""
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, 8e-5))
-    found = coupled(tmp_path, structure, rigid=np.array([5e-5, -3e-5, 0.0, 0.01, -0.015, 0.02]))
-    shift, turn = found.state.rigid[:2], found.state.rigid[3:]
+    reflow = coupled(tmp_path, structure, rigid=np.array([5e-5, -3e-5, 0.0, 0.01, -0.015, 0.02]))
+    shift, turn = reflow.state.rigid[:2], reflow.state.rigid[3:]
     assert abs(shift).max() < 1e-6 and 1e-3 * abs(turn).max() < 1e-6
-    assert np.ptp([place.gap for place in found.places.values()]) < 3e-6
-    assert found.state.rigid[2] + GAP == pytest.approx(exact_height(2e-5), rel=5e-3)
+    assert np.ptp([joint.gap for joint in reflow.places.values()]) < 3e-6
+    assert reflow.state.rigid[2] + GAP == pytest.approx(exact_height(2e-5), rel=5e-3)
 
 
 def test_weight_off_the_centre_tilts_the_package_towards_it(tmp_path):
     """Moments balance about both axes; the tilt is that of the joints' axial stiffness to some per cent."""
     weight, at = 4e-4, (0.3e-3, 0.1e-3)
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, weight, at))
-    found = coupled(tmp_path, structure)
-    forces = found.state.wrenches[:, 1]
-    centres = SQUARE + found.state.state.pad_motion[:, 1, :3]
+    reflow = coupled(tmp_path, structure)
+    forces = reflow.state.wrenches[:, 1]
+    centres = SQUARE + reflow.state.state.pad_motion[:, 1, :3]
     moment = np.cross(centres, forces[:, :3]).sum(axis=0) + forces[:, 3:].sum(axis=0)
     assert forces[:, 2].sum() == pytest.approx(weight, abs=4e-3 * PULL)
     assert moment[:2] == pytest.approx((at[1] * weight, -at[0] * weight), abs=6e-3 * PULL * 1e-3)
-    stiffness = -stiffness_estimate(next(iter(found.places.values())), SOLDER)[2, 2]
+    stiffness = -stiffness_estimate(next(iter(reflow.places.values())), SOLDER)[2, 2]
     lean = weight * np.array([-at[1], at[0]]) / (4.0 * stiffness * 1e-6)
-    assert found.state.rigid[3:5] == pytest.approx(lean, rel=0.2)
-    gaps = np.array([place.gap for place in found.places.values()])
+    assert reflow.state.rigid[3:5] == pytest.approx(lean, rel=0.2)
+    gaps = np.array([joint.gap for joint in reflow.places.values()])
     assert gaps.argmin() == 3 and gaps.argmax() == 0  # J3 is at +x, +y
 
 

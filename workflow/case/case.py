@@ -1,4 +1,4 @@
-"""What all kinds of case have in common."""
+"""Base class of all kinds of case."""
 
 from pathlib import Path
 from typing import ClassVar, Self
@@ -62,7 +62,7 @@ class Case(Parameters):
         return table
 
     def resolved(self) -> Self:
-        """The case with what its file leaves open and its scene decides."""
+        """Return the case with all ``auto`` values resolved."""
         return self
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What is wrong with a case: records that name the place, the key, the value and what is allowed."""
+"""Input errors of a case: file, line, key, value, problem and allowed values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

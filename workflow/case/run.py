@@ -1,4 +1,4 @@
-"""What a stage works with, and what it finds: metrics and health checks in the form of ``summary.json``."""
+"""Input and results of a stage: metrics and health checks in the form of ``summary.json``."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ AnyCase = TypeVar("AnyCase", bound=Case)
 
 @dataclass(frozen=True, slots=True)
 class Run(Generic[AnyCase]):
-    """What a stage works with.
+    """Input of a stage.
 
     Attributes:
         folder: the run folder, with the products of earlier stages.

@@ -68,7 +68,7 @@ def _four_digits(value: float) -> str:
 
 
 def percent(value: float) -> str:
-    """A fraction as per cent, three digits."""
+    """Format a fraction in per cent with three digits."""
     if abs(value) < 1.0e-6:
         return "< 0.0001 %"
     return f"{100.0 * value:.3g} %" if abs(value) < 10.0 else f"{100.0 * value:.0f} %"

@@ -103,7 +103,7 @@ def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
 
 
 def _nearest_name(value: Any, field: FieldInfo) -> str:
-    """Valid name most like a wrong one, which may be an item of a list."""
+    """Return the valid name nearest to a wrong one, which may be an item of a list."""
     valid = fields.literal_names(field)
     wrong = [str(item) for item in (value if isinstance(value, list) else [value]) if item not in valid]
     return nearest(wrong[0], valid) if wrong else ""

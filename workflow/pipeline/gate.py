@@ -33,7 +33,7 @@ UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """What a user allows: a case that is larger than this machine, values that are not plausible."""
+    """Exceptions granted by the user: cases larger than this machine, implausible values."""
 
     oversubscribe: bool = False
     force: bool = False

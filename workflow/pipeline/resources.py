@@ -15,7 +15,7 @@ MINUTES, MARGIN = 10, 3.0  # of the walltime: to start and compile, over the for
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a job asks for.
+    """Resources that a job requests.
 
     Attributes:
         tasks: MPI ranks.
@@ -46,7 +46,7 @@ class Resources:
 
 
 def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_CORES) -> dict[str, Resources]:
-    """Predict what the jobs of a case need.
+    """Predict the resources of the jobs of a case.
 
     Args:
         case: the case.

@@ -24,7 +24,7 @@ RANDOM_COUNT = 200
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the user asks for.
+    """Request of the user.
 
     Attributes:
         files: of cases; none means all that the program has.
@@ -88,7 +88,7 @@ def _try_all(request: Request, fixed: Mapping[Path, list[HardCase]], samples: Se
     simplest = session.simplest(missed) if missed else {}
     for path, number in missed.items():
         sample = by_name[path.stem]
-        sample.simplest = sample.file.file_table(simplest.get(sample.name, sample.cases[number].given))
+        sample.simplest = sample.file.file_table(simplest.get(sample.name, sample.cases[number].table))
     return verdicts
 
 

@@ -70,7 +70,7 @@ def _record(verdict: Verdict) -> dict[str, Any]:
 
 def _check(check: Check) -> dict[str, Any]:
     margin = check.margin if math.isfinite(check.margin) else None
-    return {"measure": check.measure, "found": check.found, "bound": check.bound, "margin": margin, "ok": check.holds}
+    return {"measure": check.measure, "found": check.value, "bound": check.bound, "margin": margin, "ok": check.holds}
 
 
 def _sample_record(sample: Sample) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def _sample_record(sample: Sample) -> dict[str, Any]:
         "ok": sample.ok,
         "tried": len(sample.verdicts),
         "refused": sample.refused,
-        "cases": [_record(verdict) | {"parameters": verdict.case.given} for verdict in sample.verdicts],
+        "cases": [_record(verdict) | {"parameters": verdict.case.table} for verdict in sample.verdicts],
     }
 
 

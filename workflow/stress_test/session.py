@@ -29,7 +29,7 @@ ENVIRONMENT = {
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is known of a test that has ended.
+    """Outcome of a test.
 
     Attributes:
         properties: that it has recorded.
@@ -71,7 +71,7 @@ class Reports:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self) -> None:
-        """Processes are about to start."""
+        """Note that processes are about to start."""
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
     @pytest.hookimpl(optionalhook=True)

@@ -61,7 +61,7 @@ def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
 
 
 def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
-    """The smallest margin of all, and whose it is."""
+    """Return the smallest margin and its case."""
     found = [(verdict.closest, verdict) for verdict in verdicts if verdict.closest is not None]
     if not found:
         return "", ""

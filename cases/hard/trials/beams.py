@@ -21,14 +21,16 @@ CURVATURE = 6.0  # of the hinge, over that at which the beam yields
 HINGE_STEPS = 4000
 
 
-def bending(given: Bending) -> dict[str, float]:
+def bending(parameters: Bending) -> dict[str, float]:
     """Return the error of the deflection of the end of a beam, over the exact one."""
-    along, across, up = given.cells
-    lines = [np.linspace(0, count * long, count + 1) for count, long in ((along, given.aspect), (across, 1), (up, 1))]
+    along, across, up = parameters.cells
+    lines = [
+        np.linspace(0, count * long, count + 1) for count, long in ((along, parameters.aspect), (across, 1), (up, 1))
+    ]
     length, width, height = (float(line[-1]) for line in lines)
-    found = tip(KINDS[given.element], lines, [laminate(given.poisson_ratio, young=YOUNG)])
-    exact = beam(length, width, np.array([height]), np.array([YOUNG]), given.poisson_ratio)
-    return {"deflection_error": abs(found / exact - 1.0)}
+    deflection = tip(KINDS[parameters.element], lines, [laminate(parameters.poisson_ratio, young=YOUNG)])
+    exact = beam(length, width, np.array([height]), np.array([YOUNG]), parameters.poisson_ratio)
+    return {"deflection_error": abs(deflection / exact - 1.0)}
 
 
 def tip(
@@ -78,9 +80,9 @@ def beam(length: float, width: float, heights: np.ndarray, young: np.ndarray, po
     return float(length**3 / (3 * rigidity) + length * flexibility)
 
 
-def hinge(given: Hinge) -> dict[str, float]:
+def hinge(parameters: Hinge) -> dict[str, float]:
     """Return the error of the moment of a beam that is bent far beyond yield."""
-    return {"moment_error": bent_moment(given.element, given.layers) - 1.0}
+    return {"moment_error": bent_moment(parameters.element, parameters.layers) - 1.0}
 
 
 def bent_moment(name: str, layers: int) -> float:
@@ -113,9 +115,9 @@ COUNTS = {4: (9, 13, 18), 8: (6, 9, 13), 10: (3, 5, 7)}  # of boxes each way, by
 POISSON = 0.3
 
 
-def order(given: Order) -> dict[str, float]:
+def order(parameters: Order) -> dict[str, float]:
     """Return the orders in h of displacements and strains in the L2 norm."""
-    of_displacement, of_strain = orders_in_h(given.element, given.poisson_ratio)
+    of_displacement, of_strain = orders_in_h(parameters.element, parameters.poisson_ratio)
     return {"displacement_order": of_displacement, "strain_order": of_strain}
 
 
@@ -136,12 +138,14 @@ def errors_of(name: str, material: Isotropic, count: int) -> tuple[float, float]
     held = np.zeros(points.shape, dtype=bool)
     held[boundary_facets(cells)] = True
     exact = exact_displacement(points, poisson)
-    found = solve(elements, exact, held)
+    displacement = solve(elements, exact, held)
     geometry = element_geometry(points, cells)
-    strain = mean_strain(geometry.gradient, found[cells])
+    strain = mean_strain(geometry.gradient, displacement[cells])
     centres = points[cells[:, : 8 if kind.nodes == 8 else 4]].mean(axis=1)
     of_strains = geometry.volume @ (strain - exact_strain(centres, poisson)) ** 2
-    return float(np.sqrt(mass_of(elements) @ np.sum((found - exact) ** 2, axis=1))), float(np.sqrt(of_strains.sum()))
+    return float(np.sqrt(mass_of(elements) @ np.sum((displacement - exact) ** 2, axis=1))), float(
+        np.sqrt(of_strains.sum())
+    )
 
 
 def exact_displacement(points: np.ndarray, poisson: float) -> np.ndarray:

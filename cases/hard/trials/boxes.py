@@ -71,10 +71,10 @@ def mass_of(elements: Elements) -> np.ndarray:
     return lumped_mass(elements, element_geometry(elements.points, elements.cells).nodal_volume)
 
 
-def solve(elements: Elements, given: np.ndarray, held: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+def solve(elements: Elements, prescribed: np.ndarray, held: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
     """Return the displacement (n, 3) where components ``held (n, 3)`` take the values ``given (n, 3)``."""
     stiffness, free = stiffness_matrix(elements), ~held.ravel()
-    displacement = np.where(held, given, 0.0).ravel()
+    displacement = np.where(held, prescribed, 0.0).ravel()
     right = (0.0 if load is None else load.ravel()) - stiffness @ displacement
     displacement[free] = splu(stiffness[free][:, free].tocsc()).solve(right[free])
     return displacement.reshape(-1, 3)
@@ -140,9 +140,9 @@ def laminate(poisson: float, orthotropy: float = 1.0, young: float = YOUNG) -> M
     )
 
 
-def body_of(given: Elastic, material: Material) -> Elements:
+def body_of(parameters: Elastic, material: Material) -> Elements:
     """Return the elements of a trial, boxes 1 mm high."""
-    flat = np.linspace(0.0, 1e-3 * given.aspect * given.cells, given.cells + 1)
-    lines = (flat, flat, np.linspace(0.0, 1e-3 * given.cells, given.cells + 1))
-    points, cells = distorted(given.element, lines, given.quality, given.seed)
-    return elements_of(KINDS[given.element], points, cells, [material])
+    flat = np.linspace(0.0, 1e-3 * parameters.aspect * parameters.cells, parameters.cells + 1)
+    lines = (flat, flat, np.linspace(0.0, 1e-3 * parameters.cells, parameters.cells + 1))
+    points, cells = distorted(parameters.element, lines, parameters.quality, parameters.seed)
+    return elements_of(KINDS[parameters.element], points, cells, [material])

@@ -50,10 +50,10 @@ def surveyed(
     return whole, survey(whole.mesh, materials, Treatment()), rules
 
 
-def checked(whole: Whole, found: Survey, rules: Rules) -> Division:
+def checked(whole: Whole, survey_of_mesh: Survey, rules: Rules) -> Division:
     """Divide as the program does, its checks included."""
-    division = divide(whole, found, rules)
-    check_division(whole, found, division, rules)
+    division = divide(whole, survey_of_mesh, rules)
+    check_division(whole, survey_of_mesh, division, rules)
     return division
 
 
@@ -79,8 +79,8 @@ def models_of(
     mesh: MeshData, materials: Materials, coupling: Coupling, fraction: float, division: Divide = checked
 ) -> Models:
     """Divide a mesh, as the program does or otherwise."""
-    whole, found, rules = surveyed(mesh, materials, fraction, coupling)
-    divided = division(whole, replace(found, cost=MANY * found.cost), rules)
+    whole, survey_of_mesh, rules = surveyed(mesh, materials, fraction, coupling)
+    divided = division(whole, replace(survey_of_mesh, cost=MANY * survey_of_mesh.cost), rules)
     inputs = model_inputs(whole, divided)
     return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, divided)
 
@@ -143,13 +143,13 @@ class Coupled:
         The energy swings with what the interface holds; its drift is that of its mean, from the first tenth of the run
         to the last. ``look`` is called at each sample.
         """
-        first, found = self.held(), []
+        first, energies = self.held(), []
         for _ in range(samples):
             for _ in range(windows // samples):
                 self.run()
-            found.append((self.held(), abs(self.energies()["interface"])))
+            energies.append((self.held(), abs(self.energies()["interface"])))
             look()
-        energy, interface = np.array(found).T / first
+        energy, interface = np.array(energies).T / first
         tenth = samples // 10
         return abs(float(energy[-tenth:].mean() - energy[:tenth].mean())), float(interface.max())
 
@@ -181,9 +181,9 @@ class Coupled:
         """Return the state one window later: displacements, velocities times DT, link over a unit."""
         counts = [int(free.sum()) for free in self._free]
         values = np.split(state, np.cumsum(counts + counts))
-        for part, free, place, speed in zip(self.parts, self._free, values[:2], values[2:4], strict=True):
+        for part, free, displacement, speed in zip(self.parts, self._free, values[:2], values[2:4], strict=True):
             part.motion.displacement[:], part.motion.velocity[:] = 0.0, 0.0
-            part.motion.displacement[free] = place
+            part.motion.displacement[free] = displacement
             part.motion.velocity[free] = speed / self.plan.window
         self._complete(values[4].reshape(-1, 3) * self._impedance / self.plan.window)
         self.run()

@@ -40,9 +40,9 @@ class Unrest(Parameters):
     def disturb(self, fields: "Fields", fluids: int, spacing: float) -> None:
         """Displace the particles of a liquid, a spacing apart [m], in two or three dimensions; change densities."""
         random = np.random.default_rng(self.seed)
-        for place in fields[:3]:
-            if np.ptp(place) > 0.0:
-                place[:fluids] += self.displaced * spacing * random.uniform(-1.0, 1.0, fluids)
+        for coordinate in fields[:3]:
+            if np.ptp(coordinate) > 0.0:
+                coordinate[:fluids] += self.displaced * spacing * random.uniform(-1.0, 1.0, fluids)
         fields.density[:fluids] *= 1.0 + self.density * random.uniform(-1.0, 1.0, fluids)
 
 
@@ -100,19 +100,20 @@ class Watch:
             self._look()
 
     def _look(self) -> None:
-        one = self.simulation
-        fields, liquid = one.fields, slice(one.fluids)
-        mass, law = fields.mass[liquid], one.law
+        simulation = self.simulation
+        fields, liquid = simulation.fields, slice(simulation.fluids)
+        mass, law = fields.mass[liquid], simulation.law
         weight = -law.gravity_z * float(mass @ fields.z[liquid])
-        tension = one.surface.energy if one.surface else 0.0
+        tension = simulation.surface.energy if simulation.surface else 0.0
         momentum = [float(mass @ speed[liquid]) for speed in fields[3:6]]
-        centre = [float(mass @ place[liquid]) / float(mass.sum()) for place in fields[:3]]
+        centre = [float(mass @ coordinate[liquid]) / float(mass.sum()) for coordinate in fields[:3]]
         self.rows.append(
             (
-                one.time, one.kinetic_energy + tension + weight + one.elastic_energy, one.fastest,
+                simulation.time, simulation.kinetic_energy + tension + weight + simulation.elastic_energy,
+                simulation.fastest,
                 float(np.hypot(momentum[0], momentum[1])) if law.mirror else float(np.linalg.norm(momentum)),
                 float(np.abs(fields.density[liquid] / law.rest_density - 1.0).max()),
-                float(one.pressures.mean()), *centre,
+                float(simulation.pressures.mean()), *centre,
             )
         )  # fmt: skip
 
@@ -123,7 +124,7 @@ class Watch:
         later = np.maximum.accumulate(energy[::-1])[::-1]
         early, late = (time >= share * time[-1] for share in (EARLY, LATE))
         middle = early & (time <= 2.0 * EARLY * time[-1])
-        aside = np.hypot(*(place - place[early][0] for place in centre[:2]))
+        aside = np.hypot(*(coordinate - coordinate[early][0] for coordinate in centre[:2]))
         return {
             "steps": self.simulation.steps,
             "energy_over_start": energy.max() / energy[0] - 1.0,
@@ -153,7 +154,7 @@ def droplet(parameters: DropletTrial) -> dict[str, float]:
         "surface_volume": (surface.volume + surface.spray) / (count * scene.volume) - 1.0,
         "outside": _outside(simulation),
         "below_wall": float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
-        "mergers": sum(one.after < one.before for one in surface.topology_changes),
+        "mergers": sum(merger.after < merger.before for merger in surface.topology_changes),
     }  # fmt: skip
 
 
@@ -165,21 +166,21 @@ def droplets(parameters: DropletTrial) -> "Simulation":
     from reflowshock.particles.surface.remeshing import EDGE
 
     scene = parameters.droplet
-    one = alone(scene)
-    fields, surface = one.fields, one.surface
+    simulation = alone(scene)
+    fields, surface = simulation.fields, simulation.surface
     assert surface is not None
     if parameters.pair != "none":
         points, corners, triangles = np.array(fields[:3]), surface.points.copy(), surface.triangles.copy()
-        gap = 0.5 * EDGE * one.law.spacing
+        gap = 0.5 * EDGE * simulation.law.spacing
         aside = np.array([0.5 * (np.ptp(corners[:, 0])) + gap, 0.5 * parameters.offset * scene.diameter, 0.0])
         both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), simulation.law)
         fields.u[:] = parameters.approach * np.repeat([1.0, -1.0], points.shape[1])
         fields.w[:] = -scene.impact_speed
         surface.mesh.points = corners - aside
         surface.add(corners + aside, triangles)
-    parameters.unrest.disturb(fields, len(fields.x), one.law.spacing)
-    return Simulation(fields, len(fields.x), one.law, surface, flow.device_of(scene))
+    parameters.unrest.disturb(fields, len(fields.x), simulation.law.spacing)
+    return Simulation(fields, len(fields.x), simulation.law, surface, flow.device_of(scene))
 
 
 def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, float]:
@@ -187,17 +188,17 @@ def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[s
     scene, late = parameters.droplet, history["time"] >= LATE * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
     size = 1.0 if parameters.pair == "none" else 2.0 ** (1.0 / 3.0)
-    found = {
+    measures = {
         "capillary_number": metrics["capillary_number"][0],
         "parts": history["parts"][-1],
         "spread_max": history["spread"].max(),
     }
     if not scene.has_wall:
         pressure = mean["mean_pressure"] / scene.laplace_pressure * size - 1.0
-        return found | {"pressure_error": pressure, "roundness": mean["roundness"]}
+        return measures | {"pressure_error": pressure, "roundness": mean["roundness"]}
     base, height = cap(scene.angle)
     errors = {"base_error": mean["base"] / (size * base) - 1.0, "height_error": mean["height"] / (size * height) - 1.0}
-    return found | errors
+    return measures | errors
 
 
 def _outside(simulation: "Simulation") -> float:
@@ -215,11 +216,11 @@ def _outside(simulation: "Simulation") -> float:
 
 def tank(parameters: TankTrial) -> dict[str, float]:
     """Let a column in a tank flow, or rest; noise is that of the pressure about that at rest, over rho g H."""
-    found, noise = _tank(parameters)
+    measures, noise = _tank(parameters)
     if parameters.undiffused:
         rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
-        found["noise_gain"] = _tank(rough)[1] / noise
-    return found
+        measures["noise_gain"] = _tank(rough)[1] / noise
+    return measures
 
 
 def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
@@ -228,12 +229,12 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
     from reflowshock.particles.sph_flows.dam_break import dam, particles_lost
 
     scene = parameters.dam_break
-    one = dam(scene)
+    filled = dam(scene)
     if parameters.thrown:
-        one.fields.u[: one.fluids] = parameters.thrown
-        one.fields.x[: one.fluids] += 0.5 * (scene.tank_length - scene.width)
-    parameters.unrest.disturb(one.fields, one.fluids, one.law.spacing)
-    simulation = Simulation(one.fields, one.fluids, one.law, device=flow.device_of(scene))
+        filled.fields.u[: filled.fluids] = parameters.thrown
+        filled.fields.x[: filled.fluids] += 0.5 * (scene.tank_length - scene.width)
+    parameters.unrest.disturb(filled.fields, filled.fluids, filled.law.spacing)
+    simulation = Simulation(filled.fields, filled.fluids, filled.law, device=flow.device_of(scene))
     watch, unit = Watch(simulation), scene.density * scene.gravity * scene.height
 
     def errors(now: "Simulation") -> tuple[float, float, float]:
@@ -243,13 +244,13 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
     history = flow.run_flow(simulation, scene.until, errors, watch).history(("time", "mean", "noise"))
     late = history["time"] >= LATE * history["time"][-1]
     noise = float(history["noise"][late].mean())
-    found = {
+    measures = {
         "noise": noise,
         "pressure_error": history["mean"][late].mean(),
         "particles_lost": particles_lost(scene, simulation),
         "speed_at_end": np.array(watch.rows)[-1, 2] / scene.fastest,
     }
-    return watch.measured() | found, noise
+    return watch.measured() | measures, noise
 
 
 def printed(parameters: PrintTrial) -> dict[str, float]:

@@ -37,14 +37,14 @@ class Followed(NamedTuple):
     force: float
 
 
-def patch(given: Patch) -> dict[str, float]:
+def patch(parameters: Patch) -> dict[str, float]:
     """Return what an affine field leaves on inner nodes, how its stress scatters, and what elements resist by."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    elements = body_of(given, material)
-    gradient = np.random.default_rng(given.seed).uniform(-1.0, 1.0, (3, 3)) * LARGE
-    if given.kinematics == "finite":
-        found = follow(nonlinear(elements, material, finite=True), lambda s: np.eye(3) + s * gradient, 1)
-        force_error, stress_error = found.force, found.scatter
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    elements = body_of(parameters, material)
+    gradient = np.random.default_rng(parameters.seed).uniform(-1.0, 1.0, (3, 3)) * LARGE
+    if parameters.kinematics == "finite":
+        errors = follow(nonlinear(elements, material, finite=True), lambda s: np.eye(3) + s * gradient, 1)
+        force_error, stress_error = errors.force, errors.scatter
     else:
         force_error, stress_error = affine(elements, gradient)
     softest, rigid = resisted(elements)
@@ -81,27 +81,27 @@ def inner_nodes(elements: Elements) -> np.ndarray:
     return np.setdiff1d(np.arange(len(elements.points)), boundary_facets(elements.cells))
 
 
-def turns(given: Turns) -> dict[str, float]:
+def turns(parameters: Turns) -> dict[str, float]:
     """Return force and stress, over the modulus, that turning alone has made: none, exactly."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    term = nonlinear(body_of(given, material), material, finite=True)
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    term = nonlinear(body_of(parameters, material), material, finite=True)
     points, worst = term.elements.points, 0.0
     area = float(np.ptp(points, axis=0).max()) ** 2
     modulus = float(term.elements.elasticity.max())
-    for turn in np.linspace(0.0, given.turns, 4 * given.turns + 1)[1:]:
+    for turn in np.linspace(0.0, parameters.turns, 4 * parameters.turns + 1)[1:]:
         matrix = Rotation.from_rotvec(2 * np.pi * turn * AXIS).as_matrix()
         worst = np.maximum(worst, np.abs(force_of(term, points @ matrix.T - points)).max())
     stress = term.means(np.arange(len(term.numbers))).stress
     return {"force_error": float(worst) / (modulus * area), "stress_error": float(np.abs(stress).max()) / modulus}
 
 
-def tension(given: Tension) -> dict[str, float]:
+def tension(parameters: Tension) -> dict[str, float]:
     """Return the error of the stress at the end of a uniaxial path of a metal, where its law gives it exactly.
 
     Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; of finite kinematics these are logarithmic, and the
     body turns by 1.4 rad on the way.
     """
-    metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, given.plastic_strain
+    metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, parameters.plastic_strain
     assert law is not None
     stress = law.A + law.B * plastic
     elastic = stress / metal.young_modulus
@@ -109,28 +109,30 @@ def tension(given: Tension) -> dict[str, float]:
     turn = Rotation.from_rotvec([0.3, 1.1, -0.7])
 
     def path(s: float) -> np.ndarray:
-        if given.kinematics == "small":
+        if parameters.kinematics == "small":
             return np.eye(3) + s * np.diag(strain)
         return (turn**s).as_matrix() @ np.diag(np.exp(s * strain))
 
-    found = follow(nonlinear(body_of(given, metal), metal, given.kinematics == "finite"), path, given.steps)
-    return judged(found, np.diag([stress, 0.0, 0.0]))
+    history = follow(
+        nonlinear(body_of(parameters, metal), metal, parameters.kinematics == "finite"), path, parameters.steps
+    )
+    return judged(history, np.diag([stress, 0.0, 0.0]))
 
 
-def compression(given: Compression) -> dict[str, float]:
+def compression(parameters: Compression) -> dict[str, float]:
     """Return the error of the stress of a confined body, C ln U exactly."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    term = nonlinear(body_of(given, material), material, finite=True)
-    found = follow(term, lambda s: np.diag([1.0, 1.0, given.stretch**s]), given.steps)
-    return judged(found, symmetric((np.log(given.stretch) * term.elements.elasticity[0, :, 2])[None])[0])
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    term = nonlinear(body_of(parameters, material), material, finite=True)
+    history = follow(term, lambda s: np.diag([1.0, 1.0, parameters.stretch**s]), parameters.steps)
+    return judged(history, symmetric((np.log(parameters.stretch) * term.elements.elasticity[0, :, 2])[None])[0])
 
 
-def judged(found: Followed, exact: np.ndarray) -> dict[str, float]:
+def judged(history: Followed, exact: np.ndarray) -> dict[str, float]:
     """Compare the end of a path with its exact stress."""
     return {
-        "stress_error": float(np.abs(found.stress - exact).max() / np.abs(exact).max()),
-        "stress_scatter": found.scatter,
-        "force_error": found.force,
+        "stress_error": float(np.abs(history.stress - exact).max() / np.abs(exact).max()),
+        "stress_scatter": history.scatter,
+        "force_error": history.force,
     }
 
 
@@ -152,19 +154,19 @@ SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # of a block [m], and its layers of elemen
 PULL = 1e-3  # displacement of the upper face over the height of both blocks
 
 
-def tied(given: Tied) -> dict[str, float]:
+def tied(parameters: Tied) -> dict[str, float]:
     """Return how far stresses are from the one that is the same everywhere, at worst and in the mean, and the force.
 
     Without lateral contraction two blocks that are pulled have one stress, whatever their moduli. Nodes that follow a
     face at points give its forces back so that their sum and moment are kept, but not those of each node: stresses next
     to the tie are wrong by what `stress_error` says, and the pull by far less.
     """
-    body = body_of_blocks(given)
+    body = body_of_blocks(parameters)
     displacement, top = pulled(body)
     elements = body.elements
     moduli = elements.elasticity[elements.material]
     stress = element_stress(body.geometry.gradient, moduli, displacement[elements.cells])[:, 2]
-    exact = PULL * 2 * HEIGHT / (HEIGHT / YOUNG + HEIGHT * given.contrast / YOUNG)
+    exact = PULL * 2 * HEIGHT / (HEIGHT / YOUNG + HEIGHT * parameters.contrast / YOUNG)
     force = stiffness_matrix(elements) @ displacement.ravel()
     volume = body.geometry.volume
     return {
@@ -174,26 +176,29 @@ def tied(given: Tied) -> dict[str, float]:
     }
 
 
-def body_of_blocks(given: Tied) -> Body:
+def body_of_blocks(parameters: Tied) -> Body:
     """Return both blocks as one body: the program's own tie, which it checks."""
-    item = prepare(append(blocks(given)), "dns")["dns"]
-    soft = laminate(0.0, young=YOUNG / given.contrast)
+    item = prepare(append(blocks(parameters)), "dns")["dns"]
+    soft = laminate(0.0, young=YOUNG / parameters.contrast)
     pieces = make_pieces(
         distribute(MPI.COMM_SELF, item.mesh),
         item.tables,
         Materials(board=laminate(0.0), substrate=soft),
-        given.element,
+        parameters.element,
     )
     return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
 
 
-def blocks(given: Tied) -> list[MeshData]:
+def blocks(parameters: Tied) -> list[MeshData]:
     """Return the lower, coarse block and the upper one, whose nodes follow the lower one's face."""
     made = []
-    for name, count, low in (("board", given.coarse, 0.0), ("substrate", round(given.coarse * given.ratio), HEIGHT)):
+    for name, count, low in (
+        ("board", parameters.coarse, 0.0),
+        ("substrate", round(parameters.coarse * parameters.ratio), HEIGHT),
+    ):
         flat = np.linspace(0.0, SIDE, count + 1)
         lines = (flat, flat, np.linspace(low, low + HEIGHT, LAYERS + 1))
-        points, cells = distorted(given.element, lines, given.quality, given.seed, faces=False)
+        points, cells = distorted(parameters.element, lines, parameters.quality, parameters.seed, faces=False)
         role = "master@tie" if low == 0.0 else "slave@tie"
         made.append(mesh_of(points, cells, name, {role: on(2, HEIGHT)}))
     return made
@@ -208,11 +213,11 @@ def pulled(body: Body) -> tuple[np.ndarray, np.ndarray]:
     count, tie = len(points), np.kron(body.tie.matrix(len(points)).toarray(), np.eye(3))
     stiffness = tie.T @ (stiffness_matrix(body.elements) @ tie)
     top = np.flatnonzero(points[:, 2] > 2 * HEIGHT - 1e-9)
-    given, known = np.zeros((count, 3)), np.abs(points) < 1e-9
-    given[top, 2], known[top, 2] = PULL * 2 * HEIGHT, True
-    known[body.tie.slave] = True
-    free = ~known.ravel()
-    displacement = given.ravel()
+    prescribed, is_prescribed = np.zeros((count, 3)), np.abs(points) < 1e-9
+    prescribed[top, 2], is_prescribed[top, 2] = PULL * 2 * HEIGHT, True
+    is_prescribed[body.tie.slave] = True
+    free = ~is_prescribed.ravel()
+    displacement = prescribed.ravel()
     displacement[free] = np.linalg.solve(stiffness[np.ix_(free, free)], -(stiffness @ displacement)[free])
     result = displacement.reshape(-1, 3)
     body.tie.spread(result)

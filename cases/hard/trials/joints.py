@@ -151,8 +151,8 @@ def head_error(meshed: Meshed) -> float:
     made = meshed.mesh
     heads = [quads for name, quads in made.facets.items() if name.startswith("pad_package@")]
     points = made.points[np.unique(np.concatenate([quads.ravel() for quads in heads]))]
-    place = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
-    return float(np.abs(points[:, 2] - place).max())
+    heights = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
+    return float(np.abs(points[:, 2] - heights).max())
 
 
 Triangulation = tuple[np.ndarray, np.ndarray]
@@ -239,7 +239,7 @@ NAME = "A4"
 
 def site() -> PadSite:
     """Where it goes: the corner joint of a small, flat package."""
-    return {place.name: place for place in pad_table(package(), board(), Warpage())}[NAME]
+    return {pad_site.name: pad_site for pad_site in pad_table(package(), board(), Warpage())}[NAME]
 
 
 def load_given(fault: str, bulge: float, noise: float, turn: float) -> tuple[ClosedSurface, ClosedSurface]:

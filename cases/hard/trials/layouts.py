@@ -15,16 +15,16 @@ from reflowshock.materials.roles import ELASTIC
 SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
 
 
-def layout(given: Layout) -> dict[str, float]:
+def layout(parameters: Layout) -> dict[str, float]:
     """Return the growth of a window, and what tie and interface do to fields, forces and masses.
 
     Raises:
         CouplingError: The layout cannot be divided in this way.
     """
-    models = models_of(LAYOUTS[given.layout](), ELASTIC, Coupling(scheme=given.scheme), FRACTION)
+    models = models_of(LAYOUTS[parameters.layout](), ELASTIC, Coupling(scheme=parameters.scheme), FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))
-    found = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
-    return found | through(models)
+    measures = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
+    return measures | through(models)
 
 
 def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = LAYER) -> MeshData:

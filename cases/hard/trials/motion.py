@@ -36,7 +36,7 @@ LOOK = 50  # steps between two looks at the energies: what doubles in each is th
 BALANCE = 0.02  # of the energy balance, the program's default
 
 
-def flight(given: Flight) -> dict[str, float]:
+def flight(parameters: Flight) -> dict[str, float]:
     """Fly; return the error of the energies and momenta, and the step of the assembled body over that of its elements.
 
     Energies are judged as in a run; momenta are over those of all nodes by magnitude.
@@ -44,47 +44,49 @@ def flight(given: Flight) -> dict[str, float]:
     Raises:
         EnergyError: The step is above the critical one, or energies do not balance.
     """
-    pieces, tables = pieces_of(given)
+    pieces, tables = pieces_of(parameters)
     target = float(pieces.steps[pieces.roles != "copper"].min())
-    factor = mass_factor(pieces, ("copper",) if given.mass_scaled else (), target)
+    factor = mass_factor(pieces, ("copper",) if parameters.mass_scaled else (), target)
     element = float((pieces.steps * np.sqrt(factor)).min())
     linear = make_body(MPI.COMM_SELF, pieces, tables, factor, None)
     assembled = highest_frequency(MPI.COMM_SELF, linear, linear.terms, linear.mass).critical_step
-    plain = element if given.critical_step == "element" else assembled
-    stiffness = given.stiffness_damping * plain
+    plain = element if parameters.critical_step == "element" else assembled
+    stiffness = parameters.stiffness_damping * plain
     critical = float(damped_critical_step(plain, stiffness))
-    step = given.step_fraction * critical
-    body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(given.kinematics, step))
+    step = parameters.step_fraction * critical
+    body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(parameters.kinematics, step))
     loads: list[Load] = []
-    if given.mass_damping or stiffness:
-        loads.append(RayleighDamping.build(body, given.mass_damping / step, stiffness))
+    if parameters.mass_damping or stiffness:
+        loads.append(RayleighDamping.build(body, parameters.mass_damping / step, stiffness))
     motion = explicit_motion(body, loads, step)
-    random_start(motion, given.seed)
-    found = watched(motion, given, EnergyBalance(limit=BALANCE, trivial=0.0, step=step, critical=critical))
-    return found | {"step_gain": assembled / element}
+    random_start(motion, parameters.seed)
+    errors = watched(motion, parameters, EnergyBalance(limit=BALANCE, trivial=0.0, step=step, critical=critical))
+    return errors | {"step_gain": assembled / element}
 
 
-def pieces_of(given: Flight) -> tuple[Pieces, Tables]:
+def pieces_of(parameters: Flight) -> tuple[Pieces, Tables]:
     """Return the elements of a trial on this rank, and what goes with them."""
-    item = prepare(mesh_of_flight(given), "dns")["dns"]
-    soft = laminate(given.poisson_ratio, given.orthotropy, YOUNG / given.contrast)
-    materials = Materials(board=laminate(given.poisson_ratio, given.orthotropy), substrate=soft, copper=COPPER)
-    formulation = given.element if given.element == "one_point" else "incompatible_modes"
+    item = prepare(mesh_of_flight(parameters), "dns")["dns"]
+    soft = laminate(parameters.poisson_ratio, parameters.orthotropy, YOUNG / parameters.contrast)
+    materials = Materials(
+        board=laminate(parameters.poisson_ratio, parameters.orthotropy), substrate=soft, copper=COPPER
+    )
+    formulation = parameters.element if parameters.element == "one_point" else "incompatible_modes"
     local = distribute(MPI.COMM_SELF, item.mesh)
     return make_pieces(local, item.tables, materials, formulation), item.tables
 
 
-def mesh_of_flight(given: Flight) -> MeshData:
+def mesh_of_flight(parameters: Flight) -> MeshData:
     """Return the body: its parts from below are board, perhaps copper, and substrate."""
-    flat = np.linspace(0.0, HEIGHT * given.aspect * given.cells, given.cells + 1)
-    low = np.linspace(0.0, HEIGHT * given.cells, given.cells + 1)
-    half = HEIGHT * (given.cells // 2)
-    lines = (flat, flat, np.unique(np.concatenate([low[low <= half], low[low >= half] + given.foil])))
-    points, cells = distorted(given.element, lines, given.quality, given.seed)
+    flat = np.linspace(0.0, HEIGHT * parameters.aspect * parameters.cells, parameters.cells + 1)
+    low = np.linspace(0.0, HEIGHT * parameters.cells, parameters.cells + 1)
+    half = HEIGHT * (parameters.cells // 2)
+    lines = (flat, flat, np.unique(np.concatenate([low[low <= half], low[low >= half] + parameters.foil])))
+    points, cells = distorted(parameters.element, lines, parameters.quality, parameters.seed)
     of_box = 1 if cells.shape[1] == 8 else 6
     middles = 0.5 * (lines[2][1:] + lines[2][:-1])
-    names = np.where(middles < half, "board", np.where(middles < half + given.foil, "copper_board", "substrate"))
-    return mesh_of(points, cells, np.repeat(names, given.cells**2 * of_box), {})
+    names = np.where(middles < half, "board", np.where(middles < half + parameters.foil, "copper_board", "substrate"))
+    return mesh_of(points, cells, np.repeat(names, parameters.cells**2 * of_box), {})
 
 
 def random_start(motion: ExplicitMotion, seed: int) -> None:
@@ -95,18 +97,18 @@ def random_start(motion: ExplicitMotion, seed: int) -> None:
     motion.velocity[:] = np.where(motion.mobility > 0.0, SPEED + scale * noise, 0.0)
 
 
-def watched(motion: ExplicitMotion, given: Flight, balance: EnergyBalance) -> dict[str, float]:
+def watched(motion: ExplicitMotion, parameters: Flight, balance: EnergyBalance) -> dict[str, float]:
     """Take the steps with looks at the energies; return errors; errors as ``flight``."""
-    steps = min(LOOK, given.steps)
-    looks = given.steps // steps
+    steps = min(LOOK, parameters.steps)
+    looks = parameters.steps // steps
     participant = SingleModel(motion, WindowPlan(steps * motion.step, steps, looks, 1))
     balance.judge(energy_sums(participant, 0.0), 0.0)
-    first, error = momentum(motion, given.kinematics == "finite"), np.zeros(2)
+    first, error = momentum(motion, parameters.kinematics == "finite"), np.zeros(2)
     scale = momentum_scale(motion)
     for _ in range(looks):
         participant.begin_window()
         balance.judge(energy_sums(participant, 0.0), motion.time)
-        change = np.abs(momentum(motion, given.kinematics == "finite") - first).reshape(2, 3).max(axis=1)
+        change = np.abs(momentum(motion, parameters.kinematics == "finite") - first).reshape(2, 3).max(axis=1)
         error = np.maximum(error, change / scale)
     return {
         "energy_error": balance.balance_error,
@@ -133,7 +135,7 @@ DIRECTION = np.array([0.6, 0.0, 0.8])
 AFTER = 5  # steps after the pulse
 
 
-def pulse(given: PulseTrial) -> dict[str, float]:
+def pulse(parameters: PulseTrial) -> dict[str, float]:
     """Return the error of speed and way after the pulse, and what the strains hold of what it gave.
 
     Raises:
@@ -141,23 +143,25 @@ def pulse(given: PulseTrial) -> dict[str, float]:
     """
     body, critical = dns_body(block())
     step = FRACTION * critical
-    duration = given.steps * step
+    duration = parameters.steps * step
     check_pulses([duration], step, FRACTION)
-    course = course_of(given, duration)
+    course = course_of(parameters, duration)
     motion = motion_of(body, step, [BodyAcceleration(DIRECTION, course)])
-    for _ in range(int(np.ceil(given.steps)) + AFTER):
+    for _ in range(int(np.ceil(parameters.steps)) + AFTER):
         motion.advance()
         motion.update_force()
     speed, way = motion.present_velocity() @ DIRECTION, motion.displacement @ DIRECTION
     exact = np.array([course.integral(motion.time), course.double_integral(motion.time)])
     scale = np.where(exact > 0.0, exact, 1.0)
-    errors = [np.abs(found - value).max() for found, value in zip((speed, way), exact, strict=True)] / scale
-    given_energy = max(float(motion.external_work), float(np.finfo(float).tiny))
+    errors = [
+        np.abs(value_at_end - value).max() for value_at_end, value in zip((speed, way), exact, strict=True)
+    ] / scale
+    received_energy = max(float(motion.external_work), float(np.finfo(float).tiny))
     return {
         "velocity_error": float(errors[0]),
         "displacement_error": float(errors[1]),
-        "strain_energy": motion.internal_energy().total / given_energy,
-        "energy_error": motion.kinetic_energy() / given_energy - 1.0 if given.peak else 0.0,
+        "strain_energy": motion.internal_energy().total / received_energy,
+        "energy_error": motion.kinetic_energy() / received_energy - 1.0 if parameters.peak else 0.0,
     }
 
 
@@ -167,25 +171,25 @@ def block() -> MeshData:
     return mesh_of(*grid(line, line, line), "board", {})
 
 
-def course_of(given: PulseTrial, duration: float) -> Pulse:
+def course_of(parameters: PulseTrial, duration: float) -> Pulse:
     """Return the pulse of a duration [s]."""
-    if given.pulse == "triangle":
-        return Tabulated(np.array([0.0, 0.5, 1.0]) * duration, np.array([0.0, given.peak, 0.0]))
-    if given.pulse == "constant":
-        return Constant(given.peak, duration)
-    return (HalfSine if given.pulse == "half_sine" else Haversine)(given.peak, duration)
+    if parameters.pulse == "triangle":
+        return Tabulated(np.array([0.0, 0.5, 1.0]) * duration, np.array([0.0, parameters.peak, 0.0]))
+    if parameters.pulse == "constant":
+        return Constant(parameters.peak, duration)
+    return (HalfSine if parameters.pulse == "half_sine" else Haversine)(parameters.peak, duration)
 
 
-def impact(given: Impact) -> dict[str, float]:
+def impact(parameters: Impact) -> dict[str, float]:
     """Return the largest imbalance of energy, what plastic flow has taken, and whether it ever gave any back."""
 
     def skew(points: np.ndarray) -> np.ndarray:
-        return points + np.outer(points[:, 1], [0.0, 0.0, given.skew])
+        return points + np.outer(points[:, 1], [0.0, 0.0, parameters.skew])
 
     mesh = rod(6e-3, 1e-3, (18, 3), skew)
-    body, motion = explicit(mesh, SOLDER, given.kinematics, given.element, given.step_fraction)
-    motion.velocity[:, 0] = np.where(body.free[:, 0], -given.speed, 0.0)
-    energies = energies_of(motion, given.steps)
+    body, motion = explicit(mesh, SOLDER, parameters.kinematics, parameters.element, parameters.step_fraction)
+    motion.velocity[:, 0] = np.where(body.free[:, 0], -parameters.speed, 0.0)
+    energies = energies_of(motion, parameters.steps)
     first = energies[0].sum()
     return {
         "energy_error": imbalance(energies),

@@ -73,8 +73,8 @@ class Pair:
     def materials(self) -> Materials:
         """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
         trial = Materials(board=self.board, solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
-        _, found, _ = surveyed(self.mesh(), trial)
-        board, block = (found.step[found.role == role].min() for role in ("board", "solder"))
+        _, survey_of_mesh, _ = surveyed(self.mesh(), trial)
+        board, block = (survey_of_mesh.step[survey_of_mesh.role == role].min() for role in ("board", "solder"))
         slowness = 1e-3 * board / block / (self.substeps - 0.02)
         product = self.impedance * (self.board.density * self.board.young_modulus_out_of_plane) ** 0.5
         return Materials(

@@ -134,21 +134,21 @@ def rest(parameters: RestTrial) -> dict[str, Measured]:
     flow, run = flow_to_rest(parameters.drop, solder)
     if not run.at_rest:
         raise ArithmeticError(f"not at rest after {flow.steps} steps")
-    before, place, energy = flow.profile(), _centre(flow), run.records[-1].energy
+    before, start_centre, energy = flow.profile(), _centre(flow), run.records[-1].energy
     records = [flow.step() for _ in range(parameters.steps)]
     after, late = flow.profile(), records[len(records) // 2 :]
     imbalance = body_metrics(solder, None, flow, run)["energy_imbalance"]
-    found = {
+    measures = {
         "volume_drift": flow.body.cloud.parts * flow.body.volume()[0] / solder.volume - 1.0,
         "height_drift": after.drop_height(1) / before.drop_height(1) - 1.0,
         "width_drift": after.max_width / before.max_width - 1.0,
-        "place_drift": float(np.linalg.norm(_centre(flow) - place)) / solder.volume ** (1.0 / 3.0),
+        "place_drift": float(np.linalg.norm(_centre(flow) - start_centre)) / solder.volume ** (1.0 / 3.0),
         "energy_drift": records[-1].energy / energy - 1.0,
         "energy_imbalance": imbalance[0],
         "late_capillary_number": max(record.speed for record in late) * solder.viscosity / solder.surface_tension,
         "particles_lost": particles_lost(flow.body),
     }
-    return {name: Measured(float(value)) for name, value in found.items()}
+    return {name: Measured(float(value)) for name, value in measures.items()}
 
 
 def _centre(flow: "LiquidFlow") -> np.ndarray:
@@ -181,9 +181,9 @@ def pair(parameters: PairTrial) -> dict[str, Measured]:
     solder = parameters.molten(parameters.drops)
     _refuse(pair_problems(parameters.drops, solder))
     shape = pair_to_rest(parameters.drops, solder).shape
-    wanted = "merged" if parameters.drops.merge else "apart"
-    if shape.verdict != wanted:
-        raise ArithmeticError(f"the drops are {shape.verdict}, must be {wanted}")
+    expected_verdict = "merged" if parameters.drops.merge else "apart"
+    if shape.verdict != expected_verdict:
+        raise ArithmeticError(f"the drops are {shape.verdict}, must be {expected_verdict}")
     aside = np.linalg.norm(centre_of_volume(shape.surface_points, shape.triangles)[:2])
     return parameters.measured(shape) | {"place_error": Measured(float(aside) / solder.volume ** (1.0 / 3.0))}
 
@@ -196,15 +196,17 @@ def swing(parameters: SwingTrial) -> dict[str, Measured]:
     scene = parameters.oscillation
     solder = scene.resolve(parameters.solder)
     _refuse(oscillation_problems(scene, solder))
-    found = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period)
-    energy, mass = found.history["energy"], solder.density * solder.volume
-    fastest = np.sqrt(2.0 * found.history["kinetic_energy"].max() / mass)
-    own = {
-        "swings_error": Measured(_swings(found.history["amplitude"]) / scene.periods - 1.0),
-        "momentum": Measured(float(found.history["momentum"].max() / (mass * fastest))),
+    solution = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period)
+    energy, mass = solution.history["energy"], solder.density * solder.volume
+    fastest = np.sqrt(2.0 * solution.history["kinetic_energy"].max() / mass)
+    measures = {
+        "swings_error": Measured(_swings(solution.history["amplitude"]) / scene.periods - 1.0),
+        "momentum": Measured(float(solution.history["momentum"].max() / (mass * fastest))),
         **_energy(energy),
     }
-    return {name: Measured(*found.metrics[name]) for name in MEASURES_OF_SWING if name in found.metrics} | own
+    return {
+        name: Measured(*solution.metrics[name]) for name in MEASURES_OF_SWING if name in solution.metrics
+    } | measures
 
 
 def _swings(amplitude: np.ndarray) -> float:

@@ -157,8 +157,8 @@ def test_a_part_smaller_than_its_particles_flies_on_without_a_surface():
 def test_what_is_outside_is_found_by_the_nearest_vertex():
     surface = droplet(Droplet(**INK, numerics=COARSE)).surface
     places = np.array([[0.0, 0.0, 0.0], [0.45, 0.0, 0.0], [0.0, 0.55, 0.0], [0.0, 0.0, -0.7], [3.0, 0.0, 0.0]])
-    found = are_outside(places, surface.points, surface.triangles, surface.mesh.normals(), 0.1)
-    assert found.tolist() == [False, False, False, True, True]
+    outside = are_outside(places, surface.points, surface.triangles, surface.mesh.normals(), 0.1)
+    assert outside.tolist() == [False, False, False, True, True]
 
 
 def test_a_vertex_without_particles_follows_the_nearest_one():

@@ -228,14 +228,14 @@ def test_a_drop_that_does_not_wet_its_wall_rebounds():
         ((0.0, 0.9), 1, 2, "stays on the wall, sheds satellites"),
     ],
 )
-def test_what_became_of_a_drop_is_told_in_words(foot, parts, shed, words):
+def test_outcome_of_an_impact_in_words(foot, parts, shed, words):
     history = {"foot": np.array(foot), "parts": np.array([1.0, parts]), "shed": np.array([0.0, shed])}
     assert outcome(history) == words
 
 
-def test_what_strikes_fast_is_told_how_wide_such_drops_spread():
-    told = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
-    assert told == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by that of computed ones"
+def test_fast_impacts_report_the_expected_spread():
+    spread = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
+    assert spread == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by a correlation of computed drops"
     assert "spread_expected" not in solve_droplet(drop(weber=8.0, reynolds=7.7, duration=1e-4)).words
 
 
@@ -266,14 +266,14 @@ def test_friction_takes_less_than_the_velocity_of_a_contact_line_in_a_step(acros
 
 
 def test_threads_change_no_droplet(every_thread):
-    found = []
+    results = []
     for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation = droplet(drop(speed=3.0))
         for _ in range(15):
             simulation.step(simulation.time_step())
-        found.append(np.array(simulation.fields[:8]))
-    assert np.array_equal(*found)
+        results.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*results)
 
 
 def test_a_droplet_continues_to_the_same_bits(tmp_path):
@@ -301,8 +301,8 @@ def test_a_droplet_continues_to_the_same_bits(tmp_path):
 
 def test_effects_of_a_droplet_follow_from_its_numbers():
     small = drop(diameter=1e-4, density=1e3, surface_tension=0.07, viscosity=1e-3, contact_angle=1.0)
-    told = decide_flow(small)
-    assert not told["droplet_gravity"]["on"] and told["droplet_tension"]["on"]
+    decisions = decide_flow(small)
+    assert not decisions["droplet_gravity"]["on"] and decisions["droplet_tension"]["on"]
     large = small.model_copy(update={"diameter": 2e-3})
     assert decide_flow(large)["droplet_gravity"]["on"]
     assert not decide_flow(large.model_copy(update={"contact_angle": None}))["droplet_gravity"]["on"]

@@ -26,17 +26,17 @@ def two_drops(viscosity=0.5, **changes):
     """Two drops that fly at each other along x, or come down on a wall beside each other."""
     numerics = DropletNumerics(particles_per_diameter=8)
     scene = Droplet(**INK | {"viscosity": viscosity, "numerics": numerics} | changes)
-    one = droplet(scene)
-    points, aside = np.array(one.fields[:3]), np.array([0.5 + 0.5 * EDGE * one.law.spacing, 0.0, 0.0])
+    drop = droplet(scene)
+    points, aside = np.array(drop.fields[:3]), np.array([0.5 + 0.5 * EDGE * drop.law.spacing, 0.0, 0.0])
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = 0.3 * np.sign(-both[0])
     fields.w[:] = -scene.impact_speed
-    surface = one.surface
+    surface = drop.surface
     corners, triangles = surface.points.copy(), surface.triangles.copy()
     surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
-    return Simulation(fields, both.shape[1], one.law, surface), 2.0 * scene.volume
+    return Simulation(fields, both.shape[1], drop.law, surface), 2.0 * scene.volume
 
 
 def go(simulation, until):
@@ -97,23 +97,23 @@ def test_drops_that_have_merged_end_with_the_pressure_of_one_sphere():
 def test_drops_beside_each_other_on_a_wall_become_one():
     simulation, volume = two_drops(viscosity=0.2, speed=1.0, contact_angle=np.pi / 3.0)
     surface = go(simulation, 0.3).surface
-    assert any((one.before, one.after) == (2, 1) for one in surface.topology_changes)
+    assert any((meeting.before, meeting.after) == (2, 1) for meeting in surface.topology_changes)
     assert len(surface.mesh.rings) == 1
     assert surface.volume == pytest.approx(volume, rel=0.01)
 
 
 def test_threads_and_a_restart_change_no_merging(every_thread):
-    found = []
+    results = []
     for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation, _ = two_drops()
         go(simulation, 0.08)
-        found.append(np.concatenate((np.array(simulation.fields[:8]).ravel(), simulation.surface.points.ravel())))
+        results.append(np.concatenate((np.array(simulation.fields[:8]).ravel(), simulation.surface.points.ravel())))
     simulation, _ = two_drops()
     saved = go(simulation, 0.05).saved()
     again, _ = two_drops()
     again.restore(saved)
     go(again, 0.08)
     assert again.surface.topology_changes and isinstance(again.surface.topology_changes[0], TopologyChange)
-    found.append(np.concatenate((np.array(again.fields[:8]).ravel(), again.surface.points.ravel())))
-    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
+    results.append(np.concatenate((np.array(again.fields[:8]).ravel(), again.surface.points.ravel())))
+    assert np.array_equal(results[0], results[1]) and np.array_equal(results[0], results[2])

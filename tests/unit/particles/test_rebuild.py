@@ -98,8 +98,8 @@ def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
     distance = np.abs(nodes).sum(axis=-1) - 1.0
     clear = distance != 0.0
     for order in permutations(range(6)):
-        place = np.array(order, np.int32)
-        surface = corners[place], np.argsort(place).astype(np.int32)[sides]
+        permutation = np.array(order, np.int32)
+        surface = corners[permutation], np.argsort(permutation).astype(np.int32)[sides]
         assert np.array_equal(winding_numbers_on(grid, *surface)[clear], (distance < 0.0)[clear])
         assert np.array_equal(depths(nodes[clear], *surface) > 0.0, distance[clear] < 0.0)
 

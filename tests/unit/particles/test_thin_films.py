@@ -90,10 +90,10 @@ def test_vertices_that_particles_pass_or_leave_behind_follow_them():
     assert not coupling.distances_to_cover(surface.points, normals, simulation.fields).any()
     for shift, sign in ((-0.8, 1.0), (1.8, -1.0)):
         moved = surface.points + shift * spacing * normals
-        distances = coupling.distances_to_cover(moved, normals, simulation.fields)
-        assert (sign * distances >= 0.0).all() and (distances != 0.0).mean() > 0.3
+        stray = coupling.distances_to_cover(moved, normals, simulation.fields)
+        assert (sign * stray >= 0.0).all() and (stray != 0.0).mean() > 0.3
         depth = (
-            np.linalg.norm(moved + distances[:, None] * normals, axis=1)
+            np.linalg.norm(moved + stray[:, None] * normals, axis=1)
             - np.linalg.norm(np.array(simulation.fields[:3]), axis=0).max()
         )
         assert depth.min() > -spacing and depth.max() < 2.0 * spacing

@@ -158,7 +158,7 @@ def test_another_case_is_not_cleaned(call, tmp_path):
     with locked(tmp_path / "run", "run", "other"):
         pass
     code, _, errors = call("clean", str(CASE), "--out", str(tmp_path / "run"))
-    assert (code, "holds the run of other" in errors) == (2, True)
+    assert (code, "contains the run of other" in errors) == (2, True)
 
 
 def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):

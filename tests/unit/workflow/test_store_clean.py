@@ -91,7 +91,7 @@ def study(tmp_path):
 
 
 def test_a_study_is_cleaned_as_a_whole_with_force_only(study):
-    with pytest.raises(CaseError, match=r"holds the study of pads, not the run of small.*--force"):
+    with pytest.raises(CaseError, match=r"contains the study of pads, not the run of small.*--force"):
         clean(study.folder, "small")
     assert (study.folder / "results.csv").exists()
     clean(study.folder, "small", force=True)

@@ -241,7 +241,7 @@ def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
 
 @pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
 def test_another_case_needs_force(store, what, name):
-    with pytest.raises(CaseError, match=r"holds the run of small.*--force"), locked(store.folder, what, name):
+    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), locked(store.folder, what, name):
         pass
     with locked(store.folder, what, name, force=True):
         pass
@@ -283,7 +283,7 @@ def test_what_the_run_folder_lacks_is_told(store):
     told = not_as_put(store, store.folder)
     assert sorted(line.removeprefix(f"{store.folder}/") for line in told) == [
         "report.html is missing",
-        "summary.json is not as it was written",
+        "summary.json was modified",
     ]
     show_products(store, POINT)
     assert not_as_put(store, store.folder) == []

@@ -12,7 +12,7 @@ import reflowshock.fem
 SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # of what is measured
 
 
-class KeptRows:
+class StoredRows:
     """A file of JSON lines, a row each; rows of other sources or parameters stay there, but do not count."""
 
     def __init__(self, path: Path, parameters: object) -> None:
@@ -22,14 +22,14 @@ class KeptRows:
         whole = path.read_text(encoding="utf-8").rpartition("\n")[0] if path.exists() else ""
         path.write_text(f"{whole}\n" if whole else "", encoding="utf-8")
         rows = [json.loads(line) for line in whole.splitlines()]
-        self._rows = {row["name"]: row["found"] for row in rows if row["key"] == self._key}
+        self._rows = {row["name"]: row["value"] for row in rows if row["key"] == self._key}
 
-    def found(self, name: str, compute: Callable[[], Any]) -> Any:
+    def get(self, name: str, compute: Callable[[], Any]) -> Any:
         """Return what is kept under a name, or else compute it and keep it."""
         if name not in self._rows:
             self._rows[name] = compute()
             with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": self._key, "name": name, "found": self._rows[name]}) + "\n")
+                file.write(json.dumps({"key": self._key, "name": name, "value": self._rows[name]}) + "\n")
         return self._rows[name]
 
 
