@@ -71,7 +71,7 @@ def test_equal_angles_give_the_result_without_hysteresis():
     for simulation in (unbounded, bounded):
         for _ in range(20):
             simulation.step(1e-8)
-    assert bounded.surface.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
+    assert bounded.surface.capillarity.bounds == pytest.approx((np.cos(1.2), np.cos(1.2)))
     assert np.allclose(unbounded.surface.points, bounded.surface.points, rtol=0.0, atol=1e-12 * unbounded.law.spacing)
 
 

@@ -13,7 +13,7 @@ from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
 from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
-from reflowshock.particles.surface.contact_line import PINNED, HystereticLine, RubbingLine
+from reflowshock.particles.surface.contact_line import PINNED, FrictionLine, HystereticLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)
@@ -82,7 +82,7 @@ def release(half_sphere, receding, advancing, viscosity):
     """Release the half sphere on a wall with hysteresis; return flow, contact angle and radius of the cap."""
     points, solder = half_sphere.points.copy(), moving(viscosity)
     cloud = replace(half_sphere.cloud, points=points, triangles=half_sphere.triangles)
-    line = RubbingLine(0, np.radians(receding), np.radians(advancing), points[cloud.rings[0]])
+    line = FrictionLine(0, np.radians(receding), np.radians(advancing), points[cloud.rings[0]])
     flow = start_flow(cloud, solder, EFFECTS | {"viscosity": True, "inertia": True}, (line,))
     flow.body.pressure = half_sphere.pressure.copy()
     before = ring_area(points, cloud.rings[0])

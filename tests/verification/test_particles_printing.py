@@ -70,7 +70,7 @@ def test_liquid_that_spreads_on_cured_ink_stays_within_its_surface():
     while deposit.time < 0.5 * np.sqrt(scene.density * scene.length**3 / scene.surface_tension):
         deposit.step(1.0)
     deposit.update()
-    inside = depths(deposit.points[deposit.liquid], (deposit.surface.points, deposit.surface.triangles))
+    inside = depths(deposit.points[deposit.liquid], deposit.surface.points, deposit.surface.triangles)
     assert inside.min() > -0.2 * deposit.law.spacing  # before the surface had an image in cured ink: -0.7
 
 
