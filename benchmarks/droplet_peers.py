@@ -41,10 +41,10 @@ from reflowshock.particles.flows.dam_break import DamBreak
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.reference.impact_spread import laan, of_measured, pasandideh_fard, roisman, wildeman
-from reflowshock.particles.sph.surface_care import SurfaceLost
 from reflowshock.particles.sph_flows.dam_break import solve_dam_break
 from reflowshock.particles.sph_flows.droplet import solve_droplet
 from reflowshock.particles.steps.time_step import capillary_limit
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 mpl.use("Agg")
 NAME = "droplet_peers"

@@ -27,8 +27,9 @@ from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT
-from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.sph_flows.droplet import droplet
+from reflowshock.particles.surface.remeshing import EDGE
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 TRACKED = "tracked surface"
 MODELS = ("colour function", "pairwise", "free-surface pressure", TRACKED)
@@ -247,7 +248,7 @@ def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: 
         fields.u[:] = -speed * np.sign(both[0])
         return untracked(law, fields, scene, model, strength)
     corners, triangles = surface.points.copy(), surface.triangles.copy()
-    surface.points = corners - aside
+    surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
     fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = -speed * np.sign(both[0])

@@ -140,7 +140,7 @@ def mesh_array(
     meshes = {"": fine}
     if coarse:
         meshes["coarse_"] = [
-            mesh_coarse_or_fine(surface, mesh, (package, site), side)
+            mesh_coarse_or_fine(surface, mesh, site, package, side)
             for (surface, site), mesh in zip(bodies, fine, strict=True)
         ]
     return meshes

@@ -43,9 +43,9 @@ def assert_same_force(elements: Elements) -> CongruentElements:
 @pytest.mark.parametrize("formulation", ["incompatible_modes", "one_point"])
 def test_grids_with_two_materials_and_holes(counts, formulation):
     points, cells = grid(*(np.cumsum([0.0, *np.linspace(1, 3, count)]) * 1e-3 for count in counts))
-    kept = np.random.default_rng(0).uniform(size=len(cells)) < 0.8
-    kept[0] = True
-    assert_same_force(elements_of(points, cells[kept], formulation))
+    is_solid = np.random.default_rng(0).uniform(size=len(cells)) < 0.8
+    is_solid[0] = True
+    assert_same_force(elements_of(points, cells[is_solid], formulation))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -91,6 +91,6 @@ def test_what_is_past_the_end_of_a_line_does_not_matter():
 
 def test_positions_of_a_line_follow_each_other():
     points, cells = grid(np.arange(5.0), np.arange(3.0), np.arange(2.0))
-    found = BoxRows.find(points, cells, np.zeros(len(cells), np.int32))
-    assert len(found.nodes) == len(points)
-    assert found.rows.tolist() == [[0, 5, 15, 20, 4, 0], [5, 10, 20, 25, 4, 0]]
+    rows = BoxRows.find(points, cells, np.zeros(len(cells), np.int32))
+    assert len(rows.nodes) == len(points)
+    assert rows.rows.tolist() == [[0, 5, 15, 20, 4, 0], [5, 10, 20, 25, 4, 0]]

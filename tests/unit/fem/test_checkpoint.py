@@ -57,11 +57,11 @@ def warnings(said: str) -> list[str]:
 def test_a_state_comes_back_as_it_was(tmp_path):
     written(tmp_path)
     files = checkpoints(tmp_path)
-    found = files.read(state(0))
+    restored = files.read(state(0))
     assert files.continued == 5
-    assert found["history"]["balance"] == {"limit": 0.01}
-    assert (found["macro"]["displacement"] == 5.0).all()
-    assert found["macro"]["work"] == 0.5
+    assert restored["history"]["balance"] == {"limit": 0.01}
+    assert (restored["macro"]["displacement"] == 5.0).all()
+    assert restored["macro"]["work"] == 0.5
     assert files.stored("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
 
 
@@ -72,8 +72,8 @@ def test_the_older_generation_is_taken_where_a_file_is_broken_or_forged(tmp_path
     written(folder)
     damage_files(folder, pattern, damage, marker)
     files = checkpoints(folder)
-    found = files.read(state(0))
-    assert (found["macro"]["displacement"] == 3.0).all()
+    restored = files.read(state(0))
+    assert (restored["macro"]["displacement"] == 3.0).all()
     assert files.continued == 3
     (warning,) = warnings(capsys.readouterr().out)
     assert re.search("state-0000-1|macro-5-0000", warning)

@@ -47,8 +47,10 @@ def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interfa
     motion = ExplicitMotion(body, loads, STEP, rows, np.zeros(len(body.mass)))
     random = np.random.default_rng(3)
     motion.velocity[:] = random.uniform(-speed, speed, motion.velocity.shape)
-    given, change = motion.velocity[rows], random.uniform(-1.0, 1.0, (STEPS, 3))
-    return motion, Interface(rows, rows[::2].copy(), given, change, random.random((STEPS + 1, 2)), np.zeros((2, 6, 3)))
+    velocity, change = motion.velocity[rows], random.uniform(-1.0, 1.0, (STEPS, 3))
+    return motion, Interface(
+        rows, rows[::2].copy(), velocity, change, random.random((STEPS + 1, 2)), np.zeros((2, 6, 3))
+    )
 
 
 @pytest.mark.parametrize("pace", [1, 3])
@@ -78,8 +80,8 @@ def test_compiled_steps_are_those_one_by_one(name, pace):
             )
         )
     (motion, first), (other, second) = ended
-    for one, two in zip(first, second, strict=True):
-        assert np.abs(one - two).max() <= 1e-13 * np.abs(two).max()
+    for left, right in zip(first, second, strict=True):
+        assert np.abs(left - right).max() <= 1e-13 * np.abs(right).max()
     assert motion.time == other.time
     assert motion.external_work == pytest.approx(other.external_work, rel=1e-12)
     assert motion.internal_energy().plastic > 0.0
@@ -94,13 +96,13 @@ def test_nodes_that_move_most_often_come_first():
 
 
 def test_inverted_elements_are_told_alike():
-    told = []
+    errors = []
     for take in (ExplicitMotion.take_steps, ExplicitMotion._take_single_steps):
         motion, interface = moving(body_of(*SETTINGS["turning"][:2]), speed=2e4)
         with pytest.raises(InvertedElementError) as error:
             take(motion, STEPS, interface)
-        told.append((str(error.value), motion.time))
-    assert told[0] == told[1]
+        errors.append((str(error.value), motion.time))
+    assert errors[0] == errors[1]
 
 
 def test_what_acts_between_steps_is_no_matter_of_one_call():

@@ -31,10 +31,10 @@ def boxes(counts: tuple[int, int, int], formulation: str = "incompatible_modes",
     """Return boxes of different sizes and two materials, some of them left out."""
     points, cells = grid(*(np.cumsum([0.0, *np.linspace(1, 3, count)]) * 1e-4 for count in counts))
     random = np.random.default_rng(len(cells))
-    kept = random.uniform(size=len(cells)) < share
-    kept[0] = True
-    material = random.integers(0, 2, kept.sum()).astype(np.int32)
-    return Elements(points, cells[kept], material, MATERIALS, np.ones(kept.sum()), element_kind(8, formulation))
+    is_solid = random.uniform(size=len(cells)) < share
+    is_solid[0] = True
+    material = random.integers(0, 2, is_solid.sum()).astype(np.int32)
+    return Elements(points, cells[is_solid], material, MATERIALS, np.ones(is_solid.sum()), element_kind(8, formulation))
 
 
 @pytest.fixture(params=[CorotationalBoxes, CorotationalBlocks, CorotationalHexahedra], ids=["rows", "blocks", "any"])

@@ -42,18 +42,18 @@ def rigid_fields(corners: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_exactly_six_modes_have_no_energy(kind):
     corners = corners_of(kind)
-    for stiffness, place in zip(kind.stiffness(corners, ELASTICITY, MATERIAL), corners, strict=True):
+    for stiffness, vertices in zip(kind.stiffness(corners, ELASTICITY, MATERIAL), corners, strict=True):
         values = np.linalg.eigvalsh(stiffness)
         assert np.abs(values[:6]).max() < 1e-13 * values[-1]
         assert values[6] > 1e-4 * values[-1]
-        assert np.abs(rigid_fields(place) @ stiffness).max() < 1e-13 * values[-1]
+        assert np.abs(rigid_fields(vertices) @ stiffness).max() < 1e-13 * values[-1]
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_mean_gradient_gives_the_average_strain(kind):
     corners, linear = corners_of(kind), RANDOM.uniform(-1, 1, (3, 3))
-    found = np.einsum("eai,ead->eid", corners @ linear.T, kind.geometry(corners).gradient)
-    assert np.allclose(found, linear, atol=1e-13)
+    gradients = np.einsum("eai,ead->eid", corners @ linear.T, kind.geometry(corners).gradient)
+    assert np.allclose(gradients, linear, atol=1e-13)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

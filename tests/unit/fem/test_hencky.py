@@ -118,9 +118,9 @@ def test_tetrahedra_are_refused():
         HenckyElements.build(elements, [FR4], np.zeros((1, 3)))
 
 
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_residual_that_is_no_number_is_not_small(place):
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_residual_that_is_no_number_is_not_small(index):
     values = np.array([1.0, -2.0, 0.5])
     assert largest_of(values) == 2.0
-    values[place] = np.nan
+    values[index] = np.nan
     assert np.isnan(largest_of(values))

@@ -79,10 +79,10 @@ def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
     load = np.sin(np.arange(free.size)).reshape(-1, 3) * body.free
     carried = levels.carry(load, np.zeros(3))
     assert np.abs(carried).max() > 0.1 * np.abs(load).max()
-    place = np.zeros_like(load)
-    place[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
-    residual = (total_force(model, place) + load + carried)[body.free]
-    assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, place)).max()
+    displacement = np.zeros_like(load)
+    displacement[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
+    residual = (total_force(model, displacement) + load + carried)[body.free]
+    assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, displacement)).max()
     scale = np.abs(carried).sum()
     assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * scale
 
@@ -138,10 +138,10 @@ def test_hourglass_energy_is_told_apart():
     body.tie.spread(displacement)
     elements = body.elements.subset(model.level > 0)
     exact = sum((term.energy(displacement) for term in linear_terms(elements)), Energy())
-    found = SubsteppedElements.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
+    terms = SubsteppedElements.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
     assert exact.hourglass > 0.01 * exact.strain
-    assert found.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
-    assert found.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)
+    assert terms.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
+    assert terms.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)
 
 
 def test_levels_need_linear_elastic_elements():

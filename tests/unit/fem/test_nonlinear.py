@@ -99,12 +99,12 @@ def carried(twin: PointTwin, amplitude: np.ndarray, resistance: np.ndarray, volu
     return min(1.0, np.sqrt(0.75) * max(0.05, 1 - (mises / strength) ** 2) * strength / stress)
 
 
-def slope(energy: Callable[[np.ndarray], float], place: np.ndarray) -> np.ndarray:
+def slope(energy: Callable[[np.ndarray], float], displacement: np.ndarray) -> np.ndarray:
     """Return the derivative of an energy by differences of order four."""
-    result, size = np.empty(place.shape), 1e-4
-    for k in range(place.size):
-        move = size * np.eye(place.size)[k].reshape(place.shape)
-        near, far = (energy(place + s * move) - energy(place - s * move) for s in (1, 2))
+    result, size = np.empty(displacement.shape), 1e-4
+    for k in range(displacement.size):
+        move = size * np.eye(displacement.size)[k].reshape(displacement.shape)
+        near, far = (energy(displacement + s * move) - energy(displacement - s * move) for s in (1, 2))
         result.flat[k] = (8 * near - far) / (12 * size)
     return result
 
@@ -195,10 +195,10 @@ def test_parts_of_one_material_share_blocks(name):
     elements = distorted(name, SOLDER)
     parts = np.arange(len(elements.cells), dtype=np.int32) % 3
     of_parts = replace(elements, material=parts, elasticity=np.repeat(elements.elasticity, 3, axis=0))
-    one = nonlinear(elements, SOLDER, True)
+    merged = nonlinear(elements, SOLDER, True)
     (many,) = force_terms(of_parts, [SOLDER, SOLDER.model_copy(), SOLDER], "finite")
-    assert len(many.lanes.filled) == len(one.lanes.filled)
+    assert len(many.lanes.filled) == len(merged.lanes.filled)
     displacement = 2e-3 * np.random.default_rng(2).uniform(-1, 1, elements.points.shape)
-    assert np.array_equal(force_of(many, displacement), force_of(one, displacement))
-    assert many.energy(displacement) == one.energy(displacement)
+    assert np.array_equal(force_of(many, displacement), force_of(merged, displacement))
+    assert many.energy(displacement) == merged.energy(displacement)
     assert many.energy(displacement).plastic > 0.0

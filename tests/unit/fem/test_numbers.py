@@ -169,8 +169,8 @@ def write_history(path: Path, scale: float, joints: tuple[str, ...] = ("A1", "A2
 
 def test_comparison_is_relative_to_the_dns(tmp_path):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
-    found = compare_histories(ours, reference)
-    assert found["critical_joint"] == "A2"
+    comparison = compare_histories(ours, reference)
+    assert comparison["critical_joint"] == "A2"
     for name in (
         "critical_joint_stress",
         "critical_joint_peel",
@@ -178,16 +178,16 @@ def test_comparison_is_relative_to_the_dns(tmp_path):
         "board_displacement",
         "worst_joint_stress",
     ):
-        assert found[f"{name}_error"] == pytest.approx(0.1)
+        assert comparison[f"{name}_error"] == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(("fine", "coarse", "worst"), [(("A2",), 0.0, 0.1), (("A1",), 1.0, 0.1)])
 def test_comparison_says_whether_the_critical_joint_is_fine(tmp_path, fine, coarse, worst):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
-    found = compare_histories(ours, reference, fine)
-    assert found["critical_joint"] == "A2"
-    assert found["critical_joint_coarse"] == coarse
-    assert found["worst_joint_stress_error"] == pytest.approx(worst)
+    comparison = compare_histories(ours, reference, fine)
+    assert comparison["critical_joint"] == "A2"
+    assert comparison["critical_joint_coarse"] == coarse
+    assert comparison["worst_joint_stress_error"] == pytest.approx(worst)
 
 
 def test_comparison_of_different_joints_is_an_error(tmp_path):

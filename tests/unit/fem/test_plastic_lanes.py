@@ -39,8 +39,8 @@ def test_lanes_return_as_one_point_does(sensitivity, exponent, step):
         before = stress.copy()
         grown = np.array([plastic_increment(*of, np.array(law[:6]), step) for of in zip(trial, strain, strict=True)])
         assert plastic_flow(w, state, 1, law) == (grown.max() > 0.0)
-        found = state[1, PLASTIC : PLASTIC + LANES] - strain
-        assert np.abs(found - grown).max() <= 1e-9 * grown.max() + 1e-15 * strain.max()
+        increments = state[1, PLASTIC : PLASTIC + LANES] - strain
+        assert np.abs(increments - grown).max() <= 1e-9 * grown.max() + 1e-15 * strain.max()
         assert np.allclose(von_mises(stress.T), trial - STIFFNESS * grown, rtol=1e-9, atol=1e-9 * trial.max())
         assert np.allclose(stress[:3].sum(axis=0), before[:3].sum(axis=0), rtol=1e-9, atol=1e-9 * trial.max())
         assert np.array_equal(stress[:, grown == 0.0], before[:, grown == 0.0])

@@ -37,12 +37,12 @@ def box_file(path, element="hexahedron", symmetry=()):
     return path
 
 
-@pytest.mark.parametrize("place", [INSIDE, (0.0, 0.0, 0.5e-3), (-4.9e-3, 1.1e-3, 0.9e-3)])
-def test_shares_of_bent_hexahedra_have_resultant_and_moment_of_the_force(place):
+@pytest.mark.parametrize("point", [INSIDE, (0.0, 0.0, 0.5e-3), (-4.9e-3, 1.1e-3, 0.9e-3)])
+def test_shares_of_bent_hexahedra_have_resultant_and_moment_of_the_force(point):
     mesh = bent(strip_mesh())
-    nodes, shares = point_shares(mesh, "at", place)
+    nodes, shares = point_shares(mesh, "at", point)
     assert shares.sum() == pytest.approx(1.0, rel=1e-14)
-    assert shares @ mesh.points[nodes] == pytest.approx(np.array(place), abs=1e-15)
+    assert shares @ mesh.points[nodes] == pytest.approx(np.array(point), abs=1e-15)
     assert shares.min() > -1e-6
 
 
@@ -58,9 +58,9 @@ def test_shares_of_tetrahedra(tmp_path, element):
 @pytest.mark.parametrize("end", [-1.0, 1.0])
 def test_a_node_bears_all_of_a_force_on_it(end):
     mesh = strip_mesh()
-    place = (0.5 * end * LENGTH, WIDTH / 6, THICKNESS)
-    nodes, shares = point_shares(mesh, "at", place)
-    assert mesh.points[nodes[np.argmax(shares)]] == pytest.approx(np.array(place))
+    point = (0.5 * end * LENGTH, WIDTH / 6, THICKNESS)
+    nodes, shares = point_shares(mesh, "at", point)
+    assert mesh.points[nodes[np.argmax(shares)]] == pytest.approx(np.array(point))
     assert np.sort(shares) == pytest.approx([0.0] * 7 + [1.0], abs=1e-12)
 
 
@@ -86,14 +86,14 @@ def test_load_has_resultant_and_moment_of_the_force(tmp_path):
     assert moment == pytest.approx(np.cross(INSIDE, [6.0, 0.0, -8.0]), rel=1e-12)
 
 
-@pytest.mark.parametrize("given", [{"peak": 2.0, "duration": 1e-4}, {"table": "force.csv"}])
-def test_course_is_a_half_sine_or_a_table(tmp_path, monkeypatch, given):
+@pytest.mark.parametrize("parameters", [{"peak": 2.0, "duration": 1e-4}, {"table": "force.csv"}])
+def test_course_is_a_half_sine_or_a_table(tmp_path, monkeypatch, parameters):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "force.csv").write_text("time [ms], force [kN]\n0,0\n0.05,2e-3\n0.1,0\n")
-    load = PointForce.model_validate({"at": INSIDE, "direction": [0.0, 0.0, 1.0]} | given)
+    load = PointForce.model_validate({"at": INSIDE, "direction": [0.0, 0.0, 1.0]} | parameters)
     pulse = pulse_of(load)
     assert pulse.value(5e-5) == pytest.approx(2.0)
-    assert pulse.integral(1.0) == pytest.approx(2e-4 * (0.5 if "table" in given else 2 / np.pi))
+    assert pulse.integral(1.0) == pytest.approx(2e-4 * (0.5 if "table" in parameters else 2 / np.pi))
 
 
 def tip_of(directory, symmetry, loads):

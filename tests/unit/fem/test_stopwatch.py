@@ -39,11 +39,11 @@ def test_waiting_is_told_from_work(monkeypatch):
     assert stopwatch.turns == {"macro": 8.0, "meso": 12.0}
     other = {"turns": {"macro": 20.0}, "sum_waiting": {"macro": 0.0}, "coupling_packing": 0.5, "coupling_waiting": 0.5}
     other["core_seconds"] = 15.0
-    found = stopwatch.summary(TwoRanks(other), 2)
-    assert found["ranks"][0]["coupling_packing"] == pytest.approx(2.0)
-    assert found["ranks"][0]["sum_packing"]["meso"] == pytest.approx(2.0)
-    assert found["window_seconds"] == pytest.approx(10.0)
-    assert found["window_core_seconds"] == pytest.approx((10.0 + 15.0) / 2)
-    assert found["busy_shares"] == pytest.approx([0.7, 0.975])
-    assert found["busy_share"] == pytest.approx(1.0 - 6.5 / 40.0)
-    assert found["coupling_overhead"] == pytest.approx(0.05)
+    summary = stopwatch.summary(TwoRanks(other), 2)
+    assert summary["ranks"][0]["coupling_packing"] == pytest.approx(2.0)
+    assert summary["ranks"][0]["sum_packing"]["meso"] == pytest.approx(2.0)
+    assert summary["window_seconds"] == pytest.approx(10.0)
+    assert summary["window_core_seconds"] == pytest.approx((10.0 + 15.0) / 2)
+    assert summary["busy_shares"] == pytest.approx([0.7, 0.975])
+    assert summary["busy_share"] == pytest.approx(1.0 - 6.5 / 40.0)
+    assert summary["coupling_overhead"] == pytest.approx(0.05)

@@ -136,9 +136,9 @@ def test_large_mass_gives_what_direct_input_gives(tmp_path):
     _, direct = run(tmp_path)
     _, large = run(tmp_path, loads={"drop": drop | {"method": "large_mass"}})
     assert direct["displacement@tip"][:, 2].min() < -10 * direct["displacement@tip"][:, 2].max()
-    found = solver_differences(large, direct)
-    assert found["displacement_difference"] < 5e-3
-    assert found["strain_difference"] < 5e-3
+    differences = solver_differences(large, direct)
+    assert differences["displacement_difference"] < 5e-3
+    assert differences["strain_difference"] < 5e-3
     speed = np.abs(direct["velocity@tip"]).max()
     assert np.abs(large["velocity@tip"] - direct["velocity@tip"]).max() < 5e-3 * speed
     peak = np.abs(direct["reaction@clamp"]).max()
@@ -162,9 +162,9 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
     assert result["health"]["energy_balance_error"]["value"] < 1e-10
     assert result["metrics"]["factor_entries"]["value"] > 0
     assert result["effects"]["strain_at_surface"]["on"]
-    found = solver_differences(explicit, implicit)
-    assert found["displacement_difference"] < 1e-3
-    assert found["strain_difference"] < 5e-3
+    differences = solver_differences(explicit, implicit)
+    assert differences["displacement_difference"] < 1e-3
+    assert differences["strain_difference"] < 5e-3
     reactions = explicit["reaction@clamp"], implicit["reaction@clamp"]
     assert np.linalg.norm(reactions[0] - reactions[1]) < 5e-3 * np.linalg.norm(reactions[1])
 

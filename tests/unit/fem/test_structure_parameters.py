@@ -45,8 +45,8 @@ def test_a_good_scene_has_no_problem_and_survives_its_json():
 
 
 def test_own_materials_go_before_those_of_the_library():
-    own = scene(materials={"FR4": TIN}, structure=layered("FR4"), supports={})
-    assert own.layer_materials["board"].density == 7400.0
+    overridden = scene(materials={"FR4": TIN}, structure=layered("FR4"), supports={})
+    assert overridden.layer_materials["board"].density == 7400.0
 
 
 @pytest.mark.parametrize(

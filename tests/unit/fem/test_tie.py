@@ -16,8 +16,8 @@ def test_projection_inverts_the_bilinear_map_of_a_warped_facet():
     corners = np.array([[[0.0, 0, 0], [2, 0.1, 0.2], [1.8, 1.2, 0], [0.1, 0.9, 0.1]]])
     xi = np.array([[0.3, -0.7]])
     values = 0.25 * (1 + xi[0, 0] * np.array([-1, 1, 1, -1])) * (1 + xi[0, 1] * np.array([-1, -1, 1, 1]))
-    found, distance = project(values @ corners, corners)
-    assert np.allclose(found, xi, atol=1e-12)
+    coordinates, distance = project(values @ corners, corners)
+    assert np.allclose(coordinates, xi, atol=1e-12)
     assert distance[0] < 1e-14
 
 

@@ -101,7 +101,7 @@ def test_levels_of_solder_divide_the_measuring_layer_and_grow_from_it():
 
 @pytest.mark.parametrize("layers", [4, 5, 6])
 def test_layers_that_cannot_grow_smoothly_are_refused(layers):
-    with pytest.raises(ValueError, match=f"{layers} layers, of which 2 in 2.5e-05 m at either pad, do not fill 0.0003"):
+    with pytest.raises(ValueError, match=f"{layers} layers, 2 of them in 2.5e-05 m at each pad, do not fill 0.0003"):
         layer_levels(300 * UM, JointNumerics(**(NUMERICS | {"layers": layers})))
 
 

@@ -81,10 +81,13 @@ def stirred(scene: str, device: str) -> Simulation:
 
 def found_of(simulation: Simulation) -> dict[str, np.ndarray]:
     """What is compared, in rows of equal size."""
-    found = {"fields": np.array(simulation.fields[:12]), "rates": simulation.rates}
+    result = {"fields": np.array(simulation.fields[:12]), "rates": simulation.rates}
     if simulation.surface:
-        found["surface"] = simulation.surface.points.T
-    return found | {"viscosity": simulation.fields.viscosity[None], "builds": np.array([[simulation.particles.builds]])}
+        result["surface"] = simulation.surface.points.T
+    return result | {
+        "viscosity": simulation.fields.viscosity[None],
+        "builds": np.array([[simulation.particles.builds]]),
+    }
 
 
 # The simulator takes minutes for the others, whose kernels are compiled for the channel as well.
@@ -100,10 +103,10 @@ def test_a_gpu_computes_what_threads_compute(scene, tmp_path):
     assert simulation.particles.builds > 1
     command = [sys.executable, "-c", PROGRAM, scene, str(tmp_path / "found.npz")]
     subprocess.run(command, env=os.environ | SIMULATED, cwd=ROOT, check=True, timeout=600)
-    with np.load(tmp_path / "found.npz") as found:
+    with np.load(tmp_path / "found.npz") as archive:
         for name, here in found_of(simulation).items():
             largest = np.abs(here).max(axis=1, keepdims=True, initial=0.0)
-            assert np.allclose(found[name], here, rtol=1e-9, atol=1e-9 * largest.max()), name
+            assert np.allclose(archive[name], here, rtol=1e-9, atol=1e-9 * largest.max()), name
 
 
 def test_without_a_gpu_a_case_that_asks_for_one_is_refused():

@@ -66,9 +66,9 @@ def test_smoothing_uses_up_the_energy_that_it_may_take_and_no_more():
     low = physics.energy(body)
     rise = smoothed(body, physics, np.inf, flips=False)[0] - low
     assert rise > 5e-5 * low
-    for given in (0.0, 0.3, 0.9):
-        energy, volume, flips = smoothed(body, physics, low + given * rise, flips=False)
-        assert given - 1.1e-4 * given - 1e-9 <= (energy - low) / rise <= given
+    for budget in (0.0, 0.3, 0.9):
+        energy, volume, flips = smoothed(body, physics, low + budget * rise, flips=False)
+        assert budget - 1.1e-4 * budget - 1e-9 <= (energy - low) / rise <= budget
         assert volume == pytest.approx(1.0, abs=1e-12)
         assert flips == 0
     assert smoothed(body, physics, low - 0.1 * rise, flips=True)[2] is None
@@ -136,8 +136,8 @@ def begun(steps):
     return flow
 
 
-@pytest.mark.parametrize(("pull", "kept"), [(1e-6, True), (0.1, False)])
-def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull, kept):
+@pytest.mark.parametrize(("pull", "is_accepted"), [(1e-6, True), (0.1, False)])
+def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull, is_accepted):
     flow, plain = begun(30), begun(30)
     body, edge, energy = flow.body, Edge(pull), flow.physics.energy(flow.body)
     flow.physics = replace(flow.physics, events=(edge,))
@@ -146,7 +146,7 @@ def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull,
     assert edge.attempts == 1
     assert flow.physics.energy(flow.body) <= energy * (1.0 + 1e-9)
     surface = slice(body.cloud.surface_count)
-    assert (np.abs(flow.body.points - plain.body.points)[surface].max() < 1e-12) != kept
+    assert (np.abs(flow.body.points - plain.body.points)[surface].max() < 1e-12) != is_accepted
     assert flow.time_step.binding != "energy"
 
 

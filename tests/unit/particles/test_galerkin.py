@@ -247,11 +247,11 @@ def test_factors_of_an_earlier_matrix_solve_and_are_restored():
     assert exact == pytest.approx(np.linalg.solve(first, right))
     few = factors.iterations
     again.restore(factors.saved())
-    found = factors.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
-    assert found == pytest.approx(np.linalg.solve(now, right))
+    solution = factors.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
+    assert solution == pytest.approx(np.linalg.solve(now, right))
     assert factors.iterations > few
     same = again.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
-    assert np.array_equal(found, same)
+    assert np.array_equal(solution, same)
 
 
 def test_a_matrix_without_factors_is_an_error():

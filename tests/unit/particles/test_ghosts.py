@@ -23,29 +23,29 @@ def points():
 def test_images_equal_a_loop_over_particles(points):
     """Twin: the reflection formula, one particle at a time."""
     plate = tilted()
-    found = mirror(points, (plate,), REACH)
+    images = mirror(points, (plate,), REACH)
     expected, source = [], []
     for number, point in enumerate(points):
         height = float((point - plate.origin) @ plate.normal)
         if 1e-6 * REACH < height < REACH:
             expected.append(point - 2.0 * height * plate.normal)
             source.append(number)
-    assert found.source.tolist() == source
-    assert found.points == pytest.approx(np.array(expected))
+    assert images.source.tolist() == source
+    assert images.points == pytest.approx(np.array(expected))
 
 
 def test_particles_on_the_wall_are_their_own_image(points):
-    found = mirror(points, (Plate.horizontal(0.0),), REACH)
-    assert not set(found.source) & set(range(20))
+    images = mirror(points, (Plate.horizontal(0.0),), REACH)
+    assert not set(images.source) & set(range(20))
 
 
 def test_an_edge_between_two_walls_has_images_of_both():
     side = Plate(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
-    found = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
+    images = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
     expected = [[-0.1, 0.5, -0.1], [-0.1, 0.5, 0.1], [0.1, 0.5, -0.1]]
-    assert np.array(sorted(found.points.tolist())) == pytest.approx(np.array(expected))
-    velocity = found.vector(1) @ np.array([1.0, 2.0, 3.0])
-    assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *found.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
+    assert np.array(sorted(images.points.tolist())) == pytest.approx(np.array(expected))
+    velocity = images.vector(1) @ np.array([1.0, 2.0, 3.0])
+    assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *images.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
 
 
 @pytest.mark.parametrize("slip", [np.inf, 0.1, 0.0])
@@ -54,13 +54,13 @@ def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (tilted(), Plate.horizontal(0.4, side=1.0))
     twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
-    found = mirror(points, plates, 2.0 * REACH, [slip, slip])
+    mirrored = mirror(points, plates, 2.0 * REACH, [slip, slip])
     other = np.concatenate((twist[:3] + np.cross(twist[3:], plates[1].origin - plates[0].origin), twist[3:]))
     moving = plates[0].rigid_velocity(twist, points)
-    images = np.einsum("gcd,gd->gc", found.reflection, moving[found.source])
-    images += found.drift(points, plates, {0: twist, 1: other})
-    assert set(found.parent) - set(range(30))
-    assert images == pytest.approx(plates[0].rigid_velocity(twist, found.points))
+    images = np.einsum("gcd,gd->gc", mirrored.reflection, moving[mirrored.source])
+    images += mirrored.drift(points, plates, {0: twist, 1: other})
+    assert set(mirrored.parent) - set(range(30))
+    assert images == pytest.approx(plates[0].rigid_velocity(twist, mirrored.points))
 
 
 def test_a_plate_that_slides_takes_nothing_along_without_friction():

@@ -35,12 +35,12 @@ def operators(box):
 def test_smoothing_equals_the_printed_sum():
     """Twin of eq 28, one particle at a time."""
     random = np.random.default_rng(2)
-    shape, old, new, kept = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
-    result = smooth(Velocities(old, kept), new, sparse.csr_matrix(shape))
+    shape, old, new, retained = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
+    result = smooth(Velocities(old, retained), new, sparse.csr_matrix(shape))
     for j in range(4):
         change = sum(shape[j, i] * (new[i] - old[i]) for i in range(4))
         end = sum(shape[j, i] * new[i] for i in range(4))
-        assert result.unsmoothed[j] == pytest.approx(0.5 * (kept[j] + change) + 0.5 * end)
+        assert result.unsmoothed[j] == pytest.approx(0.5 * (retained[j] + change) + 0.5 * end)
     assert result.coefficients is new
 
 

@@ -26,9 +26,9 @@ def joint(offset, tilt):
 def test_the_orientation_brings_the_canonical_plate_to_where_it_is(offset, tilt):
     geometry = joint(offset, tilt)
     upright, orientation = canonical(geometry)
-    own, one = joint_plates(geometry)[1], joint_plates(upright)[1]
-    assert orientation.vectors(one.origin[None])[0] == pytest.approx(own.origin, abs=1e-15)
-    assert orientation.vectors(one.normal[None])[0] == pytest.approx(own.normal, abs=1e-12)
+    inclined, upright_plate = joint_plates(geometry)[1], joint_plates(upright)[1]
+    assert orientation.vectors(upright_plate.origin[None])[0] == pytest.approx(inclined.origin, abs=1e-15)
+    assert orientation.vectors(upright_plate.normal[None])[0] == pytest.approx(inclined.normal, abs=1e-12)
     assert upright.tilt[0] == 0.0 and upright.tilt[1] <= 0.0 <= upright.offset[1]
 
 

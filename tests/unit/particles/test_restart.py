@@ -212,19 +212,19 @@ def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):
         run(BreakingCheckpoint(path, 5))
-    expected, found = run(None), run(BreakingCheckpoint(path, -1))
-    assert len(found) == len(expected)
-    assert all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
+    expected, actual = run(None), run(BreakingCheckpoint(path, -1))
+    assert len(actual) == len(expected)
+    assert all(np.array_equal(left, right) for left, right in zip(actual, expected, strict=True))
 
 
-def leaves(value, place=""):
+def leaves(value, path=""):
     """All numbers and arrays of an object by their place; what PETSc keeps is left out: it is made anew."""
     if sparse.issparse(value):
         value = {name: getattr(value, name) for name in ("data", "indices", "indptr", "shape")}
-    if place.endswith("/_solver"):
+    if path.endswith("/_solver"):
         return
     if value is None or isinstance(value, bool | int | float | str | np.ndarray | np.generic):
-        yield place, value
+        yield path, value
         return
     if isinstance(value, list | tuple):
         value = dict(enumerate(value))
@@ -232,7 +232,7 @@ def leaves(value, place=""):
         slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
         value = getattr(value, "__dict__", {}) | {name: getattr(value, name) for name in slots}
     for name, part in value.items():
-        yield from leaves(part, f"{place}/{name}")
+        yield from leaves(part, f"{path}/{name}")
 
 
 def start_drop(scheme, limit):
@@ -258,9 +258,9 @@ def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
         flow.step()
     Checkpoint(tmp_path / "state", ()).write(flow.saved())
     again.restore(Checkpoint(tmp_path / "state", ()).read(RECORDS))
-    found, expected = dict(leaves(again)), dict(leaves(flow))
-    assert found.keys() == expected.keys()
-    different = [place for place, value in expected.items() if not np.array_equal(found[place], value)]
+    actual, expected = dict(leaves(again)), dict(leaves(flow))
+    assert actual.keys() == expected.keys()
+    different = [path for path, value in expected.items() if not np.array_equal(actual[path], value)]
     assert not different
 
 

@@ -20,7 +20,7 @@ def ink(rheology, **changes):
     return Droplet(**INK | changes, rheology=rheology, numerics=DropletNumerics(particles_per_diameter=8))
 
 
-@pytest.mark.parametrize("rheology", LAWS, ids=lambda one: f"{one.law} {one.exponent}")
+@pytest.mark.parametrize("rheology", LAWS, ids=lambda item: f"{item.law} {item.exponent}")
 def test_particles_have_the_viscosity_of_the_parameters(rheology):
     law = droplet(ink(rheology)).law
     for rate in (0.0, 1.0, 1e3, 7e4, 1e5, 3e6, 1e9):
@@ -46,12 +46,12 @@ def test_the_rate_at_a_particle_is_that_of_the_flow():
     strain = 0.5 * (gradient + gradient.T)
     expected = CARREAU.viscosity(float(np.sqrt(2.0 * (strain**2).sum())), 0.0149)
     for i in range(0, simulation.fluids, 17):
-        found = viscosity_of(np.uint64(i), simulation.fluids, rows.of(i), fields, simulation.law)
-        assert found == pytest.approx(expected, rel=1e-10)
+        viscosity = viscosity_of(np.uint64(i), simulation.fluids, rows.of(i), fields, simulation.law)
+        assert viscosity == pytest.approx(expected, rel=1e-10)
     turning = np.array([[0.0, -1e6, 0.0], [1e6, 0.0, 0.0], [0.0, 0.0, 0.0]])
     fields.u[:], fields.v[:], fields.w[:] = turning @ np.array(fields[:3])
-    found = viscosity_of(np.uint64(0), simulation.fluids, rows.of(0), fields, simulation.law)
-    assert found == pytest.approx(0.0149, rel=1e-9)  # a body that turns as a whole is not sheared
+    viscosity = viscosity_of(np.uint64(0), simulation.fluids, rows.of(0), fields, simulation.law)
+    assert viscosity == pytest.approx(0.0149, rel=1e-9)  # a body that turns as a whole is not sheared
 
 
 def test_an_exponent_of_one_computes_what_constant_viscosity_does():

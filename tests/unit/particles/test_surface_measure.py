@@ -55,8 +55,8 @@ def test_volume_equals_numpy_twin(cloud):
     walls = sum(
         plate.origin[2] * ring_area(points, ring) for ring, plate in zip(cloud.rings[1:], cloud.plates[1:], strict=True)
     )
-    found = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.plates)
-    assert found == pytest.approx(free + walls)
+    volume = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.plates)
+    assert volume == pytest.approx(free + walls)
 
 
 @pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])

@@ -79,9 +79,9 @@ def test_smoothing_equals_numpy_twin():
     area = np.linalg.norm(normal, axis=1)
     offset = smoothing_offsets(points, cloud.triangles, count, cloud.rings)
     for vertex in np.setdiff1d(np.arange(count), cloud.rings[0]):
-        own = (cloud.triangles == vertex).any(axis=1)
-        mean = area[own] @ corner[own].mean(axis=1) / area[own].sum() - points[vertex]
-        n = normal[own].sum(axis=0)
+        incident = (cloud.triangles == vertex).any(axis=1)
+        mean = area[incident] @ corner[incident].mean(axis=1) / area[incident].sum() - points[vertex]
+        n = normal[incident].sum(axis=0)
         n /= np.linalg.norm(n)
         assert offset[vertex] == pytest.approx(0.3 * (mean - (mean @ n) * n), abs=1e-14)
 

@@ -54,10 +54,13 @@ def test_a_home_that_cannot_be_written_to_stays_but_nothing_is_kept_there(tmp_pa
     found = {"HOME": "/proc", "TMPDIR": str(tmp_path)}
     complete(found)
     assert found["HOME"] == "/proc"
-    assert all(found[name].startswith(str(tmp_path)) and os.path.isdir(found[name]) for name in environment.PLACES)
+    assert all(
+        found[name].startswith(str(tmp_path)) and os.path.isdir(found[name])
+        for name in environment.USER_FOLDERS
+    )
 
 
-@pytest.mark.parametrize("name", [*environment.PLACES, "NUMBA_CACHE_DIR"])
+@pytest.mark.parametrize("name", [*environment.USER_FOLDERS, "NUMBA_CACHE_DIR"])
 def test_a_named_place_that_cannot_be_written_to_is_another(tmp_path, nowhere, name):
     found = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), name: nowhere}
     complete(found)
@@ -135,7 +138,7 @@ def test_more_files_are_asked_for(monkeypatch):
     monkeypatch.setattr(resource, "setrlimit", lambda one, limits: asked.append((one, limits)))
     monkeypatch.setattr(environment, "LEAST", ())
     check_limits()
-    assert asked == [(resource.RLIMIT_NOFILE, (environment.WANTED_FILES, 100_000))]
+    assert asked == [(resource.RLIMIT_NOFILE, (environment.TARGET_FILES, 100_000))]
 
 
 def test_threads_that_cannot_be_started_are_told(monkeypatch):
