@@ -22,7 +22,7 @@ from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine, RubbingLine
+from reflowshock.particles.surface.contact_line import ContactLine, FrictionLine, HystereticLine
 from reflowshock.particles.surface.profile import width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
@@ -125,7 +125,7 @@ def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLin
         return ()
     if drop.hysteresis is None:
         return (contact_line(cloud, 0, drop.edge_radius, solder),)
-    line = RubbingLine if solder.numerics.scheme == "ispg" else HystereticLine
+    line = FrictionLine if solder.numerics.scheme == "ispg" else HystereticLine
     return (line(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
-from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
@@ -166,7 +166,7 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    if any(len(line.held_pads()) > 1 for line in lines):
+    if any(len(line.wetted_pads()) > 1 for line in lines):
         return "bridged"
     with_edge = [line for line in lines if line.has_edge]
     if any((line.state == ON_MASK).any() for line in with_edge):
@@ -284,7 +284,7 @@ def particles_lost(body: Body) -> int:
         corners[0] = np.concatenate((corners[0], (corners[0] * image)[:, ::-1]))
         inside[on_plane(cloud, axis), axis] = LITTLE * cloud.spacing
     below = inside[cloud.surface_count :]
-    return int((winding_numbers(below, np.concatenate(corners)) < 0.5).sum())
+    return int((winding_numbers.at_points(below, np.concatenate(corners)) < 0.5).sum())
 
 
 def ledger(flows: Sequence[LiquidFlow]) -> Metrics:

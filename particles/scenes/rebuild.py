@@ -25,9 +25,9 @@ from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, p
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, concatenated, shifted_indices
-from reflowshock.particles.surface.closing import without_slits
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, lidded
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, with_lids
 from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.morphological_closing import smooth_slits
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CONTACT_SPACINGS = 1.0
@@ -52,7 +52,7 @@ def touch(first: Body, second: Body) -> bool:
 
 def overlap(first: Body, second: Body) -> float:
     """How deep particles of the second body are inside the first [m]; negative where none are."""
-    return float(depths(second.points, closed_surface(first)).max())
+    return float(depths(second.points, *closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:
@@ -91,7 +91,7 @@ def rebuild(*bodies: Body) -> Body:
     if any(_contact_lines_meet(body) for body in bodies):
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
-    result = Body.at_rest(cloud_from_level_set(without_slits(union), volume, walls))
+    result = Body.at_rest(cloud_from_level_set(smooth_slits(union), volume, walls))
     moments = [body_moments(body) for body in bodies]
     centre = np.sum([moment[1] for moment in moments], axis=0) / sum(moment[0] for moment in moments)
     _put_centre(result, walls, centre)
@@ -156,7 +156,7 @@ def closed_surface(body: Body) -> tuple[Floats, Indices]:
         points.append(mirrored)
         faces.append(image[triangles][:, ::-1])
     all_faces = np.concatenate(faces)
-    return lidded(np.concatenate(points), all_faces, boundary_loops(all_faces))
+    return with_lids(np.concatenate(points), all_faces, boundary_loops(all_faces))
 
 
 def _walls(body: Body) -> tuple[Plate, ...]:

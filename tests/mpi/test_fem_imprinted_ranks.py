@@ -1,4 +1,4 @@
-"""Joints in columns, one swept and one free-form beside it: the same on any ranks, sections in balance, two scales."""
+"""Joints in columns, one swept and one free-form: equal on any ranks, sections in balance, two scales."""
 
 import json
 from pathlib import Path
@@ -25,12 +25,12 @@ SHOCK = {
     "duration": 1.2e-5,
     "numerics": {"kinematics": "small", "history_samples": 20, "field_samples": 2},
 }
-RUNS = {"one": ("dns", 1), "two": ("dns", 2), "scales": ("two_scale", 1)}  # mode and ranks
+RUNS = {"one": ("dns", 1), "two": ("dns", 2), "scales": ("two_scale", 1)}  # name -> mode and ranks
 FOUND = ("section_board", "section_package", "peel_board", "von_mises_board", "von_mises_package", "von_mises_max")
 
 
 def write_package(folder: Path) -> list[str]:
-    """Mesh a quarter of a package with two joints in a row, in columns; the outer one has a void."""
+    """Mesh a quarter of a package with two joints in a row, in columns; the outer joint has a void."""
     imprint = {"rings": 2, "first_layer": 0.06 * MM, "growth": 2.5}
     numerics = {"core": 2, "rings": 1, "layers": 3}
     whole = package(rows=2, standoff=0.30 * MM, joint_numerics=numerics, imprint=imprint)
@@ -51,7 +51,7 @@ def write_package(folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory) -> dict[str, tuple[dict, dict]]:
-    """History and result of each run."""
+    """Return history and result of each run."""
     folder = tmp_path_factory.mktemp("imprinted")
     assert write_package(folder) == ["swept", "free-form"]
     meshes, inputs = [str(folder / f"{name}.msh") for name in ("assembly", "joints")], []

@@ -154,7 +154,7 @@ def droplet(parameters: DropletTrial) -> dict[str, float]:
         "surface_volume": (surface.volume + surface.spray) / (count * scene.volume) - 1.0,
         "outside": _outside(simulation),
         "below_wall": float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
-        "mergers": sum(merger.after < merger.before for merger in surface.meetings),
+        "mergers": sum(merger.after < merger.before for merger in surface.topology_changes),
     }  # fmt: skip
 
 
@@ -162,8 +162,8 @@ def droplets(parameters: DropletTrial) -> "Simulation":
     """Set up one droplet or two, and their disorder."""
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
-    from reflowshock.particles.sph.surface_care import EDGE
     from reflowshock.particles.sph_flows.droplet import droplet as alone
+    from reflowshock.particles.surface.remeshing import EDGE
 
     scene = parameters.droplet
     simulation = alone(scene)
@@ -177,7 +177,7 @@ def droplets(parameters: DropletTrial) -> "Simulation":
         fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), simulation.law)
         fields.u[:] = parameters.approach * np.repeat([1.0, -1.0], points.shape[1])
         fields.w[:] = -scene.impact_speed
-        surface.points = corners - aside
+        surface.mesh.points = corners - aside
         surface.add(corners + aside, triangles)
     parameters.unrest.disturb(fields, len(fields.x), simulation.law.spacing)
     return Simulation(fields, len(fields.x), simulation.law, surface, flow.device_of(scene))
@@ -203,14 +203,14 @@ def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[s
 
 def _outside(simulation: "Simulation") -> float:
     """Share of the particles that are farther outside their surface than `OUTSIDE`."""
-    from reflowshock.particles.surface.cloud_level_set import mirrored
+    from reflowshock.particles.surface.cloud_level_set import with_mirror_image
     from reflowshock.particles.surface.level_set import depths
 
     surface = simulation.surface
     assert surface is not None
     closed = surface.points, surface.triangles
-    closed = mirrored(*closed) if simulation.law.mirror else closed
-    inside = depths(np.stack(simulation.fields[:3], axis=1), closed)
+    closed = with_mirror_image(*closed) if simulation.law.mirror else closed
+    inside = depths(np.stack(simulation.fields[:3], axis=1), *closed)
     return float((inside < -OUTSIDE * simulation.law.spacing).mean())
 
 

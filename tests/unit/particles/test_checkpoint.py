@@ -123,7 +123,7 @@ def test_a_broken_or_foreign_file_starts_the_run_anew(tmp_path, caplog, damage):
     checkpoint = Checkpoint(path, ("inputs",))
     assert checkpoint.read() is None
     assert f"{path}" in caplog.text
-    assert "the run starts anew" in caplog.text
+    assert "the run starts from the beginning" in caplog.text
     assert not checkpoint.continued
     assert not marker.exists()
 
@@ -136,7 +136,7 @@ def test_a_reflow_beside_a_forged_checkpoint_starts_anew(tmp_path, caplog, unint
     checkpoint = Checkpoint(path, (JOINT, QUASI_STATIC))
     check_equal(solve_joint(JOINT, QUASI_STATIC, checkpoint=checkpoint), uninterrupted)
     assert not checkpoint.continued
-    assert "the run starts anew" in caplog.text
+    assert "the run starts from the beginning" in caplog.text
     assert not marker.exists()
 
 

@@ -18,7 +18,7 @@ from reflowshock.particles.surface.contact_line import (
     PINNED,
     RECEDING,
     ContactLine,
-    RubbingLine,
+    FrictionLine,
 )
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
@@ -209,7 +209,7 @@ PAIR = (Pad((-1.0, 0.0), 0.5, PAD), Pad((1.0, 0.0), 0.5, PAD))
 def test_a_line_around_two_pads_wets_the_mask_between_them():
     """Pinned at the far side of both pads, on the mask between: the sides enclose 2 x 1, of which two half discs."""
     line, body = line_over_pads(stadium(1.0, equal_area_radius(0.5, 60), 31), PAIR)
-    assert line.held_pads() == {0, 1}
+    assert line.wetted_pads() == {0, 1}
     assert verdict((line,), ruptured=False) == "bridged"
     assert (line.state == PINNED).sum() == 2 * 32  # the arcs and the first vertex of each side
     assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * (2.0 * 1.0 - 0.25 * np.pi), rel=1e-2)
@@ -239,7 +239,7 @@ def test_a_line_steps_onto_a_pad_that_it_comes_to_and_stops_at_its_far_edge():
     for radius in (1.4, 1.8, 2.2, 2.6):
         body.points = np.where((line.state == PINNED)[:, None], body.points, radius * circle - (1.0, 0, 0))
         line.update(body, load_of_angle(body, line, np.radians(120.0)), 1.0)
-        reached.append((line.held_pads(), int(line.state[0])))
+        reached.append((line.wetted_pads(), int(line.state[0])))
     assert reached == [(set(), ON_MASK), ({1}, ON_PAD), ({1}, ON_PAD), ({1}, PINNED)]
     assert body.points[0] == pytest.approx((1.0 + line.edges[1], 0.0, 0.0))
 
@@ -248,16 +248,16 @@ def test_friction_holds_a_line_or_opposes_its_motion():
     """Vertices that stand are let go where the wall cannot hold them, those that turn are held; friction takes."""
     body = Body.at_rest(box_cloud(1.0, 5))
     ring = body.cloud.rings[0]
-    line = RubbingLine(0, np.radians(60.0), np.radians(120.0), body.points[ring])
+    line = FrictionLine(0, np.radians(60.0), np.radians(120.0), body.points[ring])
     across, zero = line._area_gradient(body), np.zeros_like(body.points)
     needed = zero.copy()
     needed[ring] = np.resize([0.4, -0.4, 0.6, -0.6], len(ring))[:, None] * across
-    assert not line.settle(body, zero, needed, releases=False)
-    assert line.settle(body, zero, needed, releases=True)
+    assert not line.update_states(body, zero, needed, releases=False)
+    assert line.update_states(body, zero, needed, releases=True)
     assert np.array_equal(line.state, np.resize([PINNED, PINNED, RECEDING, ADVANCING], len(ring)))
     inward, outward = -np.resize([0.0, 0.0, 1.0, -1.0], len(ring)), zero.copy()
     outward[ring] = inward[:, None] * across
     assert (line.friction(body) * outward[ring]).sum() < 0.0
-    assert not line.settle(body, outward, needed, releases=False)
-    assert line.settle(body, -outward, needed, releases=False)
+    assert not line.update_states(body, outward, needed, releases=False)
+    assert line.update_states(body, -outward, needed, releases=False)
     assert (line.state == PINNED).all()

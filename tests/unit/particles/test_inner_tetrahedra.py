@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import cell_volumes, volume_gradients
-from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
 from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
 from reflowshock.particles.discretisation.inner_tetrahedra import fill
@@ -64,7 +64,7 @@ def test_winding_numbers_tell_inside_from_outside():
     walls = [wall_corners(body.points, *on_wall) for on_wall in zip(body.cloud.rings, body.plates, strict=True)]
     corners = np.concatenate([body.points[body.triangles], *walls])
     points = np.array([[0.0, 0.0, 0.5], [0.45, 0.0, 0.05], [0.45, 0.0, 0.5], [0.0, 0.0, -0.1]])
-    result = winding_numbers(points, corners)
+    result = winding_numbers.at_points(points, corners)
     assert result == pytest.approx([1.0, 1.0, 0.0, 0.0], abs=1e-9)
     assert result == pytest.approx([winding_number_by_numpy(point, corners) for point in points], abs=1e-12)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pyvista
 
 from reflowshock.particles.core.grid import Grid
-from reflowshock.particles.surface.level_set import signed_distance, within_band
+from reflowshock.particles.surface.level_set import signed_distance, signed_distance_in_band
 
 
 def test_a_band_about_a_rough_surface_has_its_distances():
@@ -15,7 +15,7 @@ def test_a_band_about_a_rough_surface_has_its_distances():
     grid = Grid.around(points, 0.11)
     everywhere = signed_distance(points, triangles[:-1], grid).values
     for band in (0.05, 0.4, 10.0):
-        near = within_band(points, triangles, grid, band).values
+        near = signed_distance_in_band(points, triangles, grid, band).values
         assert np.abs(near - np.clip(everywhere, -band, band)).max() < 1e-14
 
 
@@ -28,7 +28,7 @@ def test_a_triangle_as_thin_as_rounding_is_its_edges():
         points = start + np.outer([0.0, 1.0, rng.uniform()], along)
         points[2, 0] += height
         grid = Grid.around(points, 0.11)
-        near = within_band(points, np.array([[0, 1, 2]], np.int32), grid, 0.4).values
+        near = signed_distance_in_band(points, np.array([[0, 1, 2]], np.int32), grid, 0.4).values
         places = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1) - start
         foot = np.clip(places @ along, 0.0, 1.0)[..., None] * along
         exact = np.minimum(np.linalg.norm(places - foot, axis=-1), 0.4)

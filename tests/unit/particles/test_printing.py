@@ -108,7 +108,7 @@ def test_one_thread_and_two_print_the_same_bits():
             deposit.step(1.0)
         deposit.update()
         results.append((deposit.points, deposit.surface.points, deposit.fields.density))
-    assert (deposit.surface.wetness[0] > 0.0).any()
+    assert (deposit.surface.mesh.wetness > 0.0).any()
     for serial, parallel in zip(*results, strict=True):
         assert np.array_equal(serial, parallel)
 

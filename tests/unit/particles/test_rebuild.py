@@ -9,7 +9,6 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
-from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
 from reflowshock.particles.surface.level_set import (
     LevelSet,
@@ -18,8 +17,9 @@ from reflowshock.particles.surface.level_set import (
     relax,
     signed_distance,
     smooth_union,
-    windings_on,
+    winding_numbers_on,
 )
+from reflowshock.particles.surface.morphological_closing import smooth_slits
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
 R = 0.5e-3
@@ -84,7 +84,7 @@ def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     exact = np.minimum(*(np.linalg.norm(nodes - centre, axis=1) - R for centre in (-aside, aside)))
     clear = np.abs(exact) > 0.05 * R
     assert np.array_equal(level.values.ravel()[clear] < 0.0, exact[clear] < 0.0)
-    assert np.array_equal(depths(nodes[clear], both) > 0.0, exact[clear] < 0.0)
+    assert np.array_equal(depths(nodes[clear], *both) > 0.0, exact[clear] < 0.0)
 
 
 def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
@@ -100,8 +100,8 @@ def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
     for order in permutations(range(6)):
         permutation = np.array(order, np.int32)
         surface = corners[permutation], np.argsort(permutation).astype(np.int32)[sides]
-        assert np.array_equal(windings_on(grid, *surface)[clear], (distance < 0.0)[clear])
-        assert np.array_equal(depths(nodes[clear], surface) > 0.0, distance[clear] < 0.0)
+        assert np.array_equal(winding_numbers_on(grid, *surface)[clear], (distance < 0.0)[clear])
+        assert np.array_equal(depths(nodes[clear], *surface) > 0.0, distance[clear] < 0.0)
 
 
 def test_smooth_union_closes_gaps_narrower_than_half_its_reach():
@@ -188,9 +188,9 @@ def test_a_groove_narrower_than_a_cell_is_blunted_and_a_smooth_net_stays():
         return np.unique(edges, axis=0, return_counts=True)[1].max()
 
     assert most(grooved) > 2
-    assert most(without_slits(grooved)) == 2
+    assert most(smooth_slits(grooved)) == 2
     smooth = ball(grid, (0, 0, 0), 0.4)
-    assert without_slits(smooth) is smooth
+    assert smooth_slits(smooth) is smooth
 
 
 def test_a_collapsed_surface_is_made_even_again():

@@ -6,12 +6,13 @@ import pytest
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import evened_out, on_wall, strays, without_dry_spots
-from reflowshock.particles.sph.surface_loops import find_weights
-from reflowshock.particles.sph.thin_films import hold_films
+from reflowshock.particles.sph.surface_coupling import find_weights
+from reflowshock.particles.sph.thin_films import add_wall_friction, film_sums
 from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
-from reflowshock.particles.surface.closing import narrowest_gap
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
+from reflowshock.particles.surface.morphological_closing import narrowest_gap
+from reflowshock.particles.surface.remeshing import smoothed, without_dry_spots
+from reflowshock.particles.surface.surface_mesh import on_wall
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 1.0}
@@ -62,7 +63,8 @@ def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
     lists = np.arange(0, count * count + 1, count, dtype=np.int32), np.tile(np.arange(count, dtype=np.int32), count)
     weights = np.empty((2, 2, count * count))
     find_weights(points, lists, fields, law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, law, simulation.rates)
+    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], count)
+    add_wall_friction(sums, fields, law, simulation.rates)
     assert by_images < 0.6 * height**2
     assert -simulation.rates[1].mean() * height**2 / 3.0 == pytest.approx(1.0, abs=0.05)
 
@@ -76,18 +78,19 @@ def test_a_film_of_two_particles_is_left_to_the_sums_over_pairs():
     lists = np.array([0, simulation.fluids], np.int32), np.arange(simulation.fluids, dtype=np.int32)
     weights = np.empty((2, 2, simulation.fluids))
     find_weights(points, lists, fields, simulation.law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, simulation.law, simulation.rates)
+    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], simulation.fluids)
+    add_wall_friction(sums, fields, simulation.law, simulation.rates)
     assert np.array_equal(simulation.rates, before)
 
 
 def test_vertices_that_particles_pass_or_leave_behind_follow_them():
     simulation = droplet(Droplet(**INK, numerics=COARSE))
     surface, spacing = simulation.surface, simulation.law.spacing
-    normals, lists = surface._normals(), surface._lists
-    assert not strays((surface.points, normals), lists, simulation.fields, spacing).any()
+    normals, coupling = surface.mesh.normals(), surface.coupling
+    assert not coupling.distances_to_cover(surface.points, normals, simulation.fields).any()
     for shift, sign in ((-0.8, 1.0), (1.8, -1.0)):
         moved = surface.points + shift * spacing * normals
-        stray = strays((moved, normals), lists, simulation.fields, spacing)
+        stray = coupling.distances_to_cover(moved, normals, simulation.fields)
         assert (sign * stray >= 0.0).all() and (stray != 0.0).mean() > 0.3
         depth = (
             np.linalg.norm(moved + stray[:, None] * normals, axis=1)
@@ -109,10 +112,10 @@ def test_sharp_bends_of_contact_lines_are_blunted_and_round_ones_stay():
     points = np.concatenate(([[0.0, 0.0, 1.0]], np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)))
     ring = np.arange(1, 13, dtype=np.int32)
     triangles = np.stack((np.zeros(12, np.int32), ring, np.roll(ring, -1)), axis=1).astype(np.int32)
-    round_one, _ = evened_out(points, triangles, (ring,), (ring,))
+    round_one, _ = smoothed(points, triangles, (ring,), (ring,))
     assert np.linalg.norm(round_one[ring], axis=1) == pytest.approx(1.0, abs=1e-12)
     points[3] *= 2.0
-    blunt, _ = evened_out(points, triangles, (ring,), (ring,))
+    blunt, _ = smoothed(points, triangles, (ring,), (ring,))
     assert 1.2 < np.linalg.norm(blunt[3]) < 1.8
 
 

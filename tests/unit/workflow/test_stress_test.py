@@ -149,7 +149,7 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
     survived, told = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
     assert not survived
     assert {one["tried"]: one["message"] for one in told["fixed"]} == {
-        "fate hangs": "no answer in 4 s: taken to hang",
+        "fate hangs": "no answer in 4 s: assumed to hang",
         "fate dies": "the process ended with code 3",
         "fate holds": "",
     }

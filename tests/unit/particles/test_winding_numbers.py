@@ -4,9 +4,9 @@ import numpy as np
 import pyvista
 
 from reflowshock.particles.core.grid import Grid
-from reflowshock.particles.core.windings import Windings
+from reflowshock.particles.core.winding_numbers import WindingNumbers
 from reflowshock.particles.surface.breakup import are_outside
-from reflowshock.particles.surface.level_set import windings_on
+from reflowshock.particles.surface.level_set import winding_numbers_on
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 SPACING = 0.12
@@ -33,14 +33,14 @@ def test_crossings_alone_tell_what_a_grid_tells():
     turned = several((points, triangles), (0.3 * points + [3.0, 0.0, 0.0], triangles[:, ::-1]))
     upper = triangles[points[triangles, 2].min(axis=1) > 0.0]  # the wall below closes it
     for surface, bounds in ((ball(), (0, 1)), (crossed, (0, 2)), (turned, (-1, 1)), ((points, upper), (0, 1))):
-        numbers = Windings.of(*surface, SPACING)
+        numbers = WindingNumbers.of(*surface, SPACING)
         counts = tuple(int(extent) for extent in np.ceil((surface[0].max(axis=0) - numbers.origin) / SPACING) + 3.0)
         grid = Grid(numbers.origin, SPACING, counts)
         nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
-        assert np.array_equal(numbers.about(nodes), windings_on(grid, *surface).ravel())
+        assert np.array_equal(numbers.at(nodes), winding_numbers_on(grid, *surface).ravel())
         assert numbers.bounds == bounds
     far = 9.0 * np.concatenate((np.eye(3), -np.eye(3), [[0.0, 1.0, -1.0]]))
-    assert not Windings.of(points, triangles, SPACING).about(far).any()
+    assert not WindingNumbers.of(points, triangles, SPACING).at(far).any()
 
 
 def test_crossings_of_steep_triangles_are_within_them():
@@ -50,7 +50,7 @@ def test_crossings_of_steep_triangles_are_within_them():
         angle = rng.uniform(0.0, 2.0 * np.pi)
         corners_above = node + np.outer(rng.uniform(-0.8, 0.8, 3), [np.cos(angle), np.sin(angle)])
         corners = np.column_stack((corners_above, rng.uniform(5.0, 5.5, 3)))
-        numbers = Windings.of(np.concatenate((np.zeros((1, 3)), corners)), np.array([[1, 2, 3]]), SPACING)
+        numbers = WindingNumbers.of(np.concatenate((np.zeros((1, 3)), corners)), np.array([[1, 2, 3]]), SPACING)
         below = numbers.shape[1] - 1 - numbers.keys % numbers.shape[1]
         assert (numbers.origin[2] + SPACING * below <= corners[:, 2].max()).all()
         assert (numbers.origin[2] + SPACING * (below + 1) >= corners[:, 2].min()).all()
@@ -60,27 +60,27 @@ def test_crossings_of_steep_triangles_are_within_them():
 
 def test_what_has_no_crossings_winds_round_nothing():
     points, triangles = ball()
-    numbers = Windings.of(1e-3 * points, triangles[:0], SPACING)
-    assert numbers.bounds == (0, 0) and numbers.about(points).tolist() == [0] * len(points)
+    numbers = WindingNumbers.of(1e-3 * points, triangles[:0], SPACING)
+    assert numbers.bounds == (0, 0) and numbers.at(points).tolist() == [0] * len(points)
 
 
 def test_no_windings_are_found_where_no_place_is_far(monkeypatch):
     points, triangles = ball()
-    monkeypatch.setattr(Windings, "of", None)
-    assert are_outside(1.2 * points, (points, triangles), vertex_normals(points, triangles, len(points)), SPACING).all()
+    monkeypatch.setattr(WindingNumbers, "of", None)
+    assert are_outside(1.2 * points, points, triangles, vertex_normals(points, triangles, len(points)), SPACING).all()
 
 
 def test_parts_that_are_far_apart_cost_no_more():
     points, triangles = ball()
     apart = several((points, triangles), (points + [1e5, -1e5, 1e5], triangles))
-    numbers = Windings.of(*apart, SPACING)
+    numbers = WindingNumbers.of(*apart, SPACING)
     assert numbers.bounds == (0, 1) and len(numbers.keys) < 2 * 4 * 3.2 / SPACING**2
-    assert numbers.about(np.array([[0.0, 0.0, 0.0], [1e5, -1e5, 1e5], [5e4, -5e4, 5e4]])).tolist() == [1, 1, 0]
+    assert numbers.at(np.array([[0.0, 0.0, 0.0], [1e5, -1e5, 1e5], [5e4, -5e4, 5e4]])).tolist() == [1, 1, 0]
 
 
 def test_what_is_outside_is_so_however_far():
     points, triangles = ball()
     places = np.random.default_rng(0).uniform(-1.6, 1.6, (2000, 3))
     beyond = np.linalg.norm(places, axis=1) > 1.3
-    outside = are_outside(places, (points, triangles), vertex_normals(points, triangles, len(points)), SPACING)
+    outside = are_outside(places, points, triangles, vertex_normals(points, triangles, len(points)), SPACING)
     assert outside[beyond].all() and not outside[np.linalg.norm(places, axis=1) < 0.7].any()
