@@ -39,8 +39,8 @@ def table_of(text: str) -> Table:
 
 
 @pytest.mark.parametrize("what", [NASTY, styled("{}", NASTY), table_of(NASTY)], ids=["text", "styled", "table"])
-def test_text_is_shown_as_it_is(shown, what):
-    console, written = shown
+def test_text_is_shown_as_it_is(text, what):
+    console, written = text
     console.print(what)
     assert written().count(SHOWN) == (4 if isinstance(what, Table) else 1)
     assert "\x1b" not in written()
@@ -61,9 +61,9 @@ def test_surrogates_can_be_written():
 
 
 def test_own_words_have_a_style_and_values_take_it():
-    told = styled("[bold]{}[/] of {}", "[red]x", "{}")
-    assert told.plain == "[red]x of {}"
-    assert [(span.start, span.end, str(span.style)) for span in told.spans] == [(0, 6, "bold")]
+    styled_text = styled("[bold]{}[/] of {}", "[red]x", "{}")
+    assert styled_text.plain == "[red]x of {}"
+    assert [(span.start, span.end, str(span.style)) for span in styled_text.spans] == [(0, 6, "bold")]
 
 
 def test_a_value_for_each_place():
@@ -117,7 +117,7 @@ def test_markup_is_read_in_constants_alone():
         calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "styled"]
         styled_ones = {id(node) for call in calls for node in ast.walk(call.args[0])}
         assert not [call for call in calls if any(isinstance(node, ast.JoinedStr) for node in ast.walk(call.args[0]))]
-        found = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
-        loose = [node.value for node in found if MARKUP.search(node.value) and id(node) not in styled_ones]
+        constants = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+        loose = [node.value for node in constants if MARKUP.search(node.value) and id(node) not in styled_ones]
         assert not loose, path
         assert "from_markup" not in path.read_text(encoding="utf-8"), path
