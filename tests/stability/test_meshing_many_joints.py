@@ -1,4 +1,4 @@
-"""Every tenth of two hundred joints (all: benchmarks/remeshing.py): meshed within the bars, or refused by reason."""
+"""Every tenth of two hundred joints: meshed within limits or rejected with a reason (all: benchmarks/remeshing.py)."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_there_are_two_hundred_of_all_kinds(outcomes):
     assert {record["kind"] for record in outcomes} == set(COUNTS)
 
 
-def test_none_passes_that_misses_its_bars(outcomes):
+def test_meshed_joints_are_within_the_limits(outcomes):
     for record in outcomes:
         if record["method"] == "refused":
             assert record["reason"].startswith("joint A1")
@@ -33,7 +33,7 @@ def test_none_passes_that_misses_its_bars(outcomes):
         assert record["scaled_jacobian"] >= SMALLEST_JACOBIAN, record
 
 
-def test_what_can_be_swept_is_swept_and_the_rest_is_filled(outcomes):
+def test_sweepable_joints_are_swept_and_the_rest_is_filled(outcomes):
     method = {record["kind"]: record["method"] for record in outcomes}
     swept = {"barrel", "hourglass", "shifted", "tilted", "overflow", "lobed"}
     assert method == {kind: "swept" if kind in swept else "free-form" for kind in COUNTS}

@@ -1,4 +1,4 @@
-"""Hourglass energy of one-point hexahedra: what the energy balance shows is what the hourglass stiffness holds."""
+"""Hourglass energy of one-point hexahedra: the energy balance equals the energy of the hourglass stiffness."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def energy_of(elements: Elements, displacement: np.ndarray):
 
 
 @pytest.mark.parametrize("distortion", [0.0, 0.05], ids=["congruent", "assembled"])
-def test_hourglass_energy_is_that_of_the_hourglass_stiffness(distortion):
+def test_hourglass_energy_equals_the_hourglass_stiffness_energy(distortion):
     elements = cube(distortion, "one_point")
     displacement = RANDOM.uniform(-1e-3, 1e-3, elements.points.shape)
     gamma, resistance = hourglass_control(elements.points[elements.cells], elements.elasticity, elements.material)

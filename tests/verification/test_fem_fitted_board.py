@@ -1,4 +1,4 @@
-"""What is fitted to a board: gauges in exact fields; a drop against the same board as a structure."""
+"""Gauges and neighbours of a board: exact fields, and a drop against the same board as a structure."""
 
 import json
 from dataclasses import replace
@@ -25,11 +25,11 @@ from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_models import BOARD_X, BOARD_Y, BOARD_Z, board_mesh, write_msh
 from tests.support.fem_structures import LENGTH, STEEL, THICKNESS, WIDTH, strip_mesh, structure_input
 
-CURVATURE = np.array([3.0, -1.0, 2.0])  # [1/m] of w in xx, yy, xy
+CURVATURE = np.array([3.0, -1.0, 2.0])  # w in xx, yy, xy [1/m]
 
 
 def bent(points: np.ndarray, middle: float) -> np.ndarray:
-    """Displacement of a plate that is bent to constant curvatures."""
+    """Return the displacement of a plate bent to constant curvatures."""
     x, y, z = points.T
     xx, yy, xy = CURVATURE
     slope = np.array([xx * x + xy * y, yy * y + xy * x])
@@ -48,7 +48,7 @@ def strains_of(mesh: MeshData, displacement: np.ndarray, symmetry: tuple[str, ..
 @pytest.mark.parametrize("slant", [0.0, 30.0, 90.0])
 @pytest.mark.parametrize("face", ["upper", "lower"])
 def test_gauge_on_a_bent_plate(face, slant):
-    """Either face has half the thickness times the curvature along the gauge; a long one reads its mean."""
+    """The strain is half the thickness times the curvature along the gauge; a long gauge reads the mean."""
     along = np.array([np.cos(np.radians(slant)), np.sin(np.radians(slant))])
     middle = 0.5 * THICKNESS
     xx, yy, xy = CURVATURE
@@ -61,7 +61,7 @@ def test_gauge_on_a_bent_plate(face, slant):
 
 
 def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
-    """A force at its tip: strain F (L - x) c / (E I) at the distance c from the neutral line; solved at rest."""
+    """A tip force gives the strain F (L - x) c / (E I) at the distance c from the neutral line at rest."""
     force, mesh = 2.0, strip_mesh((20, 2, 2))
     steel = STEEL | {"poisson_ratio": 0.0}
     places = {"root": (-6e-3, "upper"), "middle": (0.7e-3, "lower")}
@@ -104,7 +104,7 @@ def test_gauge_beyond_the_edge_is_refused():
         strains_of(strip_mesh(), np.zeros_like(strip_mesh().points), g={"at": [9.9e-3, 0.0]})
 
 
-def test_what_is_fitted_to_the_board_keeps_the_numbers_of_the_whole_mesh():
+def test_gauges_and_masses_keep_the_node_numbers_of_the_whole_mesh():
     mesh = board_mesh(size=1e-3)
     upper = mesh.in_parts("board_patch".__eq__)
     fittings = TypeAdapter(Fittings).validate_python(
@@ -131,7 +131,7 @@ def outputs_of(folder: Path) -> tuple[dict, dict[str, np.ndarray]]:
 
 
 def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict, dict[str, np.ndarray]]:
-    """The board as that of a drop without a package."""
+    """Run the drop of a board without a package."""
     shock = {"peak_acceleration": PEAK, "pulse_duration": PULSE, "duration": END, "modes": 3, "gravity": "off"}
     shock |= {"numerics": {"kinematics": kinematics, "history_samples": 50, "field_samples": 2}}
     shock |= {"numerics": shock["numerics"] | {"step_fraction": 0.5}}
@@ -146,7 +146,7 @@ def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict
 def as_structure(
     folder: Path, kinematics: str, supports: dict, parts=("board", "board_patch"), **more
 ) -> tuple[dict, dict[str, np.ndarray]]:
-    """The same mesh as a structure of two layers, its planes of symmetry held by supports."""
+    """Run the same mesh as a structure of two layers, with supports on its planes of symmetry."""
     layer = {"material": "steel", "thickness": 0.5 * BOARD_Z}
     body = {"length": 2 * BOARD_X, "width": 2 * BOARD_Y, "cells": [1, 1], "symmetry": ["x", "y"]}
     body |= {"layers": dict.fromkeys(parts, layer)}
@@ -162,7 +162,7 @@ def as_structure(
 
 
 @pytest.mark.parametrize(("kinematics", "sprung"), [("small", False), ("small", True), ("corotational", True)])
-def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, sprung):
+def test_drop_of_a_board_equals_the_same_structure(tmp_path, kinematics, sprung):
     mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
     write_msh(mesh, tmp_path / "board.msh")
     mesh.facets["x_min"], mesh.facets["y_min"] = mesh.facets["symmetry_x"], mesh.facets["symmetry_y"]
@@ -184,14 +184,14 @@ def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, spr
     assert drop["health"]["energy_balance_error"]["ok"]
 
 
-GLUED = {  # on two posts, whose edges are lines of the board
+GLUED = {  # on two posts whose edges are mesh lines of the board
     "at": [7.5e-3, 4.5e-3], "rows": 1, "columns": 2, "pitch": 2e-3, "post": 1e-3, "standoff": 0.4e-3,
     "substrate": [5e-3, 3e-3, 0.5e-3], "die": [3e-3, 1e-3, 0.3e-3],
 }  # fmt: skip
 
 
-def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
-    """Where its lines are lines of the board's mesh: modes, mass and motion are those of one mesh of both."""
+def test_tied_neighbour_equals_one_body_with_the_board(tmp_path):
+    """On matching mesh lines, modes, mass and motion equal a single mesh of board and neighbour."""
     neighbour = Neighbour(**GLUED)
     mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
     write_msh(mesh, tmp_path / "board.msh")

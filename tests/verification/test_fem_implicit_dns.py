@@ -1,4 +1,4 @@
-"""A package on a board in implicit steps: the same histories as explicit ones."""
+"""A package on a board: histories of implicit steps against explicit steps."""
 
 from pathlib import Path
 

@@ -28,7 +28,7 @@ def plain_yield_stress(material: Isotropic, strain: float, rate: float) -> float
 
 
 def exact_increment(trial: float, strain: float, material: Isotropic, step: float) -> float:
-    """Solve the return equation by Brent's method in ln x, between rounding and the rate-independent increment."""
+    """Solve the return equation by Brent's method in ln x, between round-off and the rate-independent increment."""
     stiffness = 3.0 * material.shear_modulus
     largest = (trial - plain_yield_stress(material, strain, 0.0)) / stiffness
 

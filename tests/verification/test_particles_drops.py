@@ -1,4 +1,4 @@
-"""Drops that merge come to rest in the exact shape of their common volume."""
+"""Merging drops: the exact shape of the total volume at rest."""
 
 from dataclasses import replace
 from math import inf

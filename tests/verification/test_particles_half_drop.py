@@ -1,4 +1,4 @@
-"""A drop at 90 deg that slides freely on its wall is half a free drop: it swings with Rayleigh's period."""
+"""A drop of 90 degrees on a free-slip wall oscillates as half a free drop, with Rayleigh's period."""
 
 import numpy as np
 import pytest
@@ -21,9 +21,9 @@ EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "vi
 
 @pytest.mark.long
 def test_second_mode_of_half_a_drop():
-    """Surface smoothed and tetrahedra made anew in each step: Reid's period within 0.5 %, his decay 5 %.
+    """With mesh smoothing and remeshing in each step, Reid's period is met within 0.5 % and his decay within 5 %.
 
-    What the time step adds to the period, (omega dt)^2 / 3, is subtracted.
+    The effect of the time step on the period, (omega dt)^2 / 3, is subtracted.
     """
     viscosity = OHNESORGE * np.sqrt(DENSITY * GAMMA * RADIUS)
     off = SolderEffects(inertia="off", viscosity="off", gravity="off")

@@ -1,4 +1,4 @@
-"""Joints of a heated reflow take steps of 100 capillary limits: where solder overflows these change nothing at rest."""
+"""Steps of 100 capillary limits in a thermal reflow do not change the overflowing joint at rest."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ PLACES = [
 
 
 def carried(limit, folder):
-    """The joint in its last place, what it does to its pads there, and the steps that it took."""
+    """Return the joint in its last position, its wrenches on the pads, the number of steps and the solder."""
     solder = Solder(volume=7.24e-11, numerics=SolderNumerics(spacing=8e-5, time_step_limit=limit))
     files = [Checkpoint(folder / f"{limit:g}-{number}", (number, solder)) for number in range(len(PLACES))]
     joints = [
@@ -36,5 +36,5 @@ def test_an_overflowing_joint_comes_to_rest_in_the_same_shape_in_fewer_steps(tmp
     expected, metrics = (measure(close_rings(s.surface_points, s.triangles, s.rings)) for s in (small, large))
     assert metrics == pytest.approx(expected, rel=1e-4)
     pull = np.pi * PAD * solder.surface_tension
-    assert np.abs(heavy - light)[:, :3].max() < 2e-4 * pull  # a fifth of the coupling's tolerance
+    assert np.abs(heavy - light)[:, :3].max() < 2e-4 * pull  # a fifth of the coupling tolerance
     assert np.abs(heavy - light)[:, 3:].max() < 2e-4 * pull * PAD

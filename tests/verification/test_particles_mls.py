@@ -10,7 +10,7 @@ COUNTS = (8, 12, 18)
 
 
 def relative_errors(basis, count, seed=13):
-    """Errors of gradient and Laplacian of sin(2x) cos(y) exp(z) in the inner half of a shaken unit cube."""
+    """Return errors of gradient and Laplacian of sin(2x) cos(y) exp(z) in the inner half of a jittered unit cube."""
     axis, spacing = np.linspace(0.0, 1.0, count), 1.0 / (count - 1)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     points += np.random.default_rng(seed).uniform(-0.1, 0.1, points.shape) * spacing
@@ -41,7 +41,7 @@ def test_quadratic_basis_converges():
 
 
 def test_laplacian_of_the_linear_basis_does_not_converge():
-    """The printed Laplacian keeps its error at every resolution; its gradient does converge."""
+    """The error of the published Laplacian is independent of resolution; the gradient converges."""
     (gradient, laplacian), errors = orders("linear")
     assert gradient > 0.9
     assert abs(laplacian) < 0.3
