@@ -1,11 +1,11 @@
-"""Placements of two models on ranks: predicted and measured windows, how busy ranks are, what coupling costs.
+"""Placements of two models on ranks: predicted and measured window times, busy shares, and coupling overhead.
 
     PYTHONPATH=. python benchmarks/placement.py [RANKS ...]  (default 1 2; three minutes; writes results/placement.json)
 
 The package of ``cases/bga_drop`` on its board, linear, copper at its true mass, all joints fine, with both schemes; and
-``cases/jedec_bga``, turning and yielding, masses scaled as there, one joint fine. The script starts itself on the
-ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts
-twice: figures are means over the fastest twentieth of the windows, and so are predictions of the least of few samples.
+``cases/jedec_bga`` in finite rotation with plastic solder, its scaled masses and one fine joint. The script starts
+itself on the ranks. Ranks wait for each other, so that interruptions by other programs count twice; figures are
+therefore means over the fastest twentieth of the windows, and predictions use the minimum of a few samples.
 """
 
 import json
@@ -40,7 +40,7 @@ PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
 
 
 def measure(world: MPI.Comm, request: RunInput) -> dict:
-    """Return the prediction, and the time of windows on all ranks."""
+    """Return the prediction and the measured window times on all ranks."""
     problem = PackageDrop.read(world, request)
     plan = problem.place(world)
     comms = Communicators(world, plan.placement)
@@ -68,7 +68,7 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
 
 
 def requests(folder: Path) -> dict[str, RunInput]:
-    """Return the inputs of both schemes and of the nonlinear case, on one rank; meshes are written to a folder."""
+    """Write the meshes to a folder; return the inputs of both schemes and of the nonlinear case on one rank."""
     for name in ("linear", "nonlinear"):
         (folder / name).mkdir()
     scene = DropScene.write(folder / "linear")
@@ -79,7 +79,7 @@ def requests(folder: Path) -> dict[str, RunInput]:
 
 
 def placed(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
-    """Return inputs with all placements on some ranks."""
+    """Return the inputs with all placements on ``size`` ranks."""
     table = {}
     for name, request in inputs.items():
         for placement in ("shared", "disjoint") if size > 1 else ("shared",):
@@ -103,7 +103,7 @@ def main(counts: list[int]) -> None:
 
 
 def bars(row: dict) -> dict:
-    """Return what is asked of a placement: that of the ranks' work only where they share both models."""
+    """Return the limits of a placement; the busy share counts only where ranks share both models."""
     figures = {
         "error of the prediction": turns.bar(abs(row["measured / predicted"] - 1.0), PREDICTION, at_least=False),
         "coupling_overhead": turns.bar(row["coupling_overhead"], OVERHEAD, at_least=False),
@@ -112,7 +112,7 @@ def bars(row: dict) -> dict:
 
 
 def on_ranks(world: MPI.Comm, path: Path) -> None:
-    """Measure the inputs of a file, and write what was found in their place."""
+    """Measure the inputs of a file and overwrite the file with the results."""
     inputs = json.loads(path.read_text())
     rows = {name: measure(world, RunInput.model_validate_json(text)) for name, text in inputs.items()}
     if world.rank == 0:

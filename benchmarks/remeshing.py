@@ -1,8 +1,8 @@
-"""Two hundred joints of known shapes, meshed or refused: method, errors, quality, tries and cost of each kind.
+"""Meshing of two hundred joints of known shape: method, errors, quality, attempts and cost of each kind.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py           (about a minute; to benchmarks/results)
      PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py --quick   (every eighth of each kind)
-Seconds are those of this process; Gmsh makes tetrahedra in processes of its own, which are not counted.
+Times are seconds of this process; the tetrahedra of Gmsh are made in separate processes, which are not counted.
 """
 
 import argparse
@@ -15,7 +15,7 @@ WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviatio
 
 
 def summary(kind: str, joints: list[dict]) -> dict:
-    """The worst of one kind."""
+    """Return counts and worst values of one kind."""
     meshed = [joint for joint in joints if joint["method"] != "refused"]
     return {
         "kind": kind,

@@ -1,4 +1,4 @@
-"""A model of Kratos in explicit steps, for the processes of peers: hexahedra of a material each."""
+"""Explicit Kratos model of hexahedra with one material each, for the processes of peers."""
 
 from collections.abc import Callable
 
@@ -19,18 +19,18 @@ STEP_VARIABLES = (
     Structural.MIDDLE_VELOCITY,
     Structural.FRACTIONAL_ACCELERATION,
 )
-ELEMENTS = {True: "TotalLagrangianElement3D8N", False: "SmallDisplacementElement3D8N"}  # of finite and small strain
+ELEMENTS = {True: "TotalLagrangianElement3D8N", False: "SmallDisplacementElement3D8N"}  # by finite strain or not
 LAWS = {True: Laws.KirchhoffSaintVenant3DLaw, False: Structural.LinearElastic3DLaw}
-NO_HARDENING, NEVER = 3, 1e12  # of Kratos' curves; fracture energy [J/m^2]
+NO_HARDENING, NEVER = 3, 1e12  # number of the Kratos hardening curve; fracture energy [J/m^2]
 COLUMNS = (Kratos.DENSITY, Kratos.YOUNG_MODULUS, Kratos.POISSON_RATIO, Kratos.YIELD_STRESS)
 
 
 def explicit_model(problem: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Callable[[], None]]:
-    """Return a body at rest in its first state, and what takes a step.
+    """Return a body at rest in its initial state, and the function that advances it by one step.
 
     Args:
-        given: ``points``, ``cells`` (cyclic order), ``material`` of each, ``constants`` of materials (density, Young's
-            modulus, Poisson's ratio, yield stress or nan), whether strains are ``finite``, ``step`` [s].
+        problem: Arrays ``points``, ``cells`` (cyclic order), ``material`` of each cell, ``constants`` of the materials
+            (density, Young's modulus, Poisson's ratio, yield stress or nan), flag ``finite`` strain, ``step`` [s].
     """
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
     finite, step = bool(problem["finite"]), float(problem["step"])
@@ -59,7 +59,7 @@ def explicit_model(problem: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Ca
     return body, advance
 
 
-model = Kratos.Model()  # owns the parts: without it they are gone
+model = Kratos.Model()  # owns the parts and must outlive them
 
 
 def fill(body: Kratos.ModelPart, problem: dict[str, np.ndarray], finite: bool) -> None:
@@ -76,7 +76,7 @@ def fill(body: Kratos.ModelPart, problem: dict[str, np.ndarray], finite: bool) -
 
 
 def material_of(body: Kratos.ModelPart, number: int, row: np.ndarray, finite: bool) -> Kratos.Properties:
-    """Return a material: J2 without hardening where it has a yield stress, else linear."""
+    """Return a material: J2 without hardening if it has a yield stress, otherwise linear elastic."""
     properties = body.CreateNewProperties(number)
     for variable, value in zip(COLUMNS, row.tolist(), strict=True):
         if np.isfinite(value):

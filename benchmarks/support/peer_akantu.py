@@ -1,6 +1,6 @@
-"""Akantu's side of ``peers.py`` and ``nonlinear.py``: internal forces and explicit steps of elastic hexahedra.
+"""Akantu process of ``peers.py`` and ``nonlinear.py``: internal forces and explicit steps of elastic hexahedra.
 
-Its J2 material is left out: with ``finite_deformation``, a rotation alone gives it stress (Akantu 5.0.7).
+Its J2 material is left out: with ``finite_deformation`` it has a stress under a pure rotation (Akantu 5.0.7).
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""Akantu's side of ``two_scale_peers.py``: explicit steps of a whole package under a body acceleration."""
+"""Akantu process of ``two_scale_peers.py``: explicit steps of a whole package under a body acceleration."""
 
 import akantu
 import numpy as np

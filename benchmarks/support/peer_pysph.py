@@ -1,6 +1,6 @@
-"""PySPH's side of ``droplet_peers.py``: the dam break among its own examples, in its own environment.
+"""PySPH process of ``droplet_peers.py``: the dam break of the PySPH examples in its own environment.
 
-Takes the particles' spacing [m], the time to follow [s] and a folder; prints a line of JSON.
+Arguments: particle spacing [m], duration [s] and a folder. It prints one line of JSON.
 """
 
 import json

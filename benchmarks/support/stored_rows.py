@@ -1,4 +1,4 @@
-"""Rows of a long table, each kept as soon as it is there: a run that was broken off goes on where it was."""
+"""Table rows that are stored as soon as they are computed, so that an interrupted run continues."""
 
 import hashlib
 import json
@@ -9,14 +9,14 @@ from typing import Any
 import reflowshock.cases.hard.trials
 import reflowshock.fem
 
-SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # of what is measured
+SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # code whose changes invalidate stored rows
 
 
 class StoredRows:
-    """A file of JSON lines, a row each; rows of other sources or parameters stay there, but do not count."""
+    """File of JSON lines with one row each; rows of other sources or parameters are ignored."""
 
     def __init__(self, path: Path, parameters: object) -> None:
-        """Read the rows of these parameters by the present sources; what a killed run left half written goes."""
+        """Read the valid rows of a file and remove an incomplete last line."""
         self._path, self._key = path, digest_of(parameters)
         path.parent.mkdir(parents=True, exist_ok=True)
         whole = path.read_text(encoding="utf-8").rpartition("\n")[0] if path.exists() else ""
@@ -25,7 +25,7 @@ class StoredRows:
         self._rows = {row["name"]: row["value"] for row in rows if row["key"] == self._key}
 
     def get(self, name: str, compute: Callable[[], Any]) -> Any:
-        """Return what is kept under a name, or else compute it and keep it."""
+        """Return the row of a name, computed and stored if it is missing."""
         if name not in self._rows:
             self._rows[name] = compute()
             with self._path.open("a", encoding="utf-8") as file:
@@ -34,7 +34,7 @@ class StoredRows:
 
 
 def digest_of(parameters: object) -> str:
-    """Return a name for parameters and all sources of what is measured."""
+    """Return a digest of the parameters and of all measured source files."""
     digest = hashlib.sha256(repr(parameters).encode())
     for package in SOURCES:
         for path in sorted(Path(package.__path__[0]).rglob("*.py")):

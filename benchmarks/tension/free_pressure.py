@@ -1,10 +1,10 @@
 """Surface tension as a pressure on the free surface: a_i = 2 p_i G_i / rho_i, p = gamma kappa, G the sum of V grad W.
 
-G is what the sums over pairs lack of a pressure at the surface: under a uniform p the liquid rests exactly, so that all
-error is that of the curvature. That is the curvature of the level c = 1/2 of a colour with a wide, smooth kernel
-(Wendland C4, support of four spacings) at the foot of each particle on the level, which a step of Newton's method a
-time step keeps there; then it is smoothed among the particles of the surface, which are those with |G| h above 0.03.
-Contact angles: the model has none; beside a mirror its angle would be 90 degrees.
+G is the defect of the pairwise pressure sums at the surface: under a uniform p the liquid rests exactly, so that the
+only error is in the curvature. The curvature is evaluated on the level c = 1/2 of a colour function with a wide, smooth
+kernel (Wendland C4, support of four spacings) at the foot point of each particle, which one Newton step per time step
+keeps on the level. It is then smoothed over the surface particles, which have |G| h above 0.03. The model has no
+contact angle; at a mirror the angle would be 90 degrees.
 """
 
 from dataclasses import dataclass, field
@@ -18,16 +18,20 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.sph.fluid_state import Fields
 from reflowshock.particles.sph.smoothing import shape, slope
 
-# Support of the colour over the spacing; passes that smooth the curvature; least |G| h at the surface.
+# Support of the colour over the spacing; smoothing passes of the curvature; threshold of |G| h at the surface.
 COLOUR_SUPPORT, PASSES, THRESHOLD = 4.0, 2, 0.03
-# Of the spacing: the longest step of Newton's method. Steps at the start.
+# Longest Newton step over the spacing; number of steps at the start.
 LONGEST, FIRST_STEPS = 0.5, 12
 WENDLAND_C4 = 495.0 / (32.0 * pi)
 
 
 @dataclass(slots=True)
 class FreeSurfacePressure(Untracked):
-    """The pressure of the free surface; `offsets`: `(n, 3)` from particles to their feet on the level [m]."""
+    """Surface tension by a pressure on the free surface.
+
+    Attributes:
+        offsets: Vectors [m] from particles to their foot points on the level, shape (n, 3).
+    """
 
     offsets: Floats = field(default_factory=lambda: np.empty((0, 3)))
     _around_feet: Lists = field(init=False)
@@ -37,7 +41,7 @@ class FreeSurfacePressure(Untracked):
         self._around_feet = Lists(COLOUR_SUPPORT * self.law.spacing, self.law.spacing)
 
     def accelerations(self, points: Floats, fields: Fields) -> Floats:
-        """As `Untracked.accelerations`."""
+        """Return the accelerations, as ``Untracked.accelerations``."""
         count = len(points)
         lists, lack = self.lists.update(points, points), np.empty((3, count))
         _lacks(lists, fields, self.law, lack)
@@ -59,7 +63,7 @@ class FreeSurfacePressure(Untracked):
 
 @looped
 def _lacks(lists, fields, law, lack):
-    """G of each particle `(3, n)` [1/m]."""
+    """Compute G [1/m] of each particle, shape (3, n)."""
     offsets, indices = lists
     for i in prange(lack.shape[1]):
         gx = gy = gz = 0.0
@@ -74,7 +78,7 @@ def _lacks(lists, fields, law, lack):
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def level_at(point, row, fields, support):
-    """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a place."""
+    """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a point."""
     x, y, z = point
     level = gx = gy = gz = xx = yy = zz = xy = yz = xz = 0.0
     for j in row:
@@ -93,7 +97,7 @@ def level_at(point, row, fields, support):
 
 @looped
 def _curvatures(lists, feet, at_surface, fields, result):
-    """Curvature [1/m] of the level at the feet of particles, and their offsets after a step of Newton's method [m]."""
+    """Compute the curvature [1/m] of the level at the foot points, and their offsets [m] after a Newton step."""
     spacing, curvature, offset = result
     offsets, indices = lists
     for i in prange(feet.shape[0]):
@@ -103,7 +107,7 @@ def _curvatures(lists, feet, at_surface, fields, result):
         foot = (feet[i, 0], feet[i, 1], feet[i, 2])
         level, gx, gy, gz, xx, yy, zz, xy, yz, xz = level_at(foot, row, fields, COLOUR_SUPPORT * spacing)
         square = gx * gx + gy * gy + gz * gz
-        if square * spacing * spacing < 1e-8:  # a particle by itself has no surface
+        if square * spacing * spacing < 1e-8:  # an isolated particle has no surface
             curvature[i] = 0.0
             continue
         bend = (
@@ -121,7 +125,7 @@ def _curvatures(lists, feet, at_surface, fields, result):
 
 @looped
 def _smooth(lists, at_surface, fields, law, values):
-    """Mean of the values of the surface's particles over the kernel, the first of the pair into the second."""
+    """Average the first of two arrays over the surface particles with the kernel, into the second."""
     values_in, values_out = values
     offsets, indices = lists
     for i in prange(values_in.shape[0]):

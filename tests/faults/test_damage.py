@@ -1,4 +1,4 @@
-"""Every file of every product, damaged in four ways, is noticed; what is damaged is made again and equals the first."""
+"""Every product file, damaged in four ways, is detected, rebuilt and equal to the first."""
 
 import json
 import random
@@ -74,7 +74,7 @@ def test_damage_heals(drop_folder, way):
     healed = run_drop(folder)
     assert healed.returncode == 0, healed.stderr
     assert "product reflow is damaged" in healed.stderr
-    assert "ok     reflow" in healed.stdout and "ok     report" not in healed.stdout  # the same bits: the report stays
+    assert "ok     reflow" in healed.stdout and "ok     report" not in healed.stdout  # equal bits: report reused
     assert run_drop(folder, "verify").returncode == 0
     assert answers(folder) == expected
     assert (folder / "reflow/shape.h5").read_bytes() == shape

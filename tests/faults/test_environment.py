@@ -1,4 +1,4 @@
-"""The command where it is hard: no home, no locale, folders that cannot be written to, odd names, small limits."""
+"""The command in hard environments: no home, no locale, read-only folders, odd names, small limits."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ import pytest
 from reflowshock.workflow.process.kernel_folder import VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, which reads \\ as one
+TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, where \\ is one backslash
 NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
 ENVIRONMENTS = {
     "nothing": {},
@@ -28,9 +28,9 @@ ENVIRONMENTS = {
 
 @pytest.fixture
 def user_folder():
-    """A folder that anybody may enter, with a case of few particles and an awkward title.
+    """Yield a folder open to all users, with a case of few particles and an awkward title.
 
-    It is none of pytest's own, which each session of pytest closes to other users.
+    The folders of pytest are closed to other users.
     """
     text = (ROOT / "cases/sessile_drop/case.toml").read_text(encoding="utf-8")
     text = text.replace("particles_per_edge = 11", "particles_per_edge = 5")
@@ -65,9 +65,9 @@ def test_a_plan_in_any_environment(user_folder, name):
 
 @pytest.mark.parametrize("kernels", ["given", pytest.param("to be compiled", marks=pytest.mark.long)])
 def test_a_run_of_a_user_without_anything(user_folder, kernels):
-    """Neither a locale nor a home nor, where the test may become another user, kernels: these are long to compile.
+    """A run needs no locale and no home; kernels are copied, since compiling them takes long.
 
-    That they are then kept in a temporary folder is tested beside `kernel_cache`.
+    Their temporary folder is tested with ``kernel_cache``.
     """
     root, out = os.geteuid() == 0, "Gehäuse [x] ü"
     environment = ENVIRONMENTS["C"] | {"TMPDIR": str(user_folder), "HOME": "/nonexistent"}

@@ -1,4 +1,4 @@
-"""Whatever a case says, or a file that it names, reading and planning it ends in success or in one line a problem."""
+"""Reading and planning any case ends in success or in one line per problem, for cases and the files that they name."""
 
 import io
 import os
@@ -57,7 +57,7 @@ def planned(path: Path, *settings: str, force: bool = False) -> None:
 
 
 def mutant(text: str, draw: random.Random) -> bytes:
-    """Change bytes, lines, values, numbers or names of a case file."""
+    """Return a case file with changed bytes, lines, values, numbers or names."""
     lines, kind = text.split("\n"), draw.random()
     if kind < 0.1:
         content = bytearray(text.encode())
@@ -106,7 +106,7 @@ def test_any_case_is_planned_or_refused(tmp_path, capsys):
 
 @pytest.fixture
 def tabulated(tmp_path) -> Path:
-    """A case whose pulse is the table pulse.csv beside it."""
+    """Return a case whose pulse is the table pulse.csv in its folder."""
     text = re.sub(r"(?m)^(peak_acceleration|pulse_duration) .*\n", "", SMALL_CASE.read_text())
     (tmp_path / "case.toml").write_text(text.replace("[shock]\n", '[shock]\ntable = "pulse.csv"\n'))
     return tmp_path / "case.toml"

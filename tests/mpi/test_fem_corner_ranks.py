@@ -1,4 +1,4 @@
-"""Four ranks, three of which meet at one corner of the interface: what they add up there is exact."""
+"""Sums over four ranks, three of which meet at one corner of the interface, are exact."""
 
 import pytest
 
@@ -24,7 +24,7 @@ from reflowshock.cases.hard.trials.coupled import checked, surveyed
 world = MPI.COMM_WORLD
 
 
-def quarters(points, corner):  # of the plane around a vertical edge, one for each rank
+def quarters(points, corner):  # quarters of the plane around a vertical edge, one for each rank
     side = points[:, :2] > corner + 1e-6
     return ((side[:, 0] + 2 * side[:, 1]) % world.size).astype(np.int32)
 

@@ -1,4 +1,4 @@
-"""Bodies of every kind of element move alike on one and on two ranks, and their fields are written."""
+"""Bodies of every kind of element move equally on one and on two ranks, and their fields are written."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
-"""Ranks must not change what levels along a path do to solder that flows, nor may copies of a node differ in a bit.
+"""Step levels with yielding solder: results do not depend on the ranks, and copies of a node are equal to the bit.
 
-A run that is broken off goes on with other ranks.
+An interrupted run continues on other ranks.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ def begun(comm: MPI.Comm) -> ExplicitMotion:
 
 
 def continued(comm: MPI.Comm, parts: list[State]) -> ExplicitMotion:
-    """Return a motion that goes on from the states of all ranks of another division."""
+    """Return a motion continued from the states of all ranks of another division."""
     motion = begun(comm)
     state = checkpoint_state.blank({"motion": motion.state()})
     for part in parts:
@@ -59,7 +59,7 @@ def gathered(comm: MPI.Comm, motion: ExplicitMotion) -> tuple[np.ndarray, float]
 
 
 def write_marches(path: str) -> None:
-    """Write what two ranks found, then those that went on from one, then one that went on from two."""
+    """Write the marches of two ranks, of two continued from one, and of one continued from two."""
     comm = MPI.COMM_WORLD
     motion = begun(comm)
     motion.take_steps(HALF)

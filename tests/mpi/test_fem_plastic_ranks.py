@@ -1,4 +1,4 @@
-"""Solder that yields flows alike on any number of ranks."""
+"""Plastic flow of solder is equal on any number of ranks."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ SHOCK = {
 
 
 def request(meshes: list[Path], macro: int, meso: int) -> Path:
-    """Write the input of a run on some ranks, beside the meshes."""
+    """Write the input of a run on some ranks into the folder of the meshes."""
     output = meshes[0].parent / f"{macro}_{meso}"
     shock = SHOCK | {"ranks": {"total": macro + meso, "placement": "disjoint", "macro": macro}}
     scene = {"mode": "two_scale", "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}

@@ -1,4 +1,4 @@
-"""Cooling gives the same on more ranks, and a coupled shock begins in balance."""
+"""Cooling is equal on more ranks, and a coupled shock begins in balance."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ import pytest
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_programs
 
-QUIET = 1e-6  # [m/s^2] of the pulse: what moves is what is out of balance
+QUIET = 1e-6  # [m/s^2] of the pulse: any motion shows an imbalance
 SHOCK = {
     "peak_acceleration": QUIET,
     "pulse_duration": 2e-5,
@@ -27,7 +27,7 @@ SHOCK = {
 
 
 def written(folder: Path, meshes: list[Path], name: str, ranks: int, **more: object) -> tuple[int, Path]:
-    """Return an input, after its number of ranks."""
+    """Return the number of ranks and an input."""
     shock = SHOCK | {"ranks": {"total": ranks}}
     request = {"meshes": [str(path) for path in meshes], "shock": shock, "output": str(folder / name)}
     path = folder / f"{name}.json"
@@ -41,7 +41,7 @@ def result_of(folder: Path, name: str) -> dict:
 
 @pytest.fixture(scope="module")
 def cooled(tmp_path_factory) -> tuple[Path, dict]:
-    """Folder of a cooling on two ranks, the same alone, and a shock that begins with it; the cooling's result."""
+    """Return the folder of a cooling on two ranks, on one, and of a shock that begins with it; and its result."""
     folder = tmp_path_factory.mktemp("residual")
     meshes = write_small_assembly(folder)
     cooling = [

@@ -1,4 +1,4 @@
-"""A run that is killed continues from its checkpoints to the same bits, on all ranks, fields included."""
+"""A killed run continues from its checkpoints to the same bits on all ranks, fields included."""
 
 import json
 import os

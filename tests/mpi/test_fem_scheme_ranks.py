@@ -1,4 +1,4 @@
-"""Schemes through the program: the same on one rank and on three, close to held velocity, balanced."""
+"""Coupling schemes through the program: equal on one rank and on three, close to held velocity, balanced."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ def assembly(tmp_path_factory) -> Path:
 
 
 def histories(directory: Path, *runs: tuple[str, dict]) -> list[dict[str, np.ndarray]]:
-    """Return what schemes give on their ranks."""
+    """Return the histories of schemes on their ranks."""
     inputs = [(ranks["total"], write_input(directory, scheme, ranks)) for scheme, ranks in runs]
     run_programs(inputs)
     return [history(path.with_suffix("")) for _, path in inputs]

@@ -1,4 +1,4 @@
-"""Heated board and package are the same on one and on two ranks; errors of one rank reach both."""
+"""Heated board and package are equal on one and on two ranks; errors of one rank end both."""
 
 from tests.support.fem_program import run_script
 

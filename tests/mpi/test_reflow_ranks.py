@@ -1,4 +1,4 @@
-"""Joints that MPI ranks reflow are those of processes; what fails or dies is named, and the next run continues."""
+"""Joints reflowed by MPI ranks equal those of processes; failures name the joint, and the next run continues."""
 
 import time
 
@@ -39,7 +39,7 @@ def test_what_fails_is_named_and_all_end(ranks):
         ranks.run(rank_work.fail, {"A1": "sleeps", "A2": "fails"}, lambda _: None)
     assert time.monotonic() - begin < 60.0
     left = [child.as_dict(["cmdline"])["cmdline"] for child in psutil.Process().children(recursive=True)]
-    assert not [line for line in left if line and "reflowshock.workflow.reflow" in line]  # a zombie has no line
+    assert not [line for line in left if line and "reflowshock.workflow.reflow" in line]  # a zombie has no command line
 
 
 def test_nothing_to_do_needs_no_rank(ranks):

@@ -1,4 +1,4 @@
-"""The report of the full chain, and of a run that ended after the reflow."""
+"""Report of the full chain, and of a run that ended after the reflow."""
 
 import shutil
 

@@ -1,4 +1,4 @@
-"""A package that floats on its joints and bows as it is heated: balance, products, and a kill in the midst of it."""
+"""Floating package that bows while it is heated: balance, products, and a kill during the exchange."""
 
 import json
 import signal
@@ -43,7 +43,7 @@ def test_each_load_step_is_in_balance(folder):
 
 
 def test_pads_joints_and_structure_tell_the_same(folder):
-    """The package's pads lie where its nodes are, and joints are in the places of their pads."""
+    """The pads of the package follow its nodes, and the joints follow their pads."""
     pads, joints = read_pads(folder / "reflow/pads.json"), json.loads((folder / "reflow/joints.json").read_text())
     drawn = {pad.name: pad for pad in read_pads(folder / "geometry/pads.json")}
     structure = np.load(folder / "reflow/structure.npz")
@@ -63,7 +63,7 @@ def test_pads_joints_and_structure_tell_the_same(folder):
 
 @pytest.mark.long
 def test_a_kill_in_the_midst_of_an_exchange_changes_nothing(folder, tmp_path):
-    """Killed in the third exchange, by kill -9 of the stage: shapes and products are the same to the last bit."""
+    """After kill -9 of the stage in the third exchange, shapes and products are equal to the bit."""
     line = command_line("run", tmp_path, "--until", "reflow", settings=HEATED)
     break_off(line, tmp_path, signal.SIGKILL, "stage", pattern="*@2")
     result = reflowshock("run", tmp_path, "--until", "reflow", settings=HEATED)

@@ -1,4 +1,4 @@
-"""Joints of a package by the scheme ispg: each flows from its cone with inertia and rests where the default has it."""
+"""Joints of a package by ISPG: each flows from its cone with inertia and rests in the shape of the default scheme."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""From case file to report, on a shortened case; then again, changed, broken off."""
+"""A shortened case from case file to report, then rerun, changed and interrupted."""
 
 import json
 import os
@@ -21,13 +21,13 @@ SNAKEFILE = Path(__file__).resolve().parents[2] / "workflow" / "Snakefile"
 
 
 def planned(text: str) -> set[str]:
-    """Stages that `plan` says will run."""
+    """Return the stages that ``plan`` will run."""
     rows = [line.split("│") for line in text.splitlines() if line.count("│") == 3]
     return {row[0].strip() for row in rows if row[1].strip() == "run"}
 
 
 def work(folder: Path, stage: str) -> Path | None:
-    """The folder in which a stage is at work, if one is."""
+    """Return the work folder of a running stage, or None."""
     return next(iter(folder.glob(f".store/work/{stage}-*/.{stage}.partial")), None)
 
 
@@ -66,7 +66,7 @@ def test_the_summary_has_what_scripts_read(first_run):
 
 
 def processor_seconds() -> float:
-    """Return what all processes have used that this one has started."""
+    """Return the processor seconds of all child processes."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -1,4 +1,4 @@
-"""A study of a small drop, through Snakemake: killed in the middle, one point fails, the others are as by a run."""
+"""Study of a small drop through Snakemake: killed in the middle; one point fails, the others equal single runs."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""A report in a browser: it loads without errors or requests, the view turns, the slider moves, the table sorts."""
+"""Report in a browser: it loads without errors or requests, the view rotates, the slider moves, the table sorts."""
 
 import shutil
 from pathlib import Path
@@ -20,7 +20,7 @@ COLUMN = '[...document.querySelectorAll("table.joints tbody tr")].map((row) => r
 
 @pytest.fixture(scope="module")
 def page(first_run, tmp_path_factory):
-    """A browser with a copy of the shortened case's report, opened beside nothing else."""
+    """Yield a browser with a copy of the report of the shortened case in an otherwise empty folder."""
     folder = tmp_path_factory.mktemp("report")
     report = Path(shutil.copy(first_run[0] / "report.html", folder))
     with Browser() as browser:

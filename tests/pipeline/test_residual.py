@@ -1,4 +1,4 @@
-"""The shock of the shortened case from the stress of cooling on: products, metrics, what it changes, bad input."""
+"""Shock of the shortened case with the stress of cooling: products, metrics, differences, bad input."""
 
 import json
 import shutil
@@ -25,7 +25,7 @@ COOLED = (
 
 
 def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:
-    """Run the shock alone, on the joint meshes that are there."""
+    """Run the shock alone on existing joint meshes."""
     case = read_case(SMALL_CASE, [*COOLED, *settings])
     folder = run_folder / "shock"
     shutil.rmtree(folder, ignore_errors=True)
@@ -55,7 +55,7 @@ def test_both_modes_begin_with_one_cooling(run_folder):
 
 
 def continues_from_the_same_cooling(run_folder: Path) -> None:
-    """A stage that was killed during its shock finds what cooling found, to the same bits."""
+    """Check that a stage killed during its shock reuses the stored cooling, to the same bits."""
     cooling_file = run_folder / ".shock.checkpoints/residual/cooling.npz"
     written, request = cooling_file.stat().st_mtime_ns, json.loads((run_folder / "shock/dns/input.json").read_text())
     again = run_folder / "again"

@@ -66,7 +66,7 @@ def test_from_case_file_to_report(tmp_path, name, setting, metrics):
 
 @pytest.mark.long
 def test_a_drop_in_a_plane_from_case_file_to_report(tmp_path):
-    """The drop of the paper as an endless ridge: at rest a segment of a circle of the area of the cube's face."""
+    """A ridge with the liquid of the paper rests as a circular segment with the area of the cube's face."""
     settings = ("drop.section=plane", "drop.particles_per_edge=8", "drop.contact_angle=120 deg")
     result = run("sessile_drop", tmp_path, *settings, "solder.effects.inertia=on", "solder.parameters=paper")
     assert result.returncode == 0, result.stdout + result.stderr
@@ -121,7 +121,7 @@ MOVED = ("joint.spacing=0.07 mm", "solder.numerics.time_step_limit=100")
 
 
 def reflow_here(folder: Path, *settings: str) -> Findings:
-    """Run the reflow of the solder joint in this process; it holds its health checks."""
+    """Run the reflow of the solder joint in this process and check its health."""
     case = read_case(CASES / "solder_joint" / "case.toml", settings)
     (folder / "reflow").mkdir()
     findings = stage_function(case, "reflow")(Run(folder, case, 1), folder / "reflow")
@@ -130,7 +130,7 @@ def reflow_here(folder: Path, *settings: str) -> Findings:
 
 
 def test_a_package_floats_to_its_collapse_height_and_centres_itself(tmp_path):
-    """Offset by 0.3 radius, under a load: where the Young-Laplace force carries it."""
+    """A package offset by 0.3 radius under a load settles where the Young-Laplace force carries it."""
     findings = reflow_here(tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
     assert findings.metrics["offset"]["value"] < 0.01 * 0.24e-3
     assert set(findings.health) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
@@ -153,7 +153,7 @@ def test_an_offset_joint_has_no_meridian(tmp_path):
 
 
 def short_steps(limit: float) -> tuple[str, str]:
-    """So many steps that a run lasts longer than the interval of its checkpoints."""
+    """Return settings with a time step so short that a run outlasts the interval of its checkpoints."""
     return f"solder.numerics.time_step_limit={limit}", "solder.numerics.max_steps=2000"
 
 
@@ -185,7 +185,7 @@ def rest_of_joint(case: JointCase) -> np.ndarray:
     ],
 )
 def test_a_run_that_is_broken_off_continues_to_the_same_bits(tmp_path, name, settings, at_rest, end):
-    """Also when the command itself is killed: what it has started ends with it."""
+    """Killing the command also ends its child processes, and the run continues."""
     break_off(command(name, tmp_path, *settings), tmp_path, end, "command")
     result = run(name, tmp_path, *settings)
     assert result.returncode == 0, result.stderr

@@ -64,7 +64,7 @@ SMALL_BAR = (
 
 
 def test_two_scales_of_a_bar_from_case_file_to_report(tmp_path):
-    """As the case, but narrower: waves are plane."""
+    """The case with a narrower bar, whose waves are plane."""
     result = command("run", "two_scale_bar", tmp_path, *SMALL_BAR)
     assert result.returncode == 0, result.stdout + result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -1,4 +1,4 @@
-"""Scenes with one effect on or off, and what a piece of work calls: for the tests of the registry of effects."""
+"""Scenes with one effect on or off, and a call counter, for the tests of the registry of effects."""
 
 import sys
 from collections import Counter
@@ -35,7 +35,7 @@ RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "ine
 RHEOLOGY = "tests/unit/particles/test_rheology.py"
 FREEZING = "tests/unit/particles/test_freezing.py"
 FLOWS, DROPLETS = (f"tests/verification/test_particles_{name}.py" for name in ("flows", "droplets"))
-# What needs a whole run is tested where there is one.
+# Effects that need a whole run are tested in tests that have one.
 ELSEWHERE_OFF = {
     "identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path",
     "flow_viscosity": f"{FLOWS}::test_a_term_that_is_off_is_not_computed",
@@ -63,7 +63,7 @@ ELSEWHERE_ON = {
 
 
 def calls(work: Callable[[], object]) -> Counter:
-    """Return how often each Python function is called, and how often compiled ones are, by a piece of work."""
+    """Return the number of calls of each Python and compiled function in a piece of work."""
     counter: Counter = Counter()
 
     def count(frame, event: str, argument) -> None:
@@ -81,7 +81,7 @@ def calls(work: Callable[[], object]) -> Counter:
 
 
 def enters(counted_calls: Counter, dotted_name: str) -> bool:
-    """Whether any method of a class, or a function, was called, given by its dotted name."""
+    """Return whether a function, or any method of a class, was called, from its dotted name."""
     module, _, name = dotted_name.rpartition(".")
     return any(
         at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in counted_calls
@@ -89,13 +89,13 @@ def enters(counted_calls: Counter, dotted_name: str) -> bool:
 
 
 def flow_with(acting: Mapping[str, bool], count: int = 5, solder: Solder = SOLDER) -> LiquidFlow:
-    """Return a cube of solder on a wall, at its start."""
+    """Return a cube of solder on a wall at its start."""
     cloud = box_cloud(solder.volume ** (1.0 / 3.0), count)
     return start_flow(cloud, solder, dict(acting), (contact_line(cloud, 0, np.inf, solder),))
 
 
 def without(physics: Physics, kind: type) -> Physics:
-    """Return the lists of what acts without the objects of one kind."""
+    """Return the lists of acting objects without those of one kind."""
     lists = {item.name: getattr(physics, item.name) for item in fields(physics)}
     return replace(physics, **{name: tuple(x for x in old if not isinstance(x, kind)) for name, old in lists.items()})
 
@@ -105,7 +105,7 @@ def shock(**changes) -> Shock:
 
 
 def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, float]:
-    """Return a strip of board between two held ends, and half its critical step [s]."""
+    """Return a board strip between two held ends, and half its critical step [s]."""
     lines = np.linspace(0.0, LENGTH, 21), [0.0, 2e-3], np.linspace(0.0, THICKNESS, 3)
     ends = {"mounting_holes": lambda c: on(0, 0.0)(c) | on(0, LENGTH)(c)}
     mesh = mesh_of(*grid(*lines), "board", ends)
@@ -123,7 +123,7 @@ def loads_of(body: Body, settings: Shock) -> list[Load]:
 
 
 def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:
-    """Return the motion after a duration [s], and the largest deflection of its middle [m] until then."""
+    """Return the motion after a duration [s], and the largest deflection [m] of its middle until then."""
     motion, largest = motion_of(body, step, loads), 0.0
     middle = np.argmin(np.abs(body.local.points[:, 0] - 0.5 * LENGTH))
     for _ in range(round(duration / step)):

@@ -7,11 +7,11 @@ from reflowshock.fem.division.whole import Survey, Whole
 
 
 def by_patch(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Give the meso model the board's patch and all that is no board."""
+    """Assign the board patch and everything except the board to the meso model."""
     return held(whole, survey, rules, whole.mesh.in_parts(lambda name: name != "board"))
 
 
 def naive(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Take the window from the macro elements alone, whatever touches the cut."""
+    """Take the window from the macro elements alone, ignoring elements at the cut."""
     macro = whole.mesh.in_parts("board".__eq__)
     return in_two_steps("held_velocity", macro, ~macro, plan_windows(rules, macro, survey.step))

@@ -1,9 +1,9 @@
 """One joint between patches of board and substrate, tied to boxes or in columns, and its static equilibrium.
 
-The patches are 3 x 3 mm, the board 1 mm, the substrate 0.4 mm thick; a cylinder of solder of radius 0.24 and height
-0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5 mm; its
-other side moves 6 um outwards and 6 um away. Turned about the joint's axis, the same motion is that of all sides, in
-proportion to the distance from one.
+The patches are 3 x 3 mm, the board is 1 mm and the substrate 0.4 mm thick. A cylinder of solder of radius 0.24 mm and
+height 0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5
+mm; its other side moves 6 um outwards and 6 um away. Rotated about the axis of the joint, the same motion is prescribed
+on all sides in proportion to their distance.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,7 +49,7 @@ SAME = 1e-9  # m
 UP = np.array([0.0, 0.0, 1.0])
 HARDENING = JohnsonCook(A=40e6, B=1e9, n=1.0)
 SOLDER = Isotropic(density=7440.0, young_modulus=44.6e9, poisson_ratio=0.40)
-CONVERGED, NEAR = 1e-8, 1e-3  # of the forces: what is left out of balance, in the end and on the way
+CONVERGED, NEAR = 1e-8, 1e-3  # tolerance of the relative residual, final and intermediate
 SHARES = (0.25, 0.5, 0.75, 1.0)
 JOINT = "A1"
 TODAY = {"core": 3, "rings": 1, "layers": 6}
@@ -59,7 +59,7 @@ PADS = {"diameter": 0.48 * MM, "mask_opening": 0.58 * MM, "definition": "NSMD"}
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """How the patch is meshed: boxes as long as ``box`` [m], shifted; fields of ``package``; swept or free-form."""
+    """Mesh settings of the patch: box size [m] and shift, fields of ``package``, swept or free-form."""
 
     box: float
     joint: dict
@@ -69,7 +69,7 @@ class Mesh:
     swept: bool = True
 
     def times(self, size: float) -> "Mesh":
-        """Make every element so many times as long."""
+        """Return settings with all element sizes multiplied by ``size``."""
         numerics, imprint = JointNumerics.model_validate(self.joint), self.imprint
         names = ["core", "rings", "layers", "copper_layers", *(["pad_layers"] if numerics.pad_layer else [])]
         counts = {name: round(getattr(numerics, name) / size) for name in names}
@@ -82,7 +82,7 @@ class Mesh:
 
 
 def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
-    """Mesh the patches, and the joint between them."""
+    """Mesh the patches and the joint between them."""
     numerics = {"element_size": mesh.box}
     layer = {"length": SIDE, "width": SIDE, "thickness": 0.4 * MM, "elements": mesh.layers[1]}
     package_of_joint = package(
@@ -105,7 +105,7 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
 def free_form_joint(
     surface: ClosedSurface, site: PadSite, whole: Package, side: PackageSide, columns: tuple[Column, ...]
 ) -> JointMesh:
-    """Mesh a joint as ``mesh_joint`` does where no sweep serves, although one would."""
+    """Mesh a joint by the free-form method even if it could be swept."""
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
     joint_place = JointPlace.of(surface, site, side, copper.thickness)
     build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
@@ -113,7 +113,7 @@ def free_form_joint(
 
 
 def box_lines(mesh: Mesh) -> Floats:
-    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column's edges."""
+    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column edges."""
     count = round(SIDE / mesh.box)
     lines = SIDE * (np.arange(count + 1) / count - 0.5)
     if not mesh.shift:
@@ -124,13 +124,13 @@ def box_lines(mesh: Mesh) -> Floats:
 
 
 def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> MeshData:
-    """Return a block of boxes between lines [m]; its face towards the joint is a side that ``tie_joints`` knows."""
+    """Return a block of boxes between lines [m], with its face towards the joint as a side of ``tie_joints``."""
     lines = levels, x if y is None else y, x
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(line) for line in lines])
     corners = [
         number[tuple(slice(side, side - 1 or None) for side in sides)].ravel() for sides in product((0, 1), repeat=3)
-    ]  # bit d of a corner's place is its side along x, y, z
+    ]  # bit d of a corner's index is its side along x, y, z
     face = number[-1] if name == "board" else number[0]
     around = [face[:-1, :-1], face[:-1, 1:], face[1:, 1:], face[1:, :-1]]
     quads = np.column_stack([some.ravel() for some in around]).astype(np.int32)
@@ -140,14 +140,14 @@ def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> Mesh
 
 
 def data_of(joint: JointMesh) -> MeshData:
-    """Return a joint as ``fem`` reads it."""
+    """Return a joint as ``MeshData``."""
     parts = [np.full(len(cells), number, np.int32) for number, cells in enumerate(joint.cells.values())]
     cells = np.concatenate(list(joint.cells.values()))[:, HEXAHEDRON.order]
     return MeshData(joint.points, cells, np.concatenate(parts), tuple(joint.cells), joint.facets)
 
 
 class Problem:
-    """The static problem of a mesh with its prescribed motion."""
+    """Static problem of a mesh with its prescribed motion."""
 
     def __init__(
         self,
@@ -156,12 +156,12 @@ class Problem:
         materials_by_role: dict[str, Material] | None = None,
         turned: float | None = None,
     ) -> None:
-        """Number the equations; solder yields or does not, unless the materials of all roles are given.
+        """Number the equations of a mesh with elastic or yielding solder, or with given materials.
 
         Args:
-            whole: The mesh.
-            yields: Whether solder does.
-            known: Role -> material.
+            whole: Mesh.
+            yields: Whether the solder yields.
+            materials_by_role: Role -> material; overrides ``yields``.
             turned: Angle [rad] of the motion.
         """
         mesh = whole.mesh
@@ -179,7 +179,7 @@ class Problem:
         self.free = np.flatnonzero(free.ravel())
 
     def solve(self) -> Floats:
-        """Find the displacement ``(n, 3)`` [m] by Newton's method, in shares of the motion where solder yields."""
+        """Return the displacement [m], shape (n, 3), by Newton's method, in increments if the solder yields."""
         shares = SHARES if self.yields else (1.0,)
         displacement = self._spread(shares[0] * self.motion)
         for share, following in pairwise((*shares, 1.0)):
@@ -223,7 +223,7 @@ def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
 
 
 def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the motion ``(n, 3)`` [m] of what is held, and which components are."""
+    """Return the prescribed motion [m], shape (n, 3), and the mask of its components."""
     held = np.abs(np.abs(mesh.points[:, 0]) - 0.5 * SIDE) < SAME
     on_board = held & (mesh.points[:, 2] <= SAME) & (mesh.points[:, 0] > 0.0)
     motion = np.zeros_like(mesh.points)
@@ -235,7 +235,7 @@ def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return as ``prescribed`` the motion of all sides at an angle [rad]."""
+    """Return the motion of all sides at an angle [rad], as ``prescribed``."""
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     held = np.abs(np.abs(mesh.points[:, :2]) - 0.5 * SIDE).min(axis=1) < SAME
     share = np.where(held & (mesh.points[:, 2] <= SAME), 0.5 + mesh.points @ along / SIDE, 0.0)
@@ -243,16 +243,16 @@ def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], ND
 
 
 def half_of(whole: Whole) -> Whole:
-    """Return what lies at y >= 0 of a mesh with a line of nodes there: all is symmetric."""
+    """Return the half y >= 0 of a symmetric mesh with a line of nodes at y = 0."""
     tie, each = whole.tie, np.arange(len(whole.tie.slave))
     heaviest = tie.master[each, tie.weight.argmax(axis=1)][:, None]
-    on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # some at y < 0 weigh nothing
+    on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # zero weight at y < 0
     part = part_of(replace(whole, tie=on_plane), whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 1] > 0.0)
     return Whole(part.mesh, part.tie, whole.moved)
 
 
 def is_half(mesh: MeshData) -> bool:
-    """Whether a mesh ends at y = 0."""
+    """Return whether a mesh ends at y = 0."""
     return bool(mesh.points[:, 1].min() > -SAME)
 
 

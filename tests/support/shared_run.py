@@ -1,4 +1,4 @@
-"""Runs that several tests need: the first of all workers that asks makes one, and all of them read it."""
+"""Runs shared by several tests: the first worker that asks makes the run, all others read it."""
 
 import fcntl
 import pickle
@@ -14,12 +14,12 @@ RUNS = {"small": lambda folder: reflowshock("run", folder), "drop": run_drop}
 
 
 def shared_run(name: str, factory: pytest.TempPathFactory, worker: str) -> tuple[Path, CompletedProcess]:
-    """Return the folder of a run that nobody changes, and how it ended.
+    """Return the folder of a read-only run and its completed process.
 
     Args:
-        name: of the run, among `RUNS`.
-        factory: of pytest, whose folders of all workers lie side by side.
-        worker: which of pytest-xdist this is; "master" without it.
+        name: Name of the run in ``RUNS``.
+        factory: Factory of temporary folders, whose parents are shared by all workers.
+        worker: Name of the pytest-xdist worker; "master" without xdist.
     """
     base = factory.getbasetemp() if worker == "master" else factory.getbasetemp().parent
     folder, record = base / "shared" / name, base / "shared" / f"{name}.pickle"

@@ -77,8 +77,8 @@ def test_rows_become_a_table_and_rows_again():
     [
         ({"work": print}, "no data"),
         ([np.array([None])], "value/0: an array of objects"),
-        ({1: "wall"}, "1 is no name"),
-        ({"@": "array"}, "'@' is no name"),
+        ({1: "wall"}, "1 is not a valid name"),
+        ({"@": "array"}, "'@' is not a valid name"),
     ],
 )
 def test_what_is_no_data_is_not_written(tmp_path, value, what):

@@ -131,7 +131,7 @@ def test_replay_of_one_side_is_the_same_to_the_last_bit(tmp_path, name, scheme):
         assert np.array_equal(again.motion.displacement, parts[role].motion.displacement)
         assert again.interface_work == parts[role].interface_work
         assert replayed.velocities.deviation == replayed.forces.deviation == 0.0
-        with pytest.raises(RecordingError, match="another one is wanted"):
+        with pytest.raises(RecordingError, match="the participant asks for another one"):
             run(again)
     with pytest.raises(RecordingError, match="nodes, this one has 1"):
         replay(tmp_path / "meso.npz", scripted_interface(1))

@@ -1,4 +1,4 @@
-"""What is printed is text: no markup of others, no control character, no sequence in a file or a pipe."""
+"""Terminal output is plain text: markup in messages is not interpreted."""
 
 import ast
 import io
@@ -19,8 +19,8 @@ WORKFLOW = Path(terminal.__file__).parent
 
 
 @pytest.fixture
-def shown():
-    """A terminal of 120 columns, and what it has written."""
+def console_output():
+    """A terminal of 120 columns, and its output."""
     console = Terminal(file=io.StringIO(), width=120)
 
     def written() -> str:
@@ -39,15 +39,15 @@ def table_of(text: str) -> Table:
 
 
 @pytest.mark.parametrize("what", [NASTY, styled("{}", NASTY), table_of(NASTY)], ids=["text", "styled", "table"])
-def test_text_is_shown_as_it_is(text, what):
-    console, written = text
+def test_text_is_shown_as_it_is(console_output, what):
+    console, written = console_output
     console.print(what)
     assert written().count(SHOWN) == (4 if isinstance(what, Table) else 1)
     assert "\x1b" not in written()
 
 
-def test_a_text_of_rich_obeys_nothing_either(shown):
-    console, written = shown
+def test_a_text_of_rich_obeys_nothing_either(console_output):
+    console, written = console_output
     console.print(Text("\x1b[31mred"))
     assert written() == "\\x1b[31mred\n"
 
@@ -71,8 +71,8 @@ def test_a_value_for_each_place():
         styled("{} {}", 1)
 
 
-def test_descriptions_of_progress_are_text(shown, monkeypatch):
-    console, written = shown
+def test_descriptions_of_progress_are_text(console_output, monkeypatch):
+    console, written = console_output
     monkeypatch.setattr("reflowshock.workflow.process.terminal.console", console)
     with progress_bar(NASTY) as bar:
         bar(0.5, NASTY)
