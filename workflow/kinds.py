@@ -49,15 +49,15 @@ from reflowshock.workflow.structure.problems import structure_problems
 
 
 class Forecast(Protocol):
-    """What the forecasts of all kinds say."""
+    """Interface of the forecasts of all kinds of case."""
 
     @property
     def effects(self) -> Mapping[str, Any]:
-        """Effect -> "on", "why" and, where it is predicted, "influence"."""
+        """Decisions by effect: "on", "why" and, if predicted, "influence"."""
 
     @property
     def seconds(self) -> Mapping[str, float]:
-        """Stage -> predicted wall time [s], where there is a prediction."""
+        """Predicted wall times by stage [s], for stages with a prediction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     effects: Sequence[Effect]
-    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
+    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, errors: None
 
     @property
     def name(self) -> str:
@@ -109,10 +109,10 @@ def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, sum
     add_shock(run_folder, case, context, summary)
 
 
-def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, errors: Discretisation) -> None:
     from reflowshock.workflow.package_report.conclusion import conclude
 
-    conclude(run_folder, case, summary, known)
+    conclude(run_folder, case, summary, errors)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -279,14 +279,14 @@ def kind_named_in(table: Mapping) -> Kind:
     Raises:
         CaseError: the file has the tables of no kind, or of several.
     """
-    found = [name for name in NAMES if name in table]
-    if found == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
+    names = [name for name in NAMES if name in table]
+    if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
         return PACKAGE
-    if len(found) == 1:
-        return next(kind for kind in KINDS if kind.name == found[0])
+    if len(names) == 1:
+        return next(kind for kind in KINDS if kind.name == names[0])
     choice = "exactly one of " + ", ".join(f"[{name}]" for name in NAMES)
-    if found:
-        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in found)
+    if names:
+        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in names)
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
         raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
@@ -300,6 +300,6 @@ def stage_seconds(case: Case) -> dict[str, float]:
 
 
 def every_stage(case: Case, predicted: Mapping[str, float]) -> dict[str, float]:
-    """Return predicted wall times [s] with those of the stages that take about as long in every case."""
+    """Complete predicted wall times [s] with default values of the short stages."""
     usual = dict.fromkeys(case.pipeline.names, SECONDS_OF_STAGE) | {case.pipeline.names[-1]: SECONDS_OF_REPORT}
     return usual | dict(predicted)

@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import prescribed, write_displaced_assembly
+from reflowshock.meshing.board.displaced_assembly import prescribed_displacement, write_displaced_assembly
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.joint.column import columns_of
@@ -48,7 +48,7 @@ class DropScene:
         case = read_case(CASES / name / "case.toml", ("shock.numerics.mass_scaled=[]", *overrides))
         assert isinstance(case, BoardDropCase)
         write_assembly(case.package, case.board, folder / "flat.msh")
-        displacement = prescribed(case.package, case.warpage)
+        displacement = prescribed_displacement(case.package, case.warpage)
         side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
         (folder / "flat.msh").unlink()
         columns = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}

@@ -9,7 +9,7 @@ import pytest
 from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.cases.hard.trials.surfaces import barrel, with_void
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import prescribed, write_displaced_assembly
+from reflowshock.meshing.board.displaced_assembly import prescribed_displacement, write_displaced_assembly
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.meshing.board.parameters import Warpage
 from reflowshock.meshing.joint.column import columns_of
@@ -36,7 +36,9 @@ def write_package(folder: Path) -> list[str]:
     whole = package(rows=2, standoff=0.30 * MM, joint_numerics=numerics, imprint=imprint)
     plate = board(numerics={"layers": 2, "patch_layers": 1, "coarse_size": 4.0 * MM})
     write_assembly(whole, plate, folder / "flat.msh")
-    side = write_displaced_assembly(folder / "flat.msh", prescribed(whole, WARPAGE), folder / "assembly.msh")
+    side = write_displaced_assembly(
+        folder / "flat.msh", prescribed_displacement(whole, WARPAGE), folder / "assembly.msh"
+    )
     joints = []
     for site in pad_table(whole, plate, WARPAGE):
         surface = barrel(site.gap, 0.04 * MM)

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from reflowshock.meshing.board.displaced_assembly import read_computed
+from reflowshock.meshing.board.displaced_assembly import read_displacement
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile
@@ -35,7 +35,7 @@ def underside_of(run: Path) -> PackageSide:
     """Return the underside of the package from the displacement of the reflow."""
     mesh = MeshFile(run / "geometry/assembly.msh")
     points = mesh.points[np.unique(mesh.cells("package_side", "quad"))]
-    return PackageSide.of_nodes(points, read_computed(run / "reflow/structure.npz")(points))
+    return PackageSide.of_nodes(points, read_displacement(run / "reflow/structure.npz")(points))
 
 
 def test_pads_of_the_joints_are_where_the_package_is(heated_run):
@@ -55,7 +55,7 @@ def test_pads_of_the_joints_are_where_the_package_is(heated_run):
 
 def test_the_assembly_is_displaced_by_what_the_reflow_computed(heated_run):
     flat, displaced = (MeshFile(heated_run / name) for name in ("geometry/assembly.msh", "solder_mesh/assembly.msh"))
-    move = read_computed(heated_run / "reflow/structure.npz")
+    move = read_displacement(heated_run / "reflow/structure.npz")
     for part in ("substrate", "die"):
         before, after = (mesh.points[mesh.cells(part)].reshape(-1, 3) for mesh in (flat, displaced))
         assert after == pytest.approx(before + move(before), abs=1e-15)

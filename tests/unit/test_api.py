@@ -1,4 +1,4 @@
-"""Importing the program, loading and planning cases from Python; what a wheel and a source distribution hold."""
+"""The program from Python: loading and planning cases; contents of wheel and source distribution."""
 
 import shutil
 import subprocess

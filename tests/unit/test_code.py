@@ -38,7 +38,7 @@ def test_import_rules():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_file_that_is_read_can_run_code(package):
-    """Pickles and their like are code; `np.load` takes none unless it is asked to, and nothing asks it."""
+    """Pickles and their like are code; `np.load` takes none unless `allow_pickle` is set, and nothing sets it."""
     found = []
     for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -78,7 +78,7 @@ def test_import_is_light(module):
 
 
 def test_plans_are_light():
-    """A report tells costs beside its pictures, and VTK draws no text in a process that has loaded DOLFINx."""
+    """A report predicts costs and draws pictures, and VTK draws no text in a process that has loaded DOLFINx."""
     lines = [
         "import sys; from pathlib import Path; from rich.console import Console",
         "from reflowshock.workflow.pipeline.reader import read_case; from reflowshock.workflow.plan import show_plan",

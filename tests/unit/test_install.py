@@ -1,4 +1,4 @@
-"""Recipes that install the program without `make setup` know what it needs, and name files that exist."""
+"""Recipes for installation without `make setup` list all dependencies and existing files."""
 
 import re
 import subprocess

@@ -37,7 +37,7 @@ def sleep(note: Path) -> None:
 
 
 def fall() -> None:
-    """End as a process does for which there is no memory."""
+    """End like a process that has run out of memory."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 

@@ -64,11 +64,11 @@ def places(*pairs, diameter=2.0):
     ("changes", "key", "told"),
     [
         ({"holes": places((-8, -7), (17.0, 10))}, "board.holes.at", "beyond the board along x -10.5 mm to -"),
-        ({"holes": places((-8, 0), (14, 10))}, "board.holes.at", "beside the package.* along y"),
-        ({"holes": places((-8, -7), (-8, -7))}, "board.holes.at", "would turn"),
+        ({"holes": places((-8, 0), (14, 10))}, "board.holes.at", "next to the package.* along y"),
+        ({"holes": places((-8, -7), (-8, -7))}, "board.holes.at", "could rotate"),
         ({"holes": places((-8, -7), (14, 10), (13, -7))}, "board.holes.at", "neither in line nor apart along x"),
         ({"holes": places() | {"inset_x": MM}}, "board.holes.inset_y", "is missing"),
-        ({"holes": places((-8, -7), (14, 10)) | {"inset_x": MM}}, "board.holes.inset_x", "goes with no holes"),
+        ({"holes": places((-8, -7), (14, 10)) | {"inset_x": MM}}, "board.holes.inset_x", "cannot be combined"),
         ({"symmetry": "quarter"}, "board.centre", "in the middle"),
         (
             {"symmetry": "quarter", "centre": (0.0, 0.0), "length": 40 * MM, "width": 30 * MM},

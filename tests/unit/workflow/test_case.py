@@ -1,4 +1,4 @@
-"""Reading a case, and refusing what is no case: each message names place, key, value, range and nearest name."""
+"""Reading and validation of case files: each message names file, key, value and allowed values."""
 
 import os
 import re

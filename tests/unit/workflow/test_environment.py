@@ -1,4 +1,4 @@
-"""The environment of the program and of all that it starts is completed, and what is too small is told."""
+"""Environment of the program and its subprocesses: defaults are set, and folders that are too small are reported."""
 
 import os
 import resource
@@ -19,7 +19,7 @@ from reflowshock.workflow.process.environment import (
 
 @pytest.fixture
 def nowhere(tmp_path):
-    """A path that is no folder, nor can become one."""
+    """A path that is not a folder and cannot be created."""
     (tmp_path / "file").write_text("", encoding="utf-8")
     return str(tmp_path / "file" / "folder")
 
@@ -136,7 +136,7 @@ def test_more_files_are_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(resource, "getrlimit", lambda one: (32, 100_000))
     monkeypatch.setattr(resource, "setrlimit", lambda one, limits: asked.append((one, limits)))
-    monkeypatch.setattr(environment, "LEAST", ())
+    monkeypatch.setattr(environment, "MINIMUM_LIMITS", ())
     check_limits()
     assert asked == [(resource.RLIMIT_NOFILE, (environment.TARGET_FILES, 100_000))]
 

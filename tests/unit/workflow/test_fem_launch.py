@@ -1,4 +1,4 @@
-"""What a run of the package fem says on its standard output reaches the user."""
+"""Messages and progress that a run of the package fem prints."""
 
 import json
 

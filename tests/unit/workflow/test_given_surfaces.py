@@ -1,4 +1,4 @@
-"""Joints whose surfaces the user gives: refused by key before anything runs, taken instead of what was reflowed."""
+"""Surfaces from files instead of reflow: they are validated by key before anything runs."""
 
 import re
 import shutil
@@ -34,7 +34,7 @@ from tests.support.workflow_command import SMALL_CASE
 
 @pytest.fixture
 def case_file(tmp_path) -> Path:
-    """A case beside a surface of A4, another 10 % wider than the reflowed ones."""
+    """A case next to a surface of A4, another 10 % wider than the reflowed ones."""
     shutil.copy(SMALL_CASE, tmp_path / "case.toml")
     given = barrel(0.35 * MM, 0.06 * MM)
     low, wrong = barrel(0.25 * MM, 0.06 * MM), given.triangles.copy()

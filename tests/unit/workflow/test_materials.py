@@ -1,4 +1,4 @@
-"""Materials of a structure: own ones and those of the library, impossible ones refused by key, value and range."""
+"""Materials of a structure: user-defined and library materials; impossible ones are rejected by key."""
 
 from pathlib import Path
 

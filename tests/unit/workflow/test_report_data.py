@@ -1,4 +1,4 @@
-"""What a report's script draws: arrays, lines, surfaces, colours; and that nothing of a case becomes code."""
+"""Data that the script of a report draws: arrays, lines, surfaces."""
 
 import base64
 import hashlib

@@ -1,4 +1,4 @@
-"""A case file at other sizes: values of a scale replace those of the file, settings those of the scale."""
+"""Scales of a case file: values of a scale replace values of the file, settings replace both."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The shock of a package in a case file: every way to give its pulse, and what is said about impossible ones."""
+"""The shock in a case file: all forms of its pulse, and messages for impossible ones."""
 
 from pathlib import Path
 
@@ -143,7 +143,7 @@ def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
 
 @pytest.mark.parametrize(("kinematics", "measured"), [("corotational", 2.05e-3), ("small", 3.05e-3)])
 def test_expected_duration_is_that_of_the_default_case(kinematics, measured):
-    """Where its run ended, as cases/jedec_bga/README.md tells."""
+    """Duration at which its run ended, see cases/jedec_bga/README.md."""
     case = read_case(CASES / "jedec_bga" / "case.toml", [f"shock.numerics.kinematics={kinematics}"])
     assert expected_duration(case) == pytest.approx(measured, rel=0.1)
     assert expected_duration(case) < longest_duration(case)

@@ -1,4 +1,4 @@
-"""A product appears complete, or not at all; what a stage has used is still so when it ends."""
+"""Running a stage: a product is complete or absent, and inputs must not change while it is built."""
 
 import json
 import subprocess
@@ -112,7 +112,7 @@ def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run
 
 
 def test_a_file_of_the_case_that_changes_before_a_stage_begins_is_noticed(tmp_path):
-    """The product is named after what the file held when the command began."""
+    """The key of the product follows from the file's content when the command started."""
     surface = tmp_path / "A1.stl"
     surface.write_text("first")
     case = read_case(SMALL_CASE)

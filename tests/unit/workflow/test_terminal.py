@@ -1,4 +1,4 @@
-"""What is printed is text: no markup of others, no control character, no sequence in a file or a pipe."""
+"""Terminal output is plain text: markup in messages is not interpreted."""
 
 import ast
 import io
@@ -20,7 +20,7 @@ WORKFLOW = Path(terminal.__file__).parent
 
 @pytest.fixture
 def shown():
-    """A terminal of 120 columns, and what it has written."""
+    """A terminal of 120 columns, and its output."""
     console = Terminal(file=io.StringIO(), width=120)
 
     def written() -> str:

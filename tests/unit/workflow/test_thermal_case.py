@@ -1,4 +1,4 @@
-"""The reflow's temperatures in a case file, how materials expand, and what is said about impossible values."""
+"""Temperatures in a case file, thermal expansion of materials, and messages for impossible values."""
 
 import tomllib
 

@@ -1,4 +1,4 @@
-"""Joints that are bridged or open: told in the records, the checks and the report, and never meshed."""
+"""Joints that are bridged or open: reported in records, checks and the report."""
 
 import json
 from types import SimpleNamespace
