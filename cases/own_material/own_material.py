@@ -82,7 +82,7 @@ def mesh() -> MeshData:
 
 
 def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -> dict[str, np.ndarray]:
-    """Drop the board; return displacement of the part over the clamps [m] and energies [J] over time [s]; collective."""
+    """Drop the board; return the displacement of the part over the clamps [m] and energies [J] by time; collective."""
     model = prepare(mesh(), "dns")["dns"] if comm.rank == 0 else None
     tables = comm.bcast(model.tables if model else None)
     local = distribute(comm, model.mesh if model else None)
