@@ -131,7 +131,7 @@ def fields_of(record: object) -> dict[str, Any]:
         return {field.name: getattr(record, field.name) for field in fields(record)}
     if hasattr(record, "model_dump"):
         return record.model_dump()
-    raise TypeError(f"{type(record).__name__} has an unsupported type")
+    raise TypeError(f"{type(record).__name__} is not a supported type")
 
 
 def _name_of(record: type) -> str:

@@ -1,4 +1,4 @@
-"""All kinds of case: one record each, with all that the program does with a case of that kind."""
+"""Kinds of case: one record per kind with its model, checks, stages, forecast and report."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -62,20 +62,20 @@ class Forecast(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of case.
+    """Kind of case.
 
     Attributes:
-        case: the model of its case files.
-        problems: finds parameters that are each allowed, but impossible together.
-        stages: name -> function of each stage but the report, in order.
-        forecast: predicts effects and cost from the parameters alone.
-        size: predicts what its stages take on one core.
-        plan: what the plan shows below stages and effects, of a case and its forecast.
-        acts: what its effects belong to, for readers.
-        report: adds its sections to the context of a report: run folder, case, context, summary.
-        study: its convergence study.
-        effects: those that it may call for.
-        conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
+        case: model of its case files.
+        problems: check for combinations of parameters that are impossible.
+        stages: functions of the stages except the report, by name, in order.
+        forecast: prediction of effects and cost from the parameters.
+        size: prediction of time and memory of the stages.
+        plan: further tables of the plan, from a case and its forecast.
+        acts: subject of its effects in headings.
+        report: function that adds sections to the context of a report: run folder, case, context, summary.
+        study: convergence study of a case.
+        effects: effects that may act.
+        conclude: function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -92,7 +92,7 @@ class Kind:
 
     @property
     def name(self) -> str:
-        """The table that makes a file a case of this kind."""
+        """Name of the table that identifies this kind of case file."""
         return self.case.kind
 
 
@@ -277,7 +277,7 @@ def kind_named_in(table: Mapping) -> Kind:
     """Return the kind of a case file.
 
     Raises:
-        CaseError: the file has the tables of no kind, or of several.
+        CaseError: the file has the table of no kind, or of several.
     """
     names = [name for name in NAMES if name in table]
     if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
@@ -291,7 +291,7 @@ def kind_named_in(table: Mapping) -> Kind:
     if isinstance(table.get("study"), dict):
         raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
     hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
-    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
+    raise CaseError("case", [Problem("", "has no table that identifies the kind of case", None, choice, hint)])
 
 
 def stage_seconds(case: Case) -> dict[str, float]:

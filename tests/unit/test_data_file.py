@@ -73,16 +73,16 @@ def test_rows_become_a_table_and_rows_again():
 
 
 @pytest.mark.parametrize(
-    "value, what",
+    "value, message",
     [
-        ({"work": print}, "no data"),
-        ([np.array([None])], "value/0: an array of objects"),
+        ({"work": print}, "not a supported type"),
+        ([np.array([None])], "value/0: arrays of objects"),
         ({1: "wall"}, "1 is not a valid name"),
         ({"@": "array"}, "'@' is not a valid name"),
     ],
 )
-def test_what_is_no_data_is_not_written(tmp_path, value, what):
-    with pytest.raises(TypeError, match=what):
+def test_unsupported_values_are_rejected(tmp_path, value, message):
+    with pytest.raises(TypeError, match=message):
         write_data(tmp_path / "file", {}, value)
     assert not list(tmp_path.iterdir())
 

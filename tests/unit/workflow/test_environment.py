@@ -136,7 +136,7 @@ def test_more_files_are_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(resource, "getrlimit", lambda one: (32, 100_000))
     monkeypatch.setattr(resource, "setrlimit", lambda one, limits: asked.append((one, limits)))
-    monkeypatch.setattr(environment, "LEAST", ())
+    monkeypatch.setattr(environment, "MINIMUM_LIMITS", ())
     check_limits()
     assert asked == [(resource.RLIMIT_NOFILE, (environment.TARGET_FILES, 100_000))]
 
