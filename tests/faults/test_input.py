@@ -158,7 +158,7 @@ NO_CASES = {
     "deep tables": (b"a." * 500 + b"a = 1", "nested too deeply"),
     "too large": (b"#" * 4_100_000, "too large: 4.1 MB; allowed: up to 4 MB"),
     "a study": (b"[study]\nname = 'x'\n", "is a study, not a case; use reflowshock study"),
-    "nothing": (b"", "does not say what kind of case it is"),
+    "nothing": (b"", "has no table that identifies the kind of case"),
 }
 
 

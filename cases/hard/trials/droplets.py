@@ -1,4 +1,4 @@
-"""Trials of delta-SPH: droplets, tanks and printed parts, judged by energy, momentum, volume, walls, exact shapes."""
+"""Trials of delta-SPH: droplets, tanks and printed parts, checked by energy, momentum, volume and exact shapes."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from reflowshock.particles.sph.fluid_state import Fields
     from reflowshock.particles.sph.simulation import Simulation
 
-# Steps after which energy, momentum and the like are looked at.
+# Steps between samples of energy, momentum and other measures.
 LOOK = 10
-# In spacings: particles that are farther outside their surface are lost.
+# Distance outside the surface, in spacings, beyond which a particle counts as lost.
 OUTSIDE = 1.0
-# Of the time: "at rest" are means over the last share, the beginning is forgotten after the first.
+# Shares of the duration: end of the initial phase, and begin of the means "at rest".
 LATE, EARLY = 0.9, 0.1
 
 
 class Unrest(Parameters):
-    """Disorder of the particles at the start.
+    """Random disorder of the particles at the start.
 
-    ``displaced`` is how far each is moved along each axis at most, over the spacing; ``density`` by how much that of
-    each differs at most, over that at rest. Both are drawn evenly from a seed.
+    ``displaced`` is the largest displacement along each axis over the spacing; ``density`` the largest relative change
+    of density. Both are uniform from a seed.
     """
 
     displaced: float = Field(0.0, ge=0, le=0.3)
@@ -38,7 +38,7 @@ class Unrest(Parameters):
     seed: int = Field(1, ge=0)
 
     def disturb(self, fields: "Fields", fluids: int, spacing: float) -> None:
-        """Displace the particles of a liquid, a spacing apart [m], in two or three dimensions; change densities."""
+        """Displace the particles of a liquid, a spacing [m] apart, and change their densities."""
         random = np.random.default_rng(self.seed)
         for coordinate in fields[:3]:
             if np.ptp(coordinate) > 0.0:
@@ -47,10 +47,10 @@ class Unrest(Parameters):
 
 
 class DropletTrial(Parameters):
-    """A droplet, or two equal ones, for the duration of the scene.
+    """One droplet or two equal ones for the duration of the scene.
 
-    The second one lands beside the first, or they fly against each other along x, each with a speed, their paths so
-    many diameters apart.
+    The second droplet lands next to the first, or they collide along x with a speed each and paths an offset apart
+    [diameters].
     """
 
     droplet: Droplet
@@ -61,9 +61,9 @@ class DropletTrial(Parameters):
 
 
 class TankTrial(Parameters):
-    """A column of liquid in a tank, in a plane; at rest at its wall, or thrown at the other one from the middle.
+    """Plane column of liquid in a tank, at rest at one wall or thrown at the other from the middle.
 
-    With ``undiffused`` it is computed a second time, without diffusion of density, to compare their noise.
+    With ``undiffused`` it runs again without density diffusion to compare the noise.
     """
 
     dam_break: DamBreak
@@ -79,14 +79,14 @@ class TankTrial(Parameters):
 
 
 class PrintTrial(Parameters):
-    """Drops that are printed."""
+    """Printed drops."""
 
     printing: Printing
 
 
 @dataclass(slots=True)
 class Watch:
-    """What is looked at while a liquid moves; called in every step."""
+    """Sampler of a moving liquid, called in every step."""
 
     simulation: "Simulation"
     rows: list[tuple[float, ...]] = field(default_factory=list)
@@ -95,7 +95,7 @@ class Watch:
         self._look()
 
     def __call__(self, fraction: float) -> None:
-        """Look, where it is time."""
+        """Take a sample when one is due."""
         if self.simulation.steps % LOOK == 0 or fraction >= 1.0:
             self._look()
 
@@ -118,7 +118,7 @@ class Watch:
         )  # fmt: skip
 
     def measured(self) -> dict[str, float]:
-        """Measures that all liquids have."""
+        """Return the measures of all liquids."""
         time, energy, fastest, momentum, squeezed, pressure, *centre = np.array(self.rows).T
         law, mass = self.simulation.law, float(self.simulation.fields.mass[: self.simulation.fluids].sum())
         later = np.maximum.accumulate(energy[::-1])[::-1]
@@ -140,7 +140,7 @@ class Watch:
 
 
 def droplet(parameters: DropletTrial) -> dict[str, float]:
-    """Let one droplet or two move."""
+    """Run one droplet or two."""
     from reflowshock.particles.sph_flows.droplet import follow
 
     scene, simulation = parameters.droplet, droplets(parameters)
@@ -159,7 +159,7 @@ def droplet(parameters: DropletTrial) -> dict[str, float]:
 
 
 def droplets(parameters: DropletTrial) -> "Simulation":
-    """Set up one droplet or two, and their disorder."""
+    """Set up one droplet or two with their disorder."""
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
     from reflowshock.particles.sph_flows.droplet import droplet as alone
@@ -184,7 +184,7 @@ def droplets(parameters: DropletTrial) -> "Simulation":
 
 
 def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, float]:
-    """Errors of the shape that all liquid together would have at rest, and what an impact spread to."""
+    """Return errors of the rest shape of the whole liquid, and the spread of an impact."""
     scene, late = parameters.droplet, history["time"] >= LATE * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
     size = 1.0 if parameters.pair == "none" else 2.0 ** (1.0 / 3.0)
@@ -202,7 +202,7 @@ def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[s
 
 
 def _outside(simulation: "Simulation") -> float:
-    """Share of the particles that are farther outside their surface than `OUTSIDE`."""
+    """Return the share of particles more than ``OUTSIDE`` outside their surface."""
     from reflowshock.particles.surface.cloud_level_set import with_mirror_image
     from reflowshock.particles.surface.level_set import depths
 
@@ -215,7 +215,7 @@ def _outside(simulation: "Simulation") -> float:
 
 
 def tank(parameters: TankTrial) -> dict[str, float]:
-    """Let a column in a tank flow, or rest; noise is that of the pressure about that at rest, over rho g H."""
+    """Run a column in a tank; noise is the deviation from hydrostatic pressure over rho g H."""
     measures, noise = _tank(parameters)
     if parameters.undiffused:
         rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
@@ -254,7 +254,7 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
 
 
 def printed(parameters: PrintTrial) -> dict[str, float]:
-    """Print a part; the largest speed is over that of sound, lengths over the diameter of a drop or the spacing."""
+    """Print a part; return speeds over the speed of sound and lengths over the drop diameter or the spacing."""
     from scipy.spatial import cKDTree
 
     from reflowshock.particles.printing.printing import solve_printing

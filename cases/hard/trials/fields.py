@@ -1,4 +1,4 @@
-"""Trials of elements with one field of strain: patch tests, turns, tension, compression, and a pull across a tie."""
+"""Element trials with uniform strain: patch tests, rotations, tension, compression, and tension across a tie."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -23,11 +23,11 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
 
 AXIS = np.array([0.48, -0.6, 0.64])
-LARGE = 0.3  # largest component of a displacement gradient of finite strain
+LARGE = 0.3  # largest component of a finite displacement gradient
 
 
 class Followed(NamedTuple):
-    """The end of a path: stress (3, 3) in the frame that turns along, its scatter, the force on inner nodes.
+    """State at the end of a path: co-rotated stress (3, 3), its scatter, and the force on inner nodes.
 
     Scatter and force are relative.
     """
@@ -38,7 +38,7 @@ class Followed(NamedTuple):
 
 
 def patch(parameters: Patch) -> dict[str, float]:
-    """Return what an affine field leaves on inner nodes, how its stress scatters, and what elements resist by."""
+    """Return the force on inner nodes and the stress scatter of an affine field, and the element stiffness extremes."""
     material = laminate(parameters.poisson_ratio, parameters.orthotropy)
     elements = body_of(parameters, material)
     gradient = np.random.default_rng(parameters.seed).uniform(-1.0, 1.0, (3, 3)) * LARGE
@@ -52,7 +52,7 @@ def patch(parameters: Patch) -> dict[str, float]:
 
 
 def affine(elements: Elements, gradient: np.ndarray) -> tuple[float, float]:
-    """Return the force on inner nodes, over the largest, and the error of the stress, of linear elements."""
+    """Return the relative force on inner nodes and the stress error of linear elements in an affine field."""
     displacement = elements.points @ gradient.T
     force = np.zeros_like(displacement)
     for term in linear_terms(elements):
@@ -67,9 +67,9 @@ def affine(elements: Elements, gradient: np.ndarray) -> tuple[float, float]:
 
 
 def resisted(elements: Elements) -> tuple[float, float]:
-    """Return the softest strain of any element and its stiffest rigid motion, over its stiffest strain.
+    """Return the softest strain mode and the stiffest rigid mode of any element over its stiffest strain mode.
 
-    Nodes are scaled to a cube: a flat element is soft in bending because it is flat.
+    Nodes are scaled to a cube, since a flat element is soft in bending by its shape alone.
     """
     corners = elements.points[elements.cells]
     values = np.linalg.eigvalsh(elements.kind.stiffness(corners, elements.elasticity, elements.material))
@@ -77,12 +77,12 @@ def resisted(elements: Elements) -> tuple[float, float]:
 
 
 def inner_nodes(elements: Elements) -> np.ndarray:
-    """Return the nodes (k,) on no face of the body."""
+    """Return the nodes (k,) inside the body."""
     return np.setdiff1d(np.arange(len(elements.points)), boundary_facets(elements.cells))
 
 
 def turns(parameters: Turns) -> dict[str, float]:
-    """Return force and stress, over the modulus, that turning alone has made: none, exactly."""
+    """Return force and stress over the modulus after rotations alone; both are zero in theory."""
     material = laminate(parameters.poisson_ratio, parameters.orthotropy)
     term = nonlinear(body_of(parameters, material), material, finite=True)
     points, worst = term.elements.points, 0.0
@@ -96,10 +96,10 @@ def turns(parameters: Turns) -> dict[str, float]:
 
 
 def tension(parameters: Tension) -> dict[str, float]:
-    """Return the error of the stress at the end of a uniaxial path of a metal, where its law gives it exactly.
+    """Return the stress error at the end of a uniaxial path of a metal with an exact solution.
 
-    Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; of finite kinematics these are logarithmic, and the
-    body turns by 1.4 rad on the way.
+    Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; logarithmic for finite kinematics with a rotation of
+    1.4 rad on the path.
     """
     metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, parameters.plastic_strain
     assert law is not None
@@ -120,7 +120,7 @@ def tension(parameters: Tension) -> dict[str, float]:
 
 
 def compression(parameters: Compression) -> dict[str, float]:
-    """Return the error of the stress of a confined body, C ln U exactly."""
+    """Return the stress error of a confined body against C ln U."""
     material = laminate(parameters.poisson_ratio, parameters.orthotropy)
     term = nonlinear(body_of(parameters, material), material, finite=True)
     history = follow(term, lambda s: np.diag([1.0, 1.0, parameters.stretch**s]), parameters.steps)
@@ -128,7 +128,7 @@ def compression(parameters: Compression) -> dict[str, float]:
 
 
 def judged(history: Followed, exact: np.ndarray) -> dict[str, float]:
-    """Compare the end of a path with its exact stress."""
+    """Return the errors at the end of a path against its exact stress."""
     return {
         "stress_error": float(np.abs(history.stress - exact).max() / np.abs(exact).max()),
         "stress_scatter": history.scatter,
@@ -137,9 +137,9 @@ def judged(history: Followed, exact: np.ndarray) -> dict[str, float]:
 
 
 def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: int) -> Followed:
-    """Deform all by F(s), s from 0 to 1.
+    """Deform the body by F(s), s from 0 to 1.
 
-    Round-off of U is multiplied by the modulus, which forces and stresses are over where that is more.
+    Forces and stresses are relative to the modulus if that is larger, since it multiplies the round-off of U.
     """
     elements = term.elements
     points = elements.points
@@ -150,16 +150,16 @@ def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: 
     return Followed(symmetric(means[:1])[0], float(np.abs(means - means[0]).max() / np.abs(means).max()), float(left))
 
 
-SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # of a block [m], and its layers of elements
-PULL = 1e-3  # displacement of the upper face over the height of both blocks
+SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # side, height [m] and layers of a block
+PULL = 1e-3  # displacement of the upper face over the total height
 
 
 def tied(parameters: Tied) -> dict[str, float]:
-    """Return how far stresses are from the one that is the same everywhere, at worst and in the mean, and the force.
+    """Return the largest and mean stress error, and the force error, of two tied blocks under tension.
 
-    Without lateral contraction two blocks that are pulled have one stress, whatever their moduli. Nodes that follow a
-    face at points give its forces back so that their sum and moment are kept, but not those of each node: stresses next
-    to the tie are wrong by what `stress_error` says, and the pull by far less.
+    Without lateral contraction the stress is uniform whatever the moduli. Slave nodes return their forces to the master
+    face with exact sum and moment, but not for each node: stresses near the tie have the error ``stress_error``, the
+    total force has a far smaller one.
     """
     body = body_of_blocks(parameters)
     displacement, top = pulled(body)
@@ -177,7 +177,7 @@ def tied(parameters: Tied) -> dict[str, float]:
 
 
 def body_of_blocks(parameters: Tied) -> Body:
-    """Return both blocks as one body: the program's own tie, which it checks."""
+    """Return both blocks as one body with the program's own tie and its checks."""
     item = prepare(append(blocks(parameters)), "dns")["dns"]
     soft = laminate(0.0, young=YOUNG / parameters.contrast)
     pieces = make_pieces(
@@ -190,7 +190,7 @@ def body_of_blocks(parameters: Tied) -> Body:
 
 
 def blocks(parameters: Tied) -> list[MeshData]:
-    """Return the lower, coarse block and the upper one, whose nodes follow the lower one's face."""
+    """Return the lower, coarse block and the upper, tied one."""
     made = []
     for name, count, low in (
         ("board", parameters.coarse, 0.0),
@@ -205,7 +205,7 @@ def blocks(parameters: Tied) -> list[MeshData]:
 
 
 def pulled(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacement (n, 3) of a body whose upper face is pulled, and the nodes (k,) of that face.
+    """Return the displacement (n, 3) of a body under tension, and the nodes (k,) of the pulled face.
 
     Nodes at x = 0, y = 0 and z = 0 keep that coordinate.
     """

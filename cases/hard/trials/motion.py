@@ -1,4 +1,4 @@
-"""Trials of one model that moves: free flight close to the critical step, a rod that strikes a wall, a short pulse."""
+"""Trials of one moving model: free flight near the critical step, rod impact, and short pulses."""
 
 from collections.abc import Callable
 
@@ -30,19 +30,19 @@ from reflowshock.materials.library import COPPER
 from reflowshock.materials.parameters import Material
 from reflowshock.materials.roles import Materials
 
-HEIGHT = 1e-3  # of a box [m]
-SPEED = np.array([1.0, -2.0, 3.0])  # of the body as a whole [m/s]
-LOOK = 50  # steps between two looks at the energies: what doubles in each is then still a number
-BALANCE = 0.02  # of the energy balance, the program's default
+HEIGHT = 1e-3  # height of a box [m]
+SPEED = np.array([1.0, -2.0, 3.0])  # speed of the whole body [m/s]
+LOOK = 50  # steps between energy samples; a doubling in each step stays finite
+BALANCE = 0.02  # limit of the energy balance, the program's default
 
 
 def flight(parameters: Flight) -> dict[str, float]:
-    """Fly; return the error of the energies and momenta, and the step of the assembled body over that of its elements.
+    """Return the errors of energies and momenta, and the assembled critical step over the element step.
 
-    Energies are judged as in a run; momenta are over those of all nodes by magnitude.
+    Energies are checked as in a run; momenta are relative to the sum of all nodal magnitudes.
 
     Raises:
-        EnergyError: The step is above the critical one, or energies do not balance.
+        EnergyError: If the step exceeds the critical one or energies do not balance.
     """
     pieces, tables = pieces_of(parameters)
     target = float(pieces.steps[pieces.roles != "copper"].min())
@@ -65,7 +65,7 @@ def flight(parameters: Flight) -> dict[str, float]:
 
 
 def pieces_of(parameters: Flight) -> tuple[Pieces, Tables]:
-    """Return the elements of a trial on this rank, and what goes with them."""
+    """Return the elements of a trial on this rank and their tables."""
     item = prepare(mesh_of_flight(parameters), "dns")["dns"]
     soft = laminate(parameters.poisson_ratio, parameters.orthotropy, YOUNG / parameters.contrast)
     materials = Materials(
@@ -77,7 +77,7 @@ def pieces_of(parameters: Flight) -> tuple[Pieces, Tables]:
 
 
 def mesh_of_flight(parameters: Flight) -> MeshData:
-    """Return the body: its parts from below are board, perhaps copper, and substrate."""
+    """Return the mesh: board, optional copper, and substrate from below."""
     flat = np.linspace(0.0, HEIGHT * parameters.aspect * parameters.cells, parameters.cells + 1)
     low = np.linspace(0.0, HEIGHT * parameters.cells, parameters.cells + 1)
     half = HEIGHT * (parameters.cells // 2)
@@ -90,7 +90,7 @@ def mesh_of_flight(parameters: Flight) -> MeshData:
 
 
 def random_start(motion: ExplicitMotion, seed: int) -> None:
-    """Put energy into all modes alike, on top of a common speed."""
+    """Add energy to all modes equally, on top of a common speed."""
     noise = np.random.default_rng(seed).normal(size=motion.velocity.shape) * np.sqrt(motion.mobility)
     mass = motion.body.mass[:, None]
     scale = np.linalg.norm(SPEED) / np.sqrt(np.sum(mass * noise**2) / mass.sum())
@@ -98,7 +98,7 @@ def random_start(motion: ExplicitMotion, seed: int) -> None:
 
 
 def watched(motion: ExplicitMotion, parameters: Flight, balance: EnergyBalance) -> dict[str, float]:
-    """Take the steps with looks at the energies; return errors; errors as ``flight``."""
+    """Take the steps with energy samples and return the errors; raises as ``flight``."""
     steps = min(LOOK, parameters.steps)
     looks = parameters.steps // steps
     participant = SingleModel(motion, WindowPlan(steps * motion.step, steps, looks, 1))
@@ -119,27 +119,27 @@ def watched(motion: ExplicitMotion, parameters: Flight, balance: EnergyBalance) 
 
 
 def momentum(motion: ExplicitMotion, moved: bool) -> np.ndarray:
-    """Return linear and angular momentum (6,), about the moved places of nodes where strains are finite."""
+    """Return linear and angular momentum (6,), about current positions for finite strains."""
     places = motion.body.local.points + (motion.displacement if moved else 0.0)
     return net_load(places, motion.body.mass[:, None] * motion.present_velocity())
 
 
 def momentum_scale(motion: ExplicitMotion) -> np.ndarray:
-    """Return the sums of magnitudes of linear and angular momenta (2,)."""
+    """Return the sums of nodal magnitudes of linear and angular momentum (2,)."""
     points, amount = motion.body.local.points, motion.body.mass[:, None] * motion.present_velocity()
     return np.array([np.linalg.norm(amount, axis=1).sum(), np.linalg.norm(np.cross(points, amount), axis=1).sum()])
 
 
-FRACTION = 0.9  # of the critical step, the program's default
+FRACTION = 0.9  # step over the critical step, the program's default
 DIRECTION = np.array([0.6, 0.0, 0.8])
 AFTER = 5  # steps after the pulse
 
 
 def pulse(parameters: PulseTrial) -> dict[str, float]:
-    """Return the error of speed and way after the pulse, and what the strains hold of what it gave.
+    """Return the errors of speed and displacement after the pulse, and the strain energy over the input energy.
 
     Raises:
-        PulseError: The pulse is over before the step is.
+        PulseError: If the pulse is shorter than a step.
     """
     body, critical = dns_body(block())
     step = FRACTION * critical
@@ -166,7 +166,7 @@ def pulse(parameters: PulseTrial) -> dict[str, float]:
 
 
 def block() -> MeshData:
-    """Return a block of board that nothing holds."""
+    """Return a free block of board."""
     line = np.linspace(0.0, 1e-3, 3)
     return mesh_of(*grid(line, line, line), "board", {})
 
@@ -181,7 +181,7 @@ def course_of(parameters: PulseTrial, duration: float) -> Pulse:
 
 
 def impact(parameters: Impact) -> dict[str, float]:
-    """Return the largest imbalance of energy, what plastic flow has taken, and whether it ever gave any back."""
+    """Return the largest energy imbalance, the plastic work, and whether it ever decreases."""
 
     def skew(points: np.ndarray) -> np.ndarray:
         return points + np.outer(points[:, 1], [0.0, 0.0, parameters.skew])
@@ -214,14 +214,14 @@ def rod(
 def explicit(
     mesh: MeshData, material: Material, kinematics: Kinematics, formulation: str, fraction: float
 ) -> tuple[Body, ExplicitMotion]:
-    """Return a body of one material and its motion at a fraction of the critical step of its elements."""
+    """Return a body of one material and its motion at a fraction of its critical element step."""
     _, critical = nonlinear_body(mesh, material, ForceOptions(kinematics, np.inf), formulation)
     body, _ = nonlinear_body(mesh, material, ForceOptions(kinematics, fraction * critical), formulation)
     return body, motion_of(body, fraction * critical)
 
 
 def energies_of(motion: ExplicitMotion, steps: int) -> np.ndarray:
-    """Take steps; return kinetic, strain, plastic and hourglass energy at each: (steps + 1, 4)."""
+    """Take steps; return kinetic, strain, plastic and hourglass energy of each, shape (steps + 1, 4)."""
     energies = []
     for _ in range(steps + 1):
         held = motion.internal_energy()
@@ -232,6 +232,6 @@ def energies_of(motion: ExplicitMotion, steps: int) -> np.ndarray:
 
 
 def imbalance(energies: np.ndarray) -> float:
-    """Return the largest change of the sum of energies (steps + 1, k) over the first one."""
+    """Return the largest change of the sum of energies (steps + 1, k) over the first sum."""
     total = energies.sum(axis=1)
     return float(np.abs(total - total[0]).max() / total[0])

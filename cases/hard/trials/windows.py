@@ -1,4 +1,4 @@
-"""Trials of two coupled models: growth of a window, what many keep, what goes through, restarts, reflected pulses."""
+"""Trials of two coupled models: window growth, long runs, interface transfer, restarts, reflected pulses."""
 
 from dataclasses import replace
 
@@ -21,18 +21,18 @@ from reflowshock.materials.parameters import Isotropic
 from reflowshock.materials.roles import Materials
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
-SAMPLES = 200  # of a run
+SAMPLES = 200  # samples of a run
 HALF = 20  # windows before a restart, and after
 
 
 def window(parameters: PairTrial) -> dict[str, float]:
-    """Return by how much a window can grow, the spectral radius of its amplification matrix minus 1, and m."""
+    """Return the growth of a window, the spectral radius of its amplification matrix minus 1, and m."""
     coupled = coupled_pair(parameters)
     return {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
 
 
 def run(parameters: PairRun) -> dict[str, float]:
-    """Return what changes at most in many windows after a push: energy, momentum, and what the interface holds."""
+    """Return the largest changes of energy and momentum over many windows after a push, and the interface energy."""
     coupled = coupled_pair(parameters, parameters.free)
     coupled.swing(PUSH)
     start, first = coupled.momentum(), all_energy(coupled)
@@ -52,20 +52,20 @@ def run(parameters: PairRun) -> dict[str, float]:
 
 
 def all_energy(coupled: Coupled) -> float:
-    """Return the energy of both models and of what lies between."""
+    """Return the energy of both models and of the interface."""
     energies = coupled.energies()
     return sum(energies[name] for name in ("kinetic", "internal", "interface"))
 
 
 def momentum_change(coupled: Coupled, start: np.ndarray) -> float:
-    """Return the largest change of linear and angular momentum over that of all nodes at the speed of the push."""
+    """Return the largest momentum change over the total nodal momentum at the push speed."""
     mass = sum(part.motion.counted_mass.sum() for part in coupled.parts)
     scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
     return float(np.abs((coupled.momentum() - start) / scale).max())
 
 
 def momentum_error(coupling: Coupling, fraction: float) -> float:
-    """Return the largest change of momentum of a free pair while it swings."""
+    """Return the largest momentum change of an oscillating free pair."""
     coupled = Pair(4, 3.0, 2, free=True).coupled(coupling, fraction)
     coupled.swing(PUSH)
     start, largest = coupled.momentum(), 0.0
@@ -76,7 +76,7 @@ def momentum_error(coupling: Coupling, fraction: float) -> float:
 
 
 def transfer(parameters: PairTransfer) -> dict[str, float]:
-    """Return what tie and interface do to rigid motions, linear fields, forces and masses: nothing, exactly."""
+    """Return the errors of tie and interface for rigid motions, linear fields, forces and masses; zero in theory."""
     pair = pair_of(parameters)
     mesh = pair.mesh()
     block = mesh.cells[~mesh.in_parts("board".__eq__)]
@@ -85,7 +85,7 @@ def transfer(parameters: PairTransfer) -> dict[str, float]:
 
 
 def through(models: Models) -> dict[str, float]:
-    """Try fields, forces and masses through tie and interface of two models."""
+    """Return the transfer errors of fields, forces and masses through tie and interface."""
     bodies = models.bodies()
     channels = InterfaceChannels.open(
         MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
@@ -102,7 +102,7 @@ def through(models: Models) -> dict[str, float]:
 
 
 def restart(parameters: PairTrial) -> dict[str, float]:
-    """Return the difference between a run and one that continues from the middle of it: no bit."""
+    """Return the difference between a run and its continuation from the middle; zero to the bit."""
     first, second = coupled_pair(parameters), coupled_pair(parameters)
     first.swing(PUSH)
     for _ in range(HALF):
@@ -117,7 +117,7 @@ def restart(parameters: PairTrial) -> dict[str, float]:
 
 
 def yielding(parameters: Yielding) -> dict[str, float]:
-    """Return the error of the energy around solder that yields, and what plastic flow and interface have of it."""
+    """Return the energy error around yielding solder, and the shares of plastic and interface energy."""
     pair = Pair(ratio=parameters.mesh_ratio)
     models = models_of(pair.mesh(), Materials(solder=SAC405), SCHEMES[parameters.scheme], FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(parameters.scheme))
@@ -155,18 +155,18 @@ def pair_of(parameters: PairTrial, free: bool = False) -> Pair:
     return replace(Pair(**same), ratio=parameters.mesh_ratio, free=free, board=board)
 
 
-LENGTH = 0.25e-3  # of an element of the board along the bar [m]
-WIDTH = 0.5e-3  # of the bar [m]
-ROOM = 1.2  # of the bar of board, over the pulse
-HEIGHT = 1e-6  # of the pulse [m]; nothing depends on it
-STIFFNESS = float(elasticity_matrix(FR4)[2, 2])  # of plane waves along z [Pa]
+LENGTH = 0.25e-3  # length of a board element along the bar [m]
+WIDTH = 0.5e-3  # width of the bar [m]
+ROOM = 1.2  # length of the board bar over the pulse
+HEIGHT = 1e-6  # height of the pulse [m]; without influence on the measures
+STIFFNESS = float(elasticity_matrix(FR4)[2, 2])  # modulus of plane waves along z [Pa]
 IMPEDANCE, SPEED = (FR4.density * STIFFNESS) ** 0.5, (STIFFNESS / FR4.density) ** 0.5
 
 
 def reflection(parameters: Reflection) -> dict[str, float]:
-    """Return the error of the reflected pulse, and of the energy, over the incident ones.
+    """Return the errors of the reflected pulse and of the energy, relative to the incident ones.
 
-    Plane waves in a bar whose sides are held: of a displacement f(z - c t), (Z1 - Z2) / (Z1 + Z2) f comes back.
+    Plane waves in a laterally held bar: a displacement f(z - c t) is reflected as (Z1 - Z2) / (Z1 + Z2) f.
     """
     materials = materials_of(parameters)
     models = models_of(mesh_of_bars(parameters), materials, SCHEMES[parameters.scheme], FRACTION)
@@ -194,14 +194,14 @@ def reflection(parameters: Reflection) -> dict[str, float]:
 
 
 def pulse_at(ahead: np.ndarray, parameters: Reflection) -> np.ndarray:
-    """Return the displacement [m] of a pulse some way [m] ahead of where its middle began."""
+    """Return the displacement [m] of a pulse at a distance [m] ahead of its initial centre."""
     long = parameters.elements * LENGTH
     phase = (ahead + 0.5 * ROOM * long) / long
     return np.where(np.abs(phase) < 0.5, HEIGHT * np.cos(np.pi * phase) ** 4, 0.0)
 
 
 def begin(coupled: Coupled, parameters: Reflection) -> None:
-    """Let the pulse run towards the block, its middle half the bar below the interface."""
+    """Start the pulse towards the block, centred half the bar below the interface."""
     for part in coupled.parts:
         motion = part.motion
         heights = motion.body.local.points[:, 2]
@@ -213,7 +213,7 @@ def begin(coupled: Coupled, parameters: Reflection) -> None:
 
 
 def mesh_of_bars(parameters: Reflection) -> MeshData:
-    """Return both bars, whose sides keep their planes; the block's is as long as its waves come."""
+    """Return both laterally held bars; the block's bar is long enough for its waves."""
     layers = round(ROOM * parameters.elements) + parameters.elements
     cell = LENGTH / parameters.mesh_ratio
     beyond = round(ROOM * parameters.elements * parameters.substeps * 1.1) + 4
@@ -234,7 +234,7 @@ def either(axis: int):
 
 
 def materials_of(parameters: Reflection) -> Materials:
-    """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
+    """Return materials with the block's impedance and a critical step slightly above 1/m of the board's."""
     trial = Materials(solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.0))
     _, survey_of_mesh, _ = surveyed(mesh_of_bars(parameters), trial)
     board, block = (survey_of_mesh.step[survey_of_mesh.role == role].min() for role in ("board", "solder"))
