@@ -26,7 +26,7 @@ from reflowshock.particles.surface.contact_line import ContactLine, FrictionLine
 from reflowshock.particles.surface.profile import width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
-# Of the cap that a drop which strikes a wall starts as: at 160 degrees particles slip out between surface and wall.
+# Contact angle of the initial cap of an impact: at 160 degrees particles slip out between surface and wall.
 TOUCHING_ANGLE = float(np.radians(155.0))
 TOUCHING_STEP = 100.0  # capillary limits, while it takes this shape
 
@@ -75,7 +75,7 @@ def flow_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[LiquidFlow, Run]:
-    """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
+    """Return the flow of a drop at rest and its run; arguments and errors as ``drop_to_rest``."""
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":
         section = start_section(drop, solder, acting)
@@ -102,7 +102,7 @@ def _rule(drop: Drop, cloud: Cloud, solder: Solder) -> StopRule:
 
 
 def _touching(cloud: Cloud, solder: Solder) -> Cloud:
-    """The particles of a cube on a wall as a sphere that has just touched it."""
+    """Deform a cube on a wall into a sphere that just touches the wall."""
     numerics = solder.numerics.model_copy(update={"scheme": "energy", "time_step_limit": TOUCHING_STEP})
     still = solder.model_copy(update={"numerics": numerics, "pad_contact_angle": TOUCHING_ANGLE})
     acting = {effect.name: effect.name in ("surface_tension", "wall_adhesion") for effect in LIQUID_EFFECTS}

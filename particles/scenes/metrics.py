@@ -124,7 +124,7 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint whose solder is a drop on the board: those of the drop, under a joint's names."""
+    """Collect the numbers of a joint whose solder is a drop on the board, under the names of a joint."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     own = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
     return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
@@ -267,7 +267,7 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def particles_lost(body: Body) -> int:
-    """Number of particles below the surface that are outside the body: through the surface or a wall, or off the wall.
+    """Count interior particles outside the body: beyond the surface or a wall, or off their wall.
 
     Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
     """
@@ -288,9 +288,9 @@ def particles_lost(body: Body) -> int:
 
 
 def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
-    """What became of the energy that the scheme ispg started with, in all bodies, over that energy.
+    """Return the energy losses of the scheme ispg in all bodies over the initial energy, and the imbalance.
 
-    And how fast a body slides, which on smooth walls it may do for ever, as it is.
+    The sliding speed of a body is included, since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     known = [(flow, state, first) for flow, state, first in moved if state is not None]

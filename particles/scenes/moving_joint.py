@@ -48,7 +48,7 @@ def settle_joint(
 
 
 def _aligned(geometry: JointGeometry) -> JointGeometry:
-    """The coaxial joint where a joint differs from one to second order only: it has a meridian to compare with."""
+    """Return the coaxial joint if a joint is nearly coaxial, so that an exact meridian exists."""
     radius = min(geometry.radius_board, geometry.radius_package)
     nearly = hypot(*geometry.offset) < ALIGNED * radius and hypot(*geometry.tilt) < ALIGNED
     return replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0)) if nearly else geometry
