@@ -92,7 +92,7 @@ def follow_path(
 
 
 def _broken(joint: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, time: float) -> JointShape:
-    """A joint that broke on the way to a place, with the standoff there; with inertia the drops that it leaves.
+    """Return a joint that broke on its path, with the standoff at break; with inertia, as the two drops.
 
     Args:
         joint: when it broke.

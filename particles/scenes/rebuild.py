@@ -234,7 +234,7 @@ def _cut(body: Body, walls: tuple[Plate, ...], neck: float, below: float) -> tup
 
 
 def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> JointShape:
-    """The shape of an open joint: both drops at rest, with the history of the joint until its neck collapsed.
+    """Return the shape of an open joint: both drops at rest, with the history until the neck collapsed.
 
     Args:
         joint: when its neck collapsed.
