@@ -39,7 +39,7 @@ def test_import_rules():
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_file_that_is_read_can_run_code(package):
     """Pickles and their like are code; `np.load` takes none unless `allow_pickle` is set, and nothing sets it."""
-    found = []
+    violations = []
     for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -49,8 +49,8 @@ def test_no_file_that_is_read_can_run_code(package):
                 odd += ["allow_pickle"] * (getattr(node.value, "value", None) is not False)
             if isinstance(node, ast.Attribute | ast.Name):
                 odd += [name for name in (getattr(node, "attr", ""), getattr(node, "id", "")) if name in UNPICKLING]
-            found += [f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}" for name in odd]
-    assert not found
+            violations += [f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}" for name in odd]
+    assert not violations
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -37,7 +37,7 @@ class Spin:
 
 @dataclass(frozen=True)
 class EdgesHold:
-    """Event that fixes contact lines to their plates."""
+    """Pad edges that pin the contact lines."""
 
     def pinned(self, body):
         return np.concatenate(body.cloud.rings)

@@ -1,4 +1,4 @@
-"""Accelerations from histories, and the filter: its frequency response, SAE J211's own recursion, what it refuses."""
+"""Accelerations from histories and their filter: frequency response, SAE J211 recursion and invalid settings."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ TIME = np.arange(4000) * STEP
 
 
 def j211(values: np.ndarray, step: float, channel_class: float) -> np.ndarray:
-    """The recursion as SAE J211-1 writes it, run both ways over a record that is zero beyond its ends."""
+    """Apply the SAE J211-1 recursion in both directions to a record with zeros beyond its ends."""
     analogue = np.tan(np.pi * channel_class * 2.0775 * step)
     scale = 1.0 + np.sqrt(2.0) * analogue + analogue**2
     a0, b1, b2 = (
@@ -47,7 +47,7 @@ def test_channel_frequency_classes_are_those_of_sae_j211(channel_class):
     pulse = np.exp(-(((TIME - 0.02) / 2e-4) ** 2)) * np.cos(8e3 * TIME)
     expected = j211(pulse, STEP, channel_class)
     filtered = low_passed(pulse, STEP, LowPass(channel_class=channel_class))
-    inner = slice(500, 3500)  # at the ends they assume different things beyond them
+    inner = slice(500, 3500)  # they treat the ends differently
     assert np.abs(filtered - expected)[inner].max() <= 1e-6 * np.abs(expected).max()
 
 
@@ -61,7 +61,7 @@ FILTERS = [
 @pytest.mark.parametrize("low_pass", FILTERS, ids=lambda item: item.label)
 @pytest.mark.parametrize("ratio", [0.25, 1.0, 2.0])
 def test_frequency_response(low_pass, ratio):
-    """Of both passes 1 / (1 + (s f / fc)^2n), s^2n = sqrt(2) - 1: -3 dB at the corner, and no phase."""
+    """Both passes give 1 / (1 + (s f / fc)^2n), s^2n = sqrt(2) - 1: -3 dB at the corner without phase shift."""
     order, _ = low_pass.passes
     frequency = ratio * low_pass.frequency
     response = low_passed(np.sin(2 * np.pi * frequency * TIME), 1e-5, low_pass)[1500:2500]
@@ -77,7 +77,7 @@ def test_corners_are_told():
 
 
 def test_acceleration_of_a_swing_and_its_two_peaks():
-    """x = t^2 sin(w t): differences give it to (w dt)^2 / 12, the filter far above leaves it."""
+    """For x = t^2 sin(w t) differences have the error (w dt)^2 / 12, and a filter far above w has no effect."""
     rate = 2 * np.pi * 50.0
     displacement = 1e-3 * np.sin(rate * TIME) * np.exp(-rate * 0.05 * TIME)
     values = acceleration(TIME, displacement, LowPass())
@@ -101,7 +101,7 @@ def test_second_peak_has_the_other_sign_and_comes_later():
 
 
 def test_watch_point_at_rest_on_the_table_feels_the_table():
-    """A point that does not move in the table's frame has the table's acceleration, along the point's own direction."""
+    """A point at rest in the table frame has the acceleration of the table, along the direction of the point."""
     peak, duration = 1000.0, 0.01
     tables = structure_tables_of(
         loads={"drop": {"kind": "input_g", "peak": peak, "duration": duration, "direction": [0.0, 0.0, -2.0]}},

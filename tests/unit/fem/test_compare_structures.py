@@ -1,4 +1,4 @@
-"""Histories of two solvers are compared at common times."""
+"""Comparison of histories of two solvers at common times."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from reflowshock.fem.output.compare_structures import solver_differences
 
 
 def history(samples: int, scale: float = 1.0, names: tuple[str, ...] = ("tip",), end: float = 1.0) -> dict:
-    """Return a swing of height ``scale`` at the first point, and of a thousandth of that at others."""
+    """Return an oscillation of amplitude ``scale`` at the first point and a thousandth of it at others."""
     time = np.linspace(0.0, end, samples + 1)
     result = {"time": time, "watch": np.array(names)}
     for k, name in enumerate(names):

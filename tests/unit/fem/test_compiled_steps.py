@@ -1,4 +1,4 @@
-"""All steps of a window in one compiled call: those one by one, but for the order of sums."""
+"""All steps of a window in one compiled call equal single steps, except for the order of sums."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ SETTINGS = {
 
 
 def body_of(formulation: str, response: ForceOptions, pace: int = 1):
-    """Return a joint that yields, tied to a board; some of its elements are no boxes, the lowest have a pace."""
+    """Return a plastic joint tied to a board, with some distorted elements and a pace for the lowest ones."""
     mesh = joint_on_board(edges=6)
     copper = np.unique(mesh.cells[mesh.in_parts(lambda name: name.startswith("copper"))])
     low = copper[mesh.points[copper, 2] < np.median(mesh.points[copper, 2])]
@@ -42,7 +42,7 @@ def body_of(formulation: str, response: ForceOptions, pace: int = 1):
 
 
 def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interface]:
-    """Return a motion that begins with any velocities, and some nodes that another model moves through its steps."""
+    """Return a motion with random velocities, and nodes that another model moves in its steps."""
     rows = np.arange(12, dtype=np.int32)
     motion = ExplicitMotion(body, loads, STEP, rows, np.zeros(len(body.mass)))
     random = np.random.default_rng(3)
@@ -95,7 +95,7 @@ def test_nodes_that_move_most_often_come_first():
     assert ends.tolist() == [np.sum(node == 1), len(node), len(node)]
 
 
-def test_inverted_elements_are_told_alike():
+def test_inverted_elements_raise_the_same_error():
     errors = []
     for take in (ExplicitMotion.take_steps, ExplicitMotion._take_single_steps):
         motion, interface = moving(body_of(*SETTINGS["turning"][:2]), speed=2e4)

@@ -1,4 +1,4 @@
-"""Cells of a small package given to models: by buffer, at ties, by levels; what does not fit is refused."""
+"""Division of a small package into models: buffers, ties, levels and invalid divisions."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Pictures of the joints' upper interface, and a DNS that ends before the shock."""
+"""Pictures of the upper joint interface, and a DNS that ends before the shock."""
 
 import json
 from pathlib import Path
@@ -58,7 +58,7 @@ def two_scale(files) -> Path:
 
 
 def test_pictures_are_the_history_at_their_times(two_scale):
-    """They are means of elements: none is above the history's largest, all together near the layer at the package."""
+    """Pictures show element means: none exceeds the history maximum, and their mean is near the package layer."""
     pictures, history = arrays(two_scale / "interface.npz"), arrays(two_scale / "history.npz")
     assert pictures["times"] == pytest.approx(TIMES)
     for k, name in enumerate(history["joints"]):
@@ -102,7 +102,7 @@ def test_dns_that_ends_early_is_the_beginning_of_the_whole(files, two_scale, sol
 
 
 class Killed(Exception):
-    """What stands for a kill."""
+    """Exception in place of a kill."""
 
 
 def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):

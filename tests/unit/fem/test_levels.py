@@ -1,4 +1,4 @@
-"""Step levels against dense matrix functions; what follows from the equations exactly."""
+"""Step levels against dense matrix functions and exact properties of the equations."""
 
 import math
 import time
@@ -52,7 +52,7 @@ def test_effective_stiffness_is_symmetric(model):
 
 
 def total_force(model: Levelled, displacement: np.ndarray) -> np.ndarray:
-    """Return the force (n, 3) of all terms, slaves' moved to their masters."""
+    """Return the force of all terms with slave forces moved to masters, shape (n, 3)."""
     moved, force = displacement.copy(), np.zeros_like(displacement)
     model.body.tie.spread(moved)
     for term in model.body.terms:
@@ -72,7 +72,7 @@ def test_rigid_motion_gives_no_force_and_any_motion_no_resultant(model):
 
 
 def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
-    """K_eff u = f + carry(f) for K u = f: at rest, levels add nothing to what a load does."""
+    """K_eff u = f + carry(f) for K u = f: at rest, levels do not change the effect of a load."""
     body = model.body
     (levels,) = levels_of(body.terms)
     free = body.free.ravel()
@@ -97,7 +97,7 @@ def test_only_supports_bear_a_falling_body(model):
 
 
 def test_what_a_motion_prescribes_does_not_move_in_substeps():
-    """Held in the motion or held in the body: the same force."""
+    """Nodes fixed in the motion or in the body give the same force."""
     mesh, ratios = joint_on_board(), (7, 3)
     model, held = levelled(mesh, ELASTIC, ratios), levelled(mesh, ELASTIC, ratios)
     body = model.body
@@ -131,7 +131,7 @@ def test_energy_is_that_of_the_effective_stiffness(model):
     assert held.strain == pytest.approx(work, rel=1e-12)
 
 
-def test_hourglass_energy_is_told_apart():
+def test_hourglass_energy_is_reported_separately():
     model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3))
     body = replace(model.plain, elements=replace(model.plain.elements, kind=ONE_POINT))
     displacement = 1e-6 * np.sin(np.arange(3 * len(body.mass))).reshape(-1, 3)
@@ -181,7 +181,7 @@ def test_more_levels_are_taken_where_they_pay():
     level, ratios = choose_levels(cells, Tie.none(), dear, 3)
     assert ratios == (3, 8)
     assert np.bincount(level).tolist() == [39, 20, 3]
-    assert choose_levels(cells, Tie.none(), cheap, 3)[1] == (21,)  # calls cost more than elements
+    assert choose_levels(cells, Tie.none(), cheap, 3)[1] == (21,)  # calls are more expensive than elements
 
 
 def test_no_level_where_all_elements_take_the_window():

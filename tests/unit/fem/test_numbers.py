@@ -1,4 +1,4 @@
-"""Materials, steps, comparison, energy balance, watch points: the small arithmetic of a run."""
+"""Arithmetic of a run: materials, steps, comparison, energy balance, watch points."""
 
 from pathlib import Path
 
@@ -109,7 +109,7 @@ def test_implicit_step_follows_the_shortest_pulse():
 
 def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
-    board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in that many seconds
+    board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in this time
     ranks = Ranks(total=2, placement="disjoint", macro=1)
     two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks, at_once=True)
     assert two_scale == pytest.approx(100 * 0.1, rel=0.01)

@@ -1,4 +1,4 @@
-"""A package whose coarse model drives a fine one of a joint, through the program."""
+"""A package whose coarse model drives the fine model of a joint, as a program run."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Partition of cells among ranks: work in proportion to speeds, at every step level, by cuts with few nodes."""
+"""Partition of cells among ranks: work proportional to speed at each step level, with few cut nodes."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_work_is_shared_as_the_speeds(speeds):
 
 
 def test_every_level_is_shared_by_one_cut():
-    """Fine cells in a corner: half of all cells on each side would leave them all on one rank."""
+    """All fine cells are in a corner: a plain bisection would put them on one rank."""
     mesh = plate()
     centre = mesh.points[mesh.cells].mean(axis=1)
     fine = (centre[:, 0] < 0.75) & (centre[:, 1] < 0.75)

@@ -1,4 +1,4 @@
-"""Forces at points: shares of nodes with the right resultant and moment, planes of symmetry, what cannot be."""
+"""Point forces: nodal shares with exact resultant and moment, planes of symmetry and invalid input."""
 
 import json
 
@@ -24,15 +24,15 @@ POKE = {"kind": "point_force", "at": INSIDE, "direction": [3.0, 0.0, -4.0], "pea
 
 
 def bent(mesh):
-    """Return a mesh whose cells are no boxes."""
+    """Return a mesh of distorted cells."""
     x, y, z = mesh.points.T
     mesh.points[:] = np.column_stack([x + 0.3 * y, y + 20.0 * x * z, z + 5.0 * x * y])
     return mesh
 
 
 def box_file(path, element="hexahedron", symmetry=()):
-    """Write a strip of any element; return the path."""
-    cells = (8, 2 if symmetry else 4)  # of the meshed part
+    """Write a strip of any element type and return the path."""
+    cells = (8, 2 if symmetry else 4)  # on the meshed part
     write_box(Box((LENGTH, WIDTH), cells, (BoxLayer("board", THICKNESS, 2, None),), symmetry, element, None), path)
     return path
 
@@ -56,7 +56,7 @@ def test_shares_of_tetrahedra(tmp_path, element):
 
 
 @pytest.mark.parametrize("end", [-1.0, 1.0])
-def test_a_node_bears_all_of_a_force_on_it(end):
+def test_node_carries_the_whole_force_at_its_position(end):
     mesh = strip_mesh()
     point = (0.5 * end * LENGTH, WIDTH / 6, THICKNESS)
     nodes, shares = point_shares(mesh, "at", point)
@@ -97,7 +97,7 @@ def test_course_is_a_half_sine_or_a_table(tmp_path, monkeypatch, parameters):
 
 
 def tip_of(directory, symmetry, loads):
-    """Run a strip or half of it; return the motion of a point of its end and the external work."""
+    """Run a full or half strip; return the motion of an end point and the external work."""
     directory.mkdir()
     mesh = box_file(directory / "box.msh", symmetry=symmetry)
     tables = structure_tables_of(loads=loads, watch={"tip": {"at": [LENGTH / 2, WIDTH / 4, THICKNESS]}})
@@ -110,7 +110,7 @@ def tip_of(directory, symmetry, loads):
 
 @pytest.mark.parametrize("places", [[0.0], [-2.6e-3, 2.6e-3]], ids=["on the plane", "beside it"])
 def test_half_a_body_moves_as_the_whole(tmp_path, places):
-    """A force on the plane of symmetry is halved, one beside it has its mirror image."""
+    """A force on the plane of symmetry is halved; any other force has a mirror image."""
     pushes = {f"push_{k}": POKE | {"at": [5e-3, y, THICKNESS]} for k, y in enumerate(places)}
     whole, all_work = tip_of(tmp_path / "whole", (), pushes)
     half, work = tip_of(tmp_path / "half", ("y",), dict([pushes.popitem()]))

@@ -1,4 +1,4 @@
-"""The highest frequency of an assembled, tied model: against dense eigenvalues, and never below them."""
+"""The highest frequency of an assembled, tied model against dense eigenvalues, as an upper bound."""
 
 import numpy as np
 import pytest

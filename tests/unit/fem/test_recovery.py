@@ -1,4 +1,4 @@
-"""Values at nodes from the means of elements."""
+"""Recovery of nodal values from element means."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_linear_field_is_recovered_at_surfaces_corners_and_inside(target):
 
 @pytest.mark.parametrize("target", [SURFACE, (LENGTH / 2, 4e-3, 0.0)])
 def test_order_at_surfaces_and_corners(target):
-    """A bending strain that varies along the strip: the error of its value falls with the square of the size."""
+    """For a bending strain that varies along the strip the error decreases with the square of the element size."""
 
     def strain(points):
         return np.sin(150.0 * points[:, 0] + 0.4) * np.cos(200.0 * points[:, 1]) * (points[:, 2] - THICKNESS / 2)

@@ -1,4 +1,4 @@
-"""The shock response spectrum against exact ones and against the convolution integral."""
+"""The shock response spectrum against exact spectra and the convolution integral."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_step_overshoots_by_its_damping():
     )
     velocity = -np.exp(-ratio * rate * time) * np.sin(damped * time) / damped
     exact = np.abs(2 * ratio * rate * velocity + rate**2 * displacement).max()
-    assert spectrum[0] == pytest.approx(exact, rel=1e-2)  # the record begins within a step, not at once
+    assert spectrum[0] == pytest.approx(exact, rel=1e-2)  # the record begins within a step
 
 
 def test_record_of_ramps_against_the_convolution_integral():

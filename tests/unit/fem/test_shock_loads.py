@@ -1,4 +1,4 @@
-"""Pulse, gravity and loads of a package's shock, what does not fit together, and loads that act on nothing."""
+"""Pulse, gravity and loads of a package shock: invalid combinations and loads without effect."""
 
 import numpy as np
 import pytest
@@ -135,7 +135,7 @@ def test_base_that_follows_time_moves_as_the_large_mass_does():
     for _ in range(600):  # beyond the pulse
         motion.advance()
         motion.update_force()
-    near = (np.pi * motion.step / pulse.duration) ** 2  # what trapezoids miss of it, twelvefold
+    near = (np.pi * motion.step / pulse.duration) ** 2  # twelve times the error of the trapezoidal rule
     assert base.base_velocity(motion.time) == pytest.approx(motion.base_velocity(), rel=near)
     assert base.base_displacement(motion.time) == pytest.approx(motion.base_displacement(), rel=near)
 

@@ -1,4 +1,4 @@
-"""A structure as two models: every node and cell counts once, all loads arrive, the motion is that of one model."""
+"""A structure divided into two models: unique nodes and cells, all loads, and the motion of one model."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ LOADS = {
     "pull": {"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 1e-5},
     "drop": {"kind": "input_g", "peak": 1e4, "duration": 2e-5, "direction": [1.0, 0.0, 0.2]},
     "poke": {"kind": "point_force", "at": [2e-4, 3e-4, 6.1e-3], "direction": [1.0, 1.0, 1.0], "peak": 0.2}
-    | {"duration": 1e-5},  # in the fine layer, beside the tie
+    | {"duration": 1e-5},  # in the fine layer, next to the tie
 }
 TABLES = {
     "supports": {
@@ -82,7 +82,7 @@ def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
 def test_two_models_move_as_one(tmp_path, scheme):
-    """Within the error of their steps: loads across tie and interface, reactions, watch points of both models."""
+    """Loads across tie and interface, reactions and watch points agree within the error of the steps."""
     changes = {"coupling": {"scheme": scheme, "fine": ["layer_1"]}}
     result, two = run_bar(write_bar(tmp_path / "two", WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
     assert all(check["ok"] for check in result["health"].values())
@@ -115,7 +115,7 @@ def test_two_models_move_as_one(tmp_path, scheme):
     ids=["pressure", "motion", "support", "point_force"],
 )
 def test_what_acts_on_fine_elements_strains_them_as_in_one_model(tmp_path, load, clamped):
-    """Nine steps a window at the end: by the window alone strains are 100 times too large, at a support 1.5 times."""
+    """With nine steps per window: loads applied per window give strains 100 times too large, 1.5 times at a support."""
     layers = bar_layers(("FR4", 6e-3, 6, (2, 2)), ("FR4", 1e-3, 16, (2, 2)))
     support = {"clamp": {"on": clamped, "hold": ["x", "y", "z"]}}
     scene = {"loads": {"load": load}, "supports": support, "watch": {"end": {"at": [0.0, 0.0, 7e-3 - 2.5e-5]}}}
@@ -128,8 +128,8 @@ def test_what_acts_on_fine_elements_strains_them_as_in_one_model(tmp_path, load,
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "impulse"])
-def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path, scheme):
-    """Nine steps a window; pushed once a window, elements at support and interface were strained 3.5 and 8 % wrong."""
+def test_support_in_the_meso_model_carries_a_body_force_as_in_one_model(tmp_path, scheme):
+    """With nine steps per window: a load per window gave strain errors of 3.5 and 8 % at support and interface."""
     layers = bar_layers(("FR4", 1e-3, 16, (2, 2)), ("FR4", 6e-3, 6, (2, 2)))
     scene = {
         "loads": {"drop": {"kind": "input_g", "peak": 1e4, "duration": 3e-5}},
@@ -145,7 +145,7 @@ def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path
 
 
 def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
-    """The macro model alone would know of it, and the meso model's interface run away: strains were 1.3 times wrong."""
+    """Only the macro model would have the motion, and the meso interface would drift: strains were wrong by 1.3."""
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
     with pytest.raises(CouplingError, match=r"loads\.side prescribes the motion of 6 interface nodes.*impulse"):

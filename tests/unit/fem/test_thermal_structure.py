@@ -1,4 +1,4 @@
-"""Pads, wrenches, weights, corners and free motions of a heated package: what must hold on any mesh."""
+"""Pads, wrenches, weights, corners and rigid-body modes of a heated package on any mesh."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The tie: exact where it can be, an error where it cannot."""
+"""The tie: exact fields, and an error where no exact tie exists."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_point_off_a_facet_has_its_distance():
 
 
 def test_a_point_where_the_sides_of_a_trapezium_meet_has_its_distance():
-    """There the bilinear map has no inverse."""
+    """The bilinear map is singular at this point."""
     trapezium = np.array([[[0.0, -1, 0], [2, -2, 0], [2, 2, 0], [0, 1, 0]]])
     _, xi, distance = closest_facets(np.array([[-2.0, 0.0, 0.0], [-9.0, 0.0, 0.0]]), np.repeat(trapezium, 2, axis=0))
     assert distance == pytest.approx([2.0, 9.0])

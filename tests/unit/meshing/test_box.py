@@ -58,8 +58,8 @@ def test_named_facets_lie_where_their_name_says(tmp_path):
     write_box(Box(SIZE, (16, 8), LAYERS, ("x",), holes=HOLES), tmp_path / "structure.msh")
     mesh = meshio.read(tmp_path / "structure.msh", file_format="gmsh")
     places = {"x_min": (0, 0.0), "x_max": (0, 20e-3), "y_min": (1, -10e-3), "z_min": (2, 0.0), "z_max": (2, 1.5e-3)}
-    for name, (axis, place) in places.items():
-        assert mesh.points[nodes_of(mesh, name), axis] == pytest.approx(place, abs=1e-12)
+    for name, (axis, coordinate) in places.items():
+        assert mesh.points[nodes_of(mesh, name), axis] == pytest.approx(coordinate, abs=1e-12)
     holes = mesh.points[nodes_of(mesh, "mounting_holes")]
     radius = np.hypot(np.abs(holes[:, 0]) - 15e-3, np.abs(holes[:, 1]) - 7e-3)
     assert radius == pytest.approx(1e-3, rel=1e-9)

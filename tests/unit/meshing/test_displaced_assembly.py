@@ -63,13 +63,13 @@ def test_only_what_the_package_does_beyond_the_board_counts(flat):
     mesh = MeshFile(flat / "flat.msh")
     is_package = np.zeros(len(mesh.points), bool)
     is_package[nodes_of(mesh, *PACKAGE)] = True
-    own = np.where(is_package[:, None], 2.0 * bend(mesh.points * [1.0, 1.0, 0.0]), 0.0)
+    package_motion = np.where(is_package[:, None], 2.0 * bend(mesh.points * [1.0, 1.0, 0.0]), 0.0)
     common = bend(mesh.points * [1.0, 1.0, 0.0])
     coarse = StructuredFace.of_nodes(*(a[(mesh.points[:, 2] == 0.0) & (mesh.points[:, :2] < 2.6 * MM).all(axis=1)]
                                        for a in (mesh.points, common)))  # fmt: skip
     common[is_package] = coarse(*mesh.points[is_package, :2].T)
-    displacement = computed_displacement(mesh.points, own + common, is_package)
-    assert np.abs(displacement(mesh.points[is_package]) - own[is_package]).max() < 1e-18
+    displacement = computed_displacement(mesh.points, package_motion + common, is_package)
+    assert np.abs(displacement(mesh.points[is_package]) - package_motion[is_package]).max() < 1e-18
     with pytest.raises(DisplacementError, match=r"no displacement is known at \(0, 0, 9\) m"):
         displacement(np.array([[0.0, 0.0, 9.0]]))
 

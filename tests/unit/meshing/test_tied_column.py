@@ -67,10 +67,10 @@ def test_a_swept_joint_with_a_finer_section_is_tied_to_the_columns_of_others():
     plate, side = board(symmetry="full"), side_of(BOWED, whole)
     site = {site.name: site for site in pad_table(whole, plate, BOWED)}["A4"]
     surface = barrel(site.gap, 0.0)
-    place = JointPlace.of(surface, site, side, whole.copper.thickness)
+    joint_place = JointPlace.of(surface, site, side, whole.copper.thickness)
     copper = CopperPads(whole.copper.thickness, columns=columns_of(site, whole, plate, side))
     finer = whole.joint_numerics.model_copy(update={"core": 5, "rings": 3})
-    mesh = build_joint(swept_solder(surface, finer, place), [site], copper, place)
+    mesh = build_joint(swept_solder(surface, finer, joint_place), [site], copper, joint_place)
     assert len(mesh.facets["slave@foot@A4"]) == 25 + 20 * 3
     assert len(mesh.cells["board_column@A4"]) == 7 * 128
 

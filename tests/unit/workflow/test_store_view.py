@@ -280,8 +280,8 @@ def test_what_the_run_folder_lacks_is_told(store):
     (store.folder / "report.html").unlink()
     (store.folder / "summary.json").unlink()
     (store.folder / "summary.json").write_text("mine")
-    told = not_as_put(store, store.folder)
-    assert sorted(line.removeprefix(f"{store.folder}/") for line in told) == [
+    differences = not_as_put(store, store.folder)
+    assert sorted(line.removeprefix(f"{store.folder}/") for line in differences) == [
         "report.html is missing",
         "summary.json was modified",
     ]
