@@ -43,7 +43,7 @@ def test_facets_that_no_cell_has_any_more_go_in_one_search(whole, monkeypatch):
     monkeypatch.setattr(column, "cells_of_facets", search)
     left = replace(whole.mesh, cells=whole.mesh.cells[stay], part=whole.mesh.part[stay])
     mesh = replace(left, facets=left.facets | empty)
-    remaining = column.without_stale_facets(mesh).facets
+    remaining = column.drop_stale_facets(mesh).facets
     assert searched == [sum(len(some) for some in mesh.facets.values())]
     assert list(remaining) == list(mesh.facets)
     one_by_one = {name: some[cells_of_facets(mesh.cells, some) >= 0] for name, some in mesh.facets.items()}
@@ -112,7 +112,7 @@ def test_a_joint_with_a_void_shares_the_face_of_its_neighbour_and_stands_on_its_
 
 def test_neighbours_with_other_rims_are_refused():
     finer = {"core": 5, "rings": 2, "layers": 10, "copper_layers": 2}
-    message = r"the columns of A4 and B4 touch with \d+ faces that do not fit together, near \(0\.001\d+, 0\.001, "
+    message = r"the columns of A4 and B4 touch with \d+ faces that do not match, near \(0\.001\d+, 0\.001, "
     with pytest.raises(MeshError, match=message):
         joined(neighbours(joint_numerics=finer))
 
