@@ -87,7 +87,8 @@ def run_cases(folder: Path, checkout: Path, names: list[str]) -> int:
         path, settings = EVERY_CASE[name]
         line = [sys.executable, "-m", "workflow", "run", str(checkout / path), "--out", str(folder.resolve() / name)]
         line += [item for setting in settings for item in ("--set", setting)]
-        begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout)}
+        # Numba orders reassociated sums by sets of names: without a fixed seed each compilation rounds in its own way.
+        begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout), "PYTHONHASHSEED": "0"}
         result = subprocess.run(line, capture_output=True, text=True, cwd=checkout, env=environment, check=False)
         complete = (folder / name / "summary.json").exists()
         print(f"{name:18}{time.perf_counter() - begin:6.0f} s  {'ran' if complete else 'FAILED'}", flush=True)

@@ -127,7 +127,7 @@ def _holes(package: Package, board: Board) -> Iterator[Problem]:
 
 
 def _which_holes(board: Board) -> Iterator[Problem]:
-    """Check that holes are given by insets or by positions, and that those of a quarter model are symmetric."""
+    """Check that holes are given by insets or by positions, and that the holes of a quarter model are symmetric."""
     holes = board.holes
     insets = [name for name in ("inset_x", "inset_y") if getattr(holes, name) is not None]
     if holes.at and insets:

@@ -51,7 +51,7 @@ def count_elements(
 ) -> dict[str, PartEstimate]:
     """Count the hexahedra of every part; ``solder`` and ``copper`` are sums over the array.
 
-    Counts are exact if the solder wets its pads up to the edge of pad or mask; element lengths in joints are those of a
+    Counts are exact if the solder wets its pads up to the edge of pad or mask; element lengths in joints follow from a
     cylinder with the smallest wetted radius and gap.
 
     Args:
@@ -99,7 +99,7 @@ def _pieces(axis: tuple[Interval, ...]) -> tuple[int, int]:
 def _shapes_around_holes(plan: Plan, board: Board) -> tuple[Edges, ...]:
     """Return the edge vectors of each distinct element between a round hole and the square around it.
 
-    Straight lines connect equidistant points of an arc to those of the square's side. The result is empty if there
+    Straight lines connect equidistant points of an arc to points of the square's side. The result is empty if there
     are more cells than are ever meshed.
     """
     rings, square, radius = hole_rings(board), hole_square(board), 0.5 * board.holes.diameter

@@ -61,8 +61,8 @@ def mesh_joint(
             meshing attempt fails its checks; the message gives the reason of each.
     """
     copper = _copper_pads(package, columns)
-    place = JointPlace.of(surface, site, side, copper.thickness if copper else 0.0)
-    return _mesh(surface, package, [site], copper, place)
+    to_assembly = JointPlace.of(surface, site, side, copper.thickness if copper else 0.0)
+    return _mesh(surface, package, [site], copper, to_assembly)
 
 
 def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Package, side: Underside) -> JointMesh:
@@ -90,8 +90,8 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
         gap=0.5 * (first.gap + second.gap),
     )
     body, copper = replace(surface, points=turned), _copper_pads(package, ())
-    place = JointPlace.of(body, middle, side, copper.thickness if copper else 0.0)
-    return _mesh(body, package, sites, copper, place)
+    to_assembly = JointPlace.of(body, middle, side, copper.thickness if copper else 0.0)
+    return _mesh(body, package, sites, copper, to_assembly)
 
 
 def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
@@ -100,11 +100,11 @@ def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, s
     Arguments and errors as in ``mesh_joint``.
     """
     overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
-    place = JointPlace.of(surface, site, side, overhang)
-    _check_place(surface, place)
+    to_assembly = JointPlace.of(surface, site, side, overhang)
+    _check_place(surface, to_assembly)
     try:
-        solder = swept_solder(surface, package.coarse_joint_numerics, place, overhang)
-        return build_joint(solder, [site], None, place)
+        solder = swept_solder(surface, package.coarse_joint_numerics, to_assembly, overhang)
+        return build_joint(solder, [site], None, to_assembly)
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
 
@@ -132,13 +132,17 @@ def mesh_coarse_or_fine(
 
 
 def _mesh(
-    surface: ClosedSurface, package: Package, sites: Sequence[PadSite], copper: CopperPads | None, place: JointPlace
+    surface: ClosedSurface,
+    package: Package,
+    sites: Sequence[PadSite],
+    copper: CopperPads | None,
+    to_assembly: JointPlace,
 ) -> JointMesh:
     """Mesh a body of solder on the pads of the sites that it wets."""
-    _check_place(surface, place)
-    candidates = attempts(surface, package.joint_numerics, place)
-    build = partial(build_joint, sites=sites, copper=copper, place=place)
-    return first_good(surface, candidates, place.site.name, build)
+    _check_place(surface, to_assembly)
+    candidates = attempts(surface, package.joint_numerics, to_assembly)
+    build = partial(build_joint, sites=sites, copper=copper, place=to_assembly)
+    return first_good(surface, candidates, to_assembly.site.name, build)
 
 
 def _copper_pads(package: Package, columns: tuple[Column, ...]) -> CopperPads | None:
@@ -160,20 +164,20 @@ def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> 
         raise JointMeshError(f"joints {first.name} and {second.name}: {distances}; one may be a mirror image")
 
 
-def _check_place(surface: ClosedSurface, place: JointPlace) -> None:
+def _check_place(surface: ClosedSurface, to_assembly: JointPlace) -> None:
     """Raise JointMeshError unless the surface spans its gap and ends at the package.
 
     The gap is measured at the centre of the package's pad, because overflowing solder may leave a tilted pad.
     """
-    site = place.site
-    gap = float(place.head.height(*np.array(site.offset)))
+    site = to_assembly.site
+    gap = float(to_assembly.head.height(*np.array(site.offset)))
     bottom = float(surface.points[:, 2].min())
     if max(abs(bottom), abs(gap - site.gap)) > GAP_TOLERANCE * site.gap:
         span = f"z = {bottom:.6g} to {gap:.6g} m, allowed 0 to its gap of {site.gap:.6g} m"
         raise JointMeshError(f"joint {site.name}: its surface spans {span}")
     upper = surface.points[np.unique(surface.triangles[surface.boundary == PACKAGE_PAD])]
     try:
-        limit, mean = HEAD_TOLERANCE * site.gap, float(place.rise(upper).mean())
+        limit, mean = HEAD_TOLERANCE * site.gap, float(to_assembly.rise(upper).mean())
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
     if abs(mean) > limit:

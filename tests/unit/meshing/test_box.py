@@ -77,12 +77,12 @@ def test_layers_whose_elements_differ_share_no_node_and_name_both_faces(tmp_path
     assert volume(mesh) == pytest.approx(0.5 * SIZE[0] * SIZE[1] * 2.8e-3, rel=1e-12)
     faces = {"slave@board-solder": 25 * 11, "master@board-solder": 17 * 9}
     faces |= {"slave@top-cover": 25 * 11, "master@top-cover": 17 * 9, "z_min": 17 * 9, "z_max": 17 * 9}
-    found = {name: nodes_of(mesh, name) for name in faces}
-    assert {name: len(nodes) for name, nodes in found.items()} == faces
-    assert not np.intersect1d(found["slave@board-solder"], found["master@board-solder"]).size
+    face_nodes = {name: nodes_of(mesh, name) for name in faces}
+    assert {name: len(nodes) for name, nodes in face_nodes.items()} == faces
+    assert not np.intersect1d(face_nodes["slave@board-solder"], face_nodes["master@board-solder"]).size
     for name, height in {"board-solder": 1e-3, "top-cover": 2.3e-3}.items():
         for side in ("slave", "master"):
-            assert mesh.points[found[f"{side}@{name}"], 2] == pytest.approx(height, abs=1e-12)
+            assert mesh.points[face_nodes[f"{side}@{name}"], 2] == pytest.approx(height, abs=1e-12)
     assert len(nodes_of(mesh, "y_min")) == 17 * 3 + 25 * 5 + 17 * 2
 
 

@@ -154,7 +154,7 @@ def test_counts_of_a_plan_are_those_of_the_meshes():
 )
 def test_columns_without_room_are_refused(changes, key):
     keys = [problem.key for problem in problems(package(**changes), board(), Warpage())]
-    assert any(one.startswith(key) for one in keys)
+    assert any(name.startswith(key) for name in keys)
 
 
 def test_columns_with_room_are_taken():

@@ -1,4 +1,4 @@
-"""Liquids that break up: contact lines that meet in a point, holes in films, parts too small for particles."""
+"""Break-up of liquids: contact lines that meet in a point, holes in films, parts too small for particles."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0
 
 
 def a_film(thickness):
-    """A drop on a wall, as a film of a thickness [spacings], with its particles."""
+    """Return a film on a wall with a thickness [spacings], and its particles."""
     flat = droplet(Droplet(**INK, numerics=COARSE, contact_angle=np.pi / 2.0))
     scale = thickness * flat.law.spacing / flat.surface.points[:, 2].max()
     for body in (flat.surface.points.T, flat.fields[:3]):
@@ -31,7 +31,7 @@ def a_film(thickness):
 
 
 def add_octahedron(surface, radius, x):
-    """Add an octahedron about a place on the x axis."""
+    """Add an octahedron about a point on the x axis."""
     octahedron = ConvexHull(np.concatenate((np.eye(3), -np.eye(3))))
     corners, faces = octahedron.points, octahedron.simplices.astype(np.int32)
     inward = np.linalg.det(corners[faces]) < 0.0
@@ -52,7 +52,7 @@ def test_fans_of_triangles_that_share_a_vertex_part():
 
 
 def test_dry_spots_that_meet_in_a_point_become_one():
-    """A plate of triangles, of which four are missing: two and two, which share a vertex."""
+    """Two pairs of triangles are missing from a plate and share a vertex."""
     corner = np.array([i + 6 * j for j in range(5) for i in range(5)], np.int32)
     triangles = np.concatenate((corner[:, None] + [0, 1, 7], corner[:, None] + [0, 7, 6])).astype(np.int32)
     torn = np.delete(triangles, [6, 31, 12, 37], axis=0)

@@ -1,4 +1,4 @@
-"""A run that was broken off continues to the same bits; a file that does not belong to it is never used."""
+"""Bitwise restart of an interrupted run, and rejection of foreign checkpoint files."""
 
 import signal
 import subprocess

@@ -40,7 +40,7 @@ def test_a_drop_has_its_volume_and_its_surface_encloses_it():
 
 
 def test_a_half_sphere_starts_with_its_contact_line_on_the_wall_and_loses_energy_from_then_on():
-    """Some of its line was above the wall: the first step put it there, and the volume was 3 % too large."""
+    """If part of the line starts above the wall, the volume is 3 % too large."""
     simulation = droplet(drop(contact_angle=0.5 * np.pi))
     surface = simulation.surface
     assert not any(surface.points[ring, 2].any() for ring in surface.mesh.rings)
@@ -79,7 +79,7 @@ def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy_at_its_press
 
 
 def test_a_sphere_of_liquid_rests_under_the_pressure_of_its_surface():
-    """Tension and pressure leave little on vertices of an uneven triangulation; particles are shifted nowhere."""
+    """Tension and pressure nearly cancel on an uneven triangulation, and particles do not drift."""
     scene = drop()
     simulation = droplet(scene)
     surface = simulation.surface
@@ -139,7 +139,7 @@ def test_a_mirror_does_what_images_would():
 
 
 def test_a_tank_in_space_rests_under_its_weight():
-    """A periodic layer on a mirror: pressure as deep as it lies, 2 %."""
+    """In a periodic layer on a mirror the pressure is hydrostatic within 2 %."""
     spacing, deep = 0.1, 12
     places, heights = np.arange(8) + 0.5, np.arange(deep) + 0.5
     points = spacing * np.stack(np.meshgrid(places, places, heights, indexing="ij")).reshape(3, -1)
@@ -249,7 +249,7 @@ def test_a_wall_holds_a_contact_line_at_rest_and_one_that_moves_has_its_angle():
 
 @pytest.mark.parametrize("across", [8, 12])
 def test_friction_takes_less_than_the_velocity_of_a_contact_line_in_a_step(across):
-    """Shares W, masses m, lengths L: dv/dt = -gamma W / m W^T L v / v_sliding; to take all is unstable."""
+    """With weights W, masses m, lengths L: dv/dt = -gamma W / m W^T L v / v_sliding; full removal is unstable."""
     numerics = DropletNumerics(particles_per_diameter=across)
     simulation = droplet(drop(contact_angle=0.5 * np.pi, advancing_angle=2.0, numerics=numerics))
     simulation.step(simulation.time_step())

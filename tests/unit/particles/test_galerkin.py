@@ -311,7 +311,7 @@ def shaken_inside(ball):
 
 
 def test_no_mode_of_the_linearised_scheme_grows(ball):
-    """Squared frequencies of m v' = -K x + B^T p, x' = v, B v = 0 are positive; those of the second mode are 8.
+    """Squared frequencies of m v' = -K x + B^T p, x' = v, B v = 0 are positive, and 8 for the second mode.
 
     A mode is weighted by its share of the divergence-free linear velocities; grid modes have almost none.
     """
@@ -341,7 +341,7 @@ def test_a_swing_keeps_its_momenta(ball):
     motions, state = rigid_motions(flow.body.points), flow.solver.state
     size = np.sqrt(2.0 * state.kinetic * np.array([(motion**2).sum(axis=1).mean() for motion in motions]))
     assert state.kinetic > 0.05
-    assert state.momenta / size == pytest.approx(0.0, abs=1e-6)  # what the linear solve leaves
+    assert state.momenta / size == pytest.approx(0.0, abs=1e-6)  # tolerance of the linear solver
 
 
 def test_a_swing_keeps_its_centre(ball):

@@ -21,7 +21,7 @@ def points():
 
 
 def test_images_equal_a_loop_over_particles(points):
-    """Twin: the reflection formula, one particle at a time."""
+    """The twin applies the reflection formula to one particle at a time."""
     plate = tilted()
     images = mirror(points, (plate,), REACH)
     expected, source = [], []
@@ -50,7 +50,7 @@ def test_an_edge_between_two_walls_has_images_of_both():
 
 @pytest.mark.parametrize("slip", [np.inf, 0.1, 0.0])
 def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
-    """Rigid motion of plate and liquid: that of the images, those of images at a second plate included."""
+    """Images follow the rigid motion of plate and liquid, including images at a second plate."""
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (tilted(), Plate.horizontal(0.4, side=1.0))
     twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
@@ -71,7 +71,7 @@ def test_a_plate_that_slides_takes_nothing_along_without_friction():
 
 
 def gradients(basis):
-    """Gradients at the particles of a wall, of an even and of a mirrored vector field."""
+    """Return gradients at wall particles, of an even field and a mirrored vector field."""
     axis = np.linspace(0.0, 1.0, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     cloud += np.random.default_rng(8).uniform(-0.02, 0.02, cloud.shape) * (cloud[:, 2:] > 0.0)
@@ -89,13 +89,13 @@ def gradients(basis):
 
 @pytest.mark.parametrize("basis", ["linear", "quadratic"])
 def test_linear_fields_that_fit_the_wall_are_exact_on_it(basis):
-    """A scalar without slope across the wall, and a velocity that slips along it."""
+    """The fields are a scalar without normal gradient and a velocity along the wall."""
     exact = np.array([[2.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.0, 0.0, 2.0]])
     assert gradients(basis) == pytest.approx(np.broadcast_to(exact[:, :, None], gradients(basis).shape), abs=1e-9)
 
 
 def test_a_quadratic_even_field_is_exact_at_the_wall():
-    """u = x^2 - z^2 is even in z: its Laplacian vanishes on the wall, its slope across it as well."""
+    """For the even field u = x^2 - z^2 the Laplacian and the normal gradient vanish on the wall."""
     axis = np.linspace(-0.5, 0.5, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis + 0.5, indexing="ij"), axis=-1).reshape(-1, 3)
     ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)

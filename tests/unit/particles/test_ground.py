@@ -1,4 +1,4 @@
-"""The ground below a liquid's surface: distances and normals, what settles on it, images behind it."""
+"""The ground below a liquid surface: distances, normals, landing and images."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ RADIUS = 1.0
 
 
 def ball():
-    """Distance to a ball of radius 1 about the origin."""
+    """Return the distance to a ball of radius 1 about the origin."""
     grid = Grid.around(np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]]), 0.1)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     return LevelSet(grid, np.sqrt(x * x + y * y + z * z) - RADIUS)

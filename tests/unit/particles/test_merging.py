@@ -1,4 +1,4 @@
-"""Drops that meet in delta-SPH: gaps of a surface, its level set without them, drops that become one."""
+"""Merging drops in delta-SPH: surface gaps, gap-free level set and merged drops."""
 
 import numba
 import numpy as np
@@ -23,7 +23,7 @@ INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0,
 
 
 def two_drops(viscosity=0.5, **changes):
-    """Two drops that fly at each other along x, or come down on a wall beside each other."""
+    """Return two drops that collide along x or land next to each other on a wall."""
     numerics = DropletNumerics(particles_per_diameter=8)
     scene = Droplet(**INK | {"viscosity": viscosity, "numerics": numerics} | changes)
     drop = droplet(scene)
@@ -91,10 +91,10 @@ def test_drops_that_have_merged_end_with_the_pressure_of_one_sphere():
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
     assert distance.mean() == pytest.approx(radius, rel=0.01)
     assert simulation.pressures.mean() == pytest.approx(2.0 / radius, rel=0.02)
-    assert np.std(distance) < 0.03 * radius  # where they met a dimple stays long
+    assert np.std(distance) < 0.03 * radius  # a dimple remains at the contact
 
 
-def test_drops_beside_each_other_on_a_wall_become_one():
+def test_neighbouring_drops_on_a_wall_merge():
     simulation, volume = two_drops(viscosity=0.2, speed=1.0, contact_angle=np.pi / 3.0)
     surface = go(simulation, 0.3).surface
     assert any((meeting.before, meeting.after) == (2, 1) for meeting in surface.topology_changes)

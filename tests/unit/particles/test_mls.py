@@ -25,7 +25,7 @@ def weights(offsets, support):
 
 @pytest.mark.parametrize("row", [171, 0])
 def test_quadratic_weights_equal_a_dense_least_squares_fit(cloud, row):
-    """Twin: NumPy's lstsq on the weighted Taylor expansion, inside and at a corner."""
+    """The twin applies NumPy's lstsq to the weighted Taylor expansion, inside and at a corner."""
     actual = fit(cloud, [row], "quadratic")
     d = np.delete(cloud, row, axis=0) - cloud[row]
     x, y, z = d.T
@@ -40,7 +40,7 @@ def test_quadratic_weights_equal_a_dense_least_squares_fit(cloud, row):
 
 
 def mls_value(cloud, values, at):
-    """Twin: value of the linear MLS approximation at a point."""
+    """Return the linear MLS approximation at a point."""
     basis = np.column_stack((np.ones(len(cloud)), cloud - at))
     w = weights(cloud - at, SUPPORT["linear"])
     return np.linalg.solve(basis.T @ (w[:, None] * basis), basis.T @ (w * values))[0]

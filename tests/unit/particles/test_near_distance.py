@@ -1,4 +1,4 @@
-"""Distances to a surface in a band about it: those that VTK finds everywhere, slivers and folds included."""
+"""Distances to a surface in a narrow band against VTK, including slivers and folds."""
 
 import numpy as np
 import pyvista
@@ -11,7 +11,7 @@ def test_a_band_about_a_rough_surface_has_its_distances():
     ball = pyvista.Icosphere(radius=1.0, nsub=2)
     points, triangles = np.array(ball.points, dtype=float), ball.faces.reshape(-1, 4)[:, 1:].astype(np.int32)
     points = points * [1.0, 1.0, 0.6] + 0.1 * np.random.default_rng(0).normal(size=points.shape)
-    triangles = np.append(triangles, triangles[:1, [0, 1, 1]], axis=0)  # an edge, and no triangle
+    triangles = np.append(triangles, triangles[:1, [0, 1, 1]], axis=0)  # edges only
     grid = Grid.around(points, 0.11)
     everywhere = signed_distance(points, triangles[:-1], grid).values
     for band in (0.05, 0.4, 10.0):
@@ -20,7 +20,7 @@ def test_a_band_about_a_rough_surface_has_its_distances():
 
 
 def test_a_triangle_as_thin_as_rounding_is_its_edges():
-    """Its normal is one of rounding: with it a plane that is far from the nodes, or a foot that is none."""
+    """Its normal is dominated by round-off, which would give wrong plane distances and projections."""
     rng = np.random.default_rng(1)
     for height in np.repeat([1e-12, 1e-15, 0.0], 30):
         start, along = rng.uniform(0.3, 0.6, 3), rng.normal(size=3)

@@ -1,4 +1,4 @@
-"""Joints in canonical orientation: what a turn and a mirror image do to places, wrenches and shapes."""
+"""Joints in canonical orientation: rotation and reflection of positions, wrenches and shapes."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_lengths_below_a_picometre_have_no_direction():
 
 
 def test_wrenches_keep_their_power():
-    """Forces are vectors, moments axial ones, as velocities and spins of the plate are."""
+    """Forces and velocities are vectors; moments and spins are axial vectors."""
     rng = np.random.default_rng(1)
     for orientation in (Orientation(0.7, False), Orientation(-2.1, True)):
         points, force = rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
@@ -58,7 +58,7 @@ def test_wrenches_keep_their_power():
 
 
 def test_the_shape_of_a_mirror_image_is_that_of_its_own_reflow():
-    """Rings stay counter-clockwise, triangles outward, discs where they belong."""
+    """Rings stay counter-clockwise, triangles point outwards and discs stay on their pads."""
     geometry = JointGeometry(0.33e-3, RADIUS, RADIUS, (2e-5, 3e-5), (0.03, 0.05))
     upright, orientation = canonical(geometry)
     assert orientation.mirror

@@ -1,4 +1,4 @@
-"""Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
+"""Printed parts: landing, curing, solid particles, restart, metrics and files."""
 
 from contextlib import nullcontext
 
@@ -20,7 +20,7 @@ INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
     "pitch": 23.2e-6, "columns": 2, "rows": 1,
 }  # fmt: skip
-BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: a second has to land on what is cured
+BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: the second lands on cured ink
 
 
 def printing(**changes):
@@ -58,7 +58,7 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     assert deposit.cure()
     assert (deposit.state == SOLID).all() and deposit.simulation is None and len(deposit.bodies) == 1
     again = Deposit(scene)
-    again.restore(deposit.saved())  # where a run was killed while nothing was liquid
+    again.restore(deposit.saved())  # interrupted while everything was solid
     for state in (deposit, again):
         state.add_drop((0.0, 0.0))
     assert np.array_equal(again.points, deposit.points) and np.array_equal(again.dose, deposit.dose)

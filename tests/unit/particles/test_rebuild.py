@@ -74,7 +74,7 @@ def test_signed_distance_of_a_net_is_that_of_the_sphere():
 
 
 def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
-    """Two balls of one net that overlap: between their sheets the nearest one faces the wrong way."""
+    """In the overlap of two balls of one surface the nearest sheet has the wrong orientation."""
     points, triangles = extract_surface(ball(grid_around_ball((0, 0, 0), R, R / 8), (0, 0, 0), R))
     aside = np.array([0.8 * R, 0.0, 0.0])
     both = np.concatenate((points - aside, points + aside)), np.concatenate((triangles, triangles + len(points)))
@@ -88,7 +88,7 @@ def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
 
 
 def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
-    """An octahedron: all triangles of its upper half meet above its centre, and edges lie above its axes."""
+    """In an octahedron all upper triangles meet above the centre, and edges lie above the axes."""
     corners = np.concatenate((np.eye(3), -np.eye(3)))
     sides = np.array([[x, y, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)], np.int32)
     inward = np.linalg.det(corners[sides]) < 0.0
@@ -126,7 +126,7 @@ def test_a_rebuilt_drop_on_a_wall_has_one_ring_and_its_volume():
     assert np.all(ring[:, 2] == 0.0)
     x, y = ring[:, 0], ring[:, 1]
     assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0  # counter-clockwise
-    # the net rounds the edge between the drop and its mirror image within a cell
+    # the surface rounds the edge between drop and mirror image within a cell
     assert np.hypot(x, y) == pytest.approx(radius * np.sin(angle), rel=0.03)
     assert cloud.points[:, 2].min() == 0.0
     assert (cloud.wall[cloud.surface_count :] == 0).any()
@@ -176,7 +176,7 @@ def test_bodies_that_cannot_rebuild():
 
 
 def test_a_groove_narrower_than_a_cell_is_blunted_and_a_smooth_net_stays():
-    """Two bars that touch along an edge: both of their nets have the vertices of its cells."""
+    """Two bars touch along an edge, and both surfaces share the vertices of its cells."""
     grid = Grid.around(np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), 0.1)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     x, y = x - 0.03, y - 0.03

@@ -85,7 +85,7 @@ def test_periodic_neighbours_are_those_of_a_tree_of_the_torus():
 
 
 def disturbed(simulation: Simulation) -> Simulation:
-    """The same with particles, velocities and densities pushed at random."""
+    """Return the simulation with random disturbances of positions, velocities and densities."""
     random, fields = np.random.default_rng(7), simulation.fields
     for axis in (fields.x, fields.z):
         axis += random.uniform(-0.2, 0.2, axis.shape) * simulation.law.spacing
@@ -182,7 +182,7 @@ def test_walls_carry_liquid_at_rest():
     fields, liquid = simulation.fields, slice(simulation.fluids)
     depth = 0.6 - fields.z[liquid]
     inner = (depth > 3 * simulation.law.spacing) & (np.abs(fields.x[liquid] - 1.6) < 1.0)
-    assert np.abs(simulation.rates[3][inner]).max() < 0.05 * 9.81  # the layer at the floor; 1 % farther up
+    assert np.abs(simulation.rates[3][inner]).max() < 0.05 * 9.81  # bottom layer; 1 % above
     below = fields.z[simulation.fluids :] < 0.0
     assert fields.pressure[simulation.fluids :][below].max() > 0.9 * 1000.0 * 9.81 * 0.6
 

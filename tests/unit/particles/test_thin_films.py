@@ -1,4 +1,4 @@
-"""Films and rims of droplets: friction of the wall, the surface that stays with its particles, its triangles."""
+"""Thin films and rims of droplets: wall friction, surface tracking and triangle quality."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def film(layers, height):
-    """A film on a wall that holds it, periodic, of particles a spacing of one apart or over a height; viscosity one."""
+    """Return a periodic film on a no-slip wall with unit spacing or a given height, and unit viscosity."""
     law, _ = liquid_of(Droplet(**INK | {"viscosity": 1.0, "speed": 1.0}, numerics=COARSE), 1.0)
     wide = ACROSS / np.sqrt(height / layers)
     law = law._replace(period_x=wide, period_y=wide, sound=1e3, diffusion=0.0, gravity_z=0.0, shifting=0.0)
@@ -33,7 +33,7 @@ def film(layers, height):
 
 
 def mean_speed(layers):
-    """Of a film under a force along the wall, over Nusselt's H^2 / 3: particles of one layer move alike."""
+    """Return the mean speed under a tangential force over Nusselt's H^2 / 3; layers move uniformly."""
     simulation = film(layers, layers)
     fields, drag = simulation.fields, np.empty((layers, layers))
     layer = np.round(fields.z - 0.5).astype(int)
@@ -45,14 +45,14 @@ def mean_speed(layers):
 
 
 def test_a_wall_holds_a_film_as_in_nusselts_solution():
-    """With the viscosity along the line of two particles, images too, films of 2 and 4 were 1.28 and 1.16 too fast."""
+    """With pairwise radial viscosity, films of 2 and 4 particles were too fast by factors of 1.28 and 1.16."""
     assert mean_speed(2) == pytest.approx(1.0, abs=0.2)
     assert mean_speed(4) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("height", [0.6, 0.8, 1.0])
 def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
-    """3 mu u / H a unit of area; sums over images alone give a ninth to a half of it."""
+    """The friction is 3 mu u / H per area; sums over images alone give a ninth to a half of it."""
     simulation = film(1, height)
     fields, law = simulation.fields, simulation.law
     fields.u[:] = 1.0
@@ -107,7 +107,7 @@ def test_what_faces_the_wall_wets_it_and_a_film_is_not_yet_dry():
 
 
 def test_sharp_bends_of_contact_lines_are_blunted_and_round_ones_stay():
-    """A fan of triangles: a circle of twelve, one of whose vertices is a spike."""
+    """A fan of twelve triangles has one spike on its circle."""
     angles = 2.0 * np.pi * np.arange(12) / 12
     points = np.concatenate(([[0.0, 0.0, 1.0]], np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)))
     ring = np.arange(1, 13, dtype=np.int32)
@@ -128,7 +128,7 @@ def test_a_notch_is_no_gap():
 
 
 def test_a_dry_spot_smaller_than_a_particle_is_closed():
-    """A plate of triangles on a wall, in the middle of which one is missing."""
+    """One triangle is missing in the middle of a triangulated plate on a wall."""
     x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
     points = np.stack((x.ravel(), y.ravel(), np.full(25, 0.5)), axis=1)
     corner = np.array([i + 5 * j for j in range(4) for i in range(4)], np.int32)

@@ -1,4 +1,4 @@
-"""XSPH: particles move with a smoothed velocity; momentum and the centre of mass are what they are without it."""
+"""XSPH moves particles with a smoothed velocity and conserves momentum and centre of mass."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_noise_is_smoothed_and_the_centre_of_mass_stays():
     drift = drifts(simulation)
     assert np.abs(drift @ fields.mass).max() < 1e-12 * np.abs(drift).max() * fields.mass.sum()
     assert np.std(fields.u + drift[0]) < 0.85 * np.std(fields.u)
-    pairwise = np.zeros(3)  # a plain sum over all pairs, for one particle
+    pairwise = np.zeros(3)  # sum over all pairs for one particle
     law, i = simulation.law, 40
     for j in range(simulation.fluids):
         q = np.linalg.norm([fields[k][i] - fields[k][j] for k in range(3)]) / law.length
@@ -48,8 +48,8 @@ def test_what_moves_as_a_whole_is_not_touched_and_beside_a_wall_the_image_counts
     above = ink(0.5, contact_angle=1.5)
     above.fields.u[:], above.fields.w[:] = 3.0, -1.0
     drift, near = drifts(above), above.fields.z < above.law.length
-    assert not drift[:2].any()  # along the wall an image moves on
-    assert (drift[2, near] > 0.0).all()  # across it, it comes back
+    assert not drift[:2].any()  # along the wall the image has the same velocity
+    assert (drift[2, near] > 0.0).all()  # across the wall it is reversed
 
 
 def test_a_drop_rests_with_it_as_without_it():
