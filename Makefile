@@ -1,39 +1,39 @@
-# `make demo` and `make test` install what is missing first (.ci/setup); the second time that takes no time.
+# `make demo` and `make test` first install missing packages (.ci/setup); if none is missing this takes no time.
 export OMP_NUM_THREADS = 1
-# Without compiled modules every process compiles them anew: half a second each, and a run starts dozens.
+# Without compiled modules each of the dozens of processes of a run would compile them, half a second each.
 unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON := .venv/bin/python
 CASE := cases/jedec_bga/case.toml
-# One worker more than cores: tests of schedulers and of the command line wait. A worker that dies ends the tests: replaced,
-# xdist would wait for its files for ever.
+# One worker more than cores, since tests of schedulers and of the command line wait. A worker that dies ends the tests:
+# with a replacement xdist would wait forever for its files.
 PARALLEL := --numprocesses=$(shell expr $$(nproc) + 1) --maxprocesses=8 --dist=loadfile --no-loadscope-reorder --max-worker-restart=0
 
-help:  ## this list
+help:  ## list the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
 
-setup:  ## install what is missing: Debian packages, .venv
+setup:  ## install missing Debian packages and the virtual environment
 	@.ci/setup
 
 demo: setup  ## run the default case from case file to report
 	$(PYTHON) -m reflowshock run $(CASE)
 
-test: setup  ## run every check and test, on all cores
+test: setup  ## run all checks and tests on all cores
 	@.ci/setup-slurm
 	@.ci/setup-browser
 	$(PYTHON) -m pytest $(PARALLEL)
 
-test-long: setup  ## the sweeps that `make test` leaves out: 50 interrupts, ..., random hard cases on three new seeds
+test-long: setup  ## run the long tests: 50 interrupts, sweeps, random hard cases with three new seeds
 	$(PYTHON) -m pytest -m long $(PARALLEL)
 	@for seed in $$($(PYTHON) -c 'import random; print(*random.sample(range(10**6), 3))'); do echo "seed $$seed"; \
 	    $(PYTHON) -m reflowshock stress-test --random 500 --seed $$seed --out runs/stress-test-$$seed || exit 1; done
 
-test-debian13:  ## run every test on Debian 13 too, in a chroot; compare results (root)
+test-debian13:  ## run all tests on Debian 13 in a chroot and compare results (root)
 	@.ci/debian13
 
-test-golden: setup  ## run every case with this checkout and with the commit BASE: equal to the bit
-	@[ -n "$(BASE)" ] || { echo "which commit? make test-golden BASE=COMMIT" >&2; exit 2; }
-	@rm -rf build/golden && git worktree prune  # a product of earlier code with the same version would count as made
+test-golden: setup  ## run all cases with this checkout and the commit BASE; results must be equal to the bit
+	@[ -n "$(BASE)" ] || { echo "BASE is missing; run make test-golden BASE=COMMIT" >&2; exit 2; }
+	@rm -rf build/golden && git worktree prune  # products of earlier code with the same version would count as valid
 	@git worktree add --detach build/golden/base $(BASE)
 	$(PYTHON) -m tests.same_results run build/golden/before --every --checkout build/golden/base
 	$(PYTHON) -m tests.same_results run build/golden/after --every

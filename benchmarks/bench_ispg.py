@@ -1,7 +1,8 @@
-"""Cost of a step of the scheme ispg against the number of particles: a cube of solder, values of the paper, 60 degrees.
+"""Cost of one ISPG step against the number of particles, for a cube of solder that wets a wall at 60 degrees.
 
 Run: PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/bench_ispg.py   (10 s)
-Seconds are those of the processor, over the first swing, where factors of the pressure equation age fastest.
+Times are processor seconds over the first swing, where the factors of the pressure equation age fastest. The material
+has the values of the paper.
 """
 
 from time import process_time

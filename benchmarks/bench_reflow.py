@@ -1,7 +1,7 @@
-"""Error against cost of the reflow of joints: spacing, time step, gap; and of the derivatives that the seed takes.
+"""Error against cost of solder joint reflow over spacing, time step and gap, and of the nodal derivatives.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_reflow.py   (about a minute; writes results/reflow.json)
-Errors are relative to the Young-Laplace meridian; seconds are those of one core after compilation.
+Errors are relative to the Young-Laplace meridian; times are seconds of one core after compilation.
 """
 
 from time import perf_counter
@@ -34,7 +34,7 @@ COLUMNS = (
 
 
 def joint(gap: float, numerics: SolderNumerics) -> dict:
-    """Solve one joint; a run that finds no rest is reported as such."""
+    """Solve one joint and return its figures, or the failure if it does not come to rest."""
     solder = Solder(volume=BALL, numerics=numerics)
     row = {"gap_mm": gap, "spacing_mm": numerics.spacing / MM, "time_step_limit": numerics.time_step_limit}
     try:
@@ -45,7 +45,7 @@ def joint(gap: float, numerics: SolderNumerics) -> dict:
 
 
 def derivative_errors(basis: str, count: int) -> dict:
-    """Relative errors of gradient and Laplacian of sin(2x) cos(y) exp(z) inside a shaken lattice, and their cost."""
+    """Return relative errors of gradient and Laplacian of sin(2x) cos(y) exp(z) on a perturbed lattice, and cost."""
     axis, spacing = np.linspace(0.0, 1.0, count), 1.0 / (count - 1)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     points += np.random.default_rng(13).uniform(-0.1, 0.1, points.shape) * spacing
@@ -53,7 +53,7 @@ def derivative_errors(basis: str, count: int) -> dict:
     neighbours = NeighbourList(SUPPORT[basis] * spacing, 0.0)
     neighbours.update(points)
     start = perf_counter()
-    found = derivatives(points, inner, neighbours, basis)
+    operators = derivatives(points, inner, neighbours, basis)
     microseconds = 1e6 * (perf_counter() - start) / len(inner)
     x, y, z = points.T
     field = np.sin(2 * x) * np.cos(y) * np.exp(z)
@@ -61,21 +61,21 @@ def derivative_errors(basis: str, count: int) -> dict:
     return {
         "basis": basis,
         "per_edge": count,
-        "gradient_error": np.linalg.norm(found.gradient[0] @ field - slope) / np.linalg.norm(slope),
-        "laplacian_error": np.linalg.norm(found.laplacian @ field - laplacian) / np.linalg.norm(laplacian),
+        "gradient_error": np.linalg.norm(operators.gradient[0] @ field - slope) / np.linalg.norm(slope),
+        "laplacian_error": np.linalg.norm(operators.laplacian @ field - laplacian) / np.linalg.norm(laplacian),
         "microseconds_a_particle": microseconds,
     }
 
 
 def cost_of_a_step(rows: list[dict]) -> dict:
-    """Fit seconds a step = a + b n, the model of `particles.parameters.estimate`."""
+    """Fit seconds per step = a + b n, the model of ``particles.parameters.estimate``."""
     rows = [row for row in rows if "seconds" in row]
     slope, constant = np.polyfit([row["particles"] for row in rows], [row["seconds"] / row["steps"] for row in rows], 1)
     return {"seconds_per_step": float(constant), "seconds_per_step_and_particle": float(slope)}
 
 
 def main() -> None:
-    """Run the series and write the table."""
+    """Run all series and store the results."""
     joint(0.31, SolderNumerics(spacing=0.1 * MM))
     for basis in SUPPORT:
         derivative_errors(basis, 8)

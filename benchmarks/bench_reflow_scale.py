@@ -1,7 +1,7 @@
-"""Cost of a step against the number of particles, on one and two threads: a cube that spreads to 60 degrees.
+"""Cost of a reflow step against the number of particles, on one and two threads, for a cube that wets a wall.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_reflow_scale.py   (two minutes; writes results/reflow_scale.json)
-Each row runs in a process of its own; bytes are the growth of its largest resident size over that of 343 particles.
+Each row runs in its own process. Memory is the growth of the maximum resident size over a cube of 343 particles.
 """
 
 import json

@@ -1,9 +1,9 @@
-"""Particle-steps per second of delta-SPH: a dam break in a plane, droplets in space without and with a surface; a GPU.
+"""Particle-steps per second of delta-SPH for a plane dam break and droplets in three dimensions, on CPU and GPU.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/bench_sph.py   (two minutes; results/sph.json)
-Whole steps, on one thread and on two in turns. The bars are those of one core in space with all terms, of two threads
-over one, and of a GPU, where there is one: liquid in space without a tracked surface, up to 4e6 particles, beside one,
-two and all threads of the same machine.
+Whole steps are timed, on one and two threads in turns. The limits apply to one core in three dimensions with all terms,
+to the speed-up of two threads, and to a GPU if there is one. The GPU runs a liquid without a tracked surface with up to
+4e6 particles; the threads of the same machine run one of these sizes for comparison.
 """
 
 import json
@@ -25,21 +25,21 @@ from reflowshock.particles.sph_flows.dam_break import dam
 from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
 
 NAME = "sph"
-RATE, SPEEDUP, GPU_RATE = 5e5, 1.7, 1e8  # bars
+RATE, SPEEDUP, GPU_RATE = 5e5, 1.7, 1e8  # limits
 STEPS, TURNS = 20, 5
-# Across the diameter: sizes on a GPU with steps to measure, and the size that threads compute, too.
+# Particles across the diameter: GPU sizes with their measured steps, and the size that the threads run as well.
 ACROSS = 38
 SIZES, SHARED = {ACROSS: 200, 60: 200, 124: 100, 197: 50}, 60
 
 
 def dam_break() -> Simulation:
-    """In a plane: 20 000 particles of water."""
+    """Return a plane dam break of 20 000 particles of water."""
     numerics = SphNumerics(particles_across=100)
     return dam(DamBreak(height=0.6, width=1.2, tank_length=3.22, sensor_height=0.12, duration=1.0, numerics=numerics))
 
 
 def ink(tension: str, across: int, device: str = "cpu") -> Droplet:
-    """A drop of ink that strikes a wall, with or without tension."""
+    """Return a drop of ink that strikes a wall, with or without surface tension."""
     effects = DropletEffects(surface_tension=tension, viscosity="on")
     liquid = {"density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "contact_angle": 1.57, "speed": 5.0}
     numerics = DropletNumerics(particles_per_diameter=across, device=device)
@@ -47,30 +47,30 @@ def ink(tension: str, across: int, device: str = "cpu") -> Droplet:
 
 
 def drop() -> Simulation:
-    """In space: 28 000 particles that carry a surface."""
+    """Return a drop of 28 000 particles with a tracked surface."""
     return droplet(ink("on", ACROSS))
 
 
 def stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
-    """In space: a free drop without a tracked surface, whose particles are not shifted; it is drawn out along z.
+    """Return a free drop without a tracked surface or particle shifting, stretched along z.
 
-    Its viscosity is a tenth of the ink's, so that sound and not viscosity bounds the time step of all sizes.
+    Its viscosity is a tenth of that of ink, so that the speed of sound limits the time step of all sizes.
     """
     scene = ink("off", across)
-    places = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
-    lattice = np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1)
+    coordinates = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
+    lattice = np.stack(np.meshgrid(coordinates, coordinates, coordinates, indexing="ij")).reshape(3, -1)
     points = lattice[:, (lattice**2).sum(axis=0) < (0.5 * scene.diameter) ** 2]
     law = liquid_of(scene, scene.spacing)[0]._replace(
         tracked=0, shifting=0.0, mirror=0, viscosity=0.1 * scene.viscosity
     )
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
-    for speed, share, place in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
-        speed[:] = share * scene.impact_speed * place / (0.5 * scene.diameter)
+    for speed, share, coordinate in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
+        speed[:] = share * scene.impact_speed * coordinate / (0.5 * scene.diameter)
     return Simulation(fields, points.shape[1], law, device=device)
 
 
 def go_on(simulation: Simulation, steps: int) -> float:
-    """Wall time of some steps [s]; what a GPU does is waited for."""
+    """Take steps and return their wall time [s], GPU work included."""
     start = perf_counter()
     for _ in range(steps):
         simulation.step(simulation.time_step())
@@ -79,35 +79,35 @@ def go_on(simulation: Simulation, steps: int) -> float:
 
 
 def seconds(simulation: Simulation, threads: int) -> tuple[float, float]:
-    """Wall and processor time of some steps on so many threads [s]."""
+    """Return wall and processor time [s] of ``STEPS`` steps on a number of threads."""
     set_num_threads(threads)
     processor = process_time()
     return go_on(simulation, STEPS), process_time() - processor
 
 
 def measure(simulation: Simulation) -> dict[str, float]:
-    """Rates of one thread by its processor time, and the wall time of one thread over that of two; the best turns."""
+    """Return the rate of one thread (processor time) and the speed-up of two (wall time), each from the best turn."""
     most = get_num_threads()
     seconds(simulation, most)
     turns = [(seconds(simulation, 1), seconds(simulation, min(2, most))) for _ in range(TURNS)]
     set_num_threads(most)
-    one = min(processor for (_, processor), _ in turns)
-    speedup = min(one[0] for one, _ in turns) / min(two[0] for _, two in turns)
+    single_seconds = min(processor for (_, processor), _ in turns)
+    speedup = min(single[0] for single, _ in turns) / min(double[0] for _, double in turns)
     return {
         "particles": simulation.fluids, "neighbours_listed": simulation.particles.neighbours,
-        "particle_steps_per_second": simulation.fluids * STEPS / one, "two_threads_over_one": speedup,
+        "particle_steps_per_second": simulation.fluids * STEPS / single_seconds, "two_threads_over_one": speedup,
     }  # fmt: skip
 
 
 def measure_gpu() -> dict[str, Any] | None:
-    """Rates of a GPU by wall time, and of threads beside it; None where there is none."""
+    """Return particle-steps per second of a GPU and of the threads of the same machine; None without a GPU."""
     from numba import cuda
 
     from reflowshock.particles.sph.cuda_particles import CudaParticles
 
     if not cuda.is_available():
         return None
-    found: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
+    figures: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
     for across, steps in SIZES.items():
         free = cuda.current_context().get_memory_info()[0]
         simulation = stretched_drop(across, CudaParticles)
@@ -116,19 +116,19 @@ def measure_gpu() -> dict[str, Any] | None:
         rate = simulation.fluids * steps / go_on(simulation, steps)
         lists = simulation.particles.builds - lists
         used = (free - cuda.current_context().get_memory_info()[0]) / simulation.fluids
-        found["sizes"][simulation.fluids] = {
+        figures["sizes"][simulation.fluids] = {
             "particle_steps_per_second": rate, "steps_of_a_list": steps / max(1, lists), "bytes_of_particle": used,
         }  # fmt: skip
         if across == SHARED:
-            found["gpu"] = rate
+            figures["gpu"] = rate
         del simulation
     shared, most = stretched_drop(SHARED, ThreadParticles), get_num_threads()
     go_on(shared, 5)
     for threads in (most, 2, 1):
         set_num_threads(threads)
-        found[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
+        figures[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
     set_num_threads(most)
-    return found
+    return figures
 
 
 def main() -> None:

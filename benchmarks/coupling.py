@@ -1,10 +1,10 @@
-"""The bars of two scales: what is asked and what is measured; ranks and placements are measured here.
+"""Limits on two-scale coupling: results on several ranks, with the limits of three longer benchmarks in one table.
 
     PYTHONPATH=. python benchmarks/coupling.py  (a minute on two free cores; writes coupling.json)
 
-Ranks: 1 to 4 of them in both placements on a small package, whose histories must be equal; on two ranks that share both
-models of a larger one, how busy they are and what the coupling costs. All other rows are from the results of
-``coupling_stability.py``, ``two_scale.py`` and ``two_scale_peers.py``, which take longer.
+A small package runs on 1 to 4 ranks in both placements; the histories must be equal. A larger one runs on two ranks
+that share both models and reports the busy share and the coupling overhead. All other rows are read from the results of
+``coupling_stability.py``, ``two_scale.py`` and ``two_scale_peers.py``.
 """
 
 import os
@@ -37,22 +37,22 @@ SOURCES = ("coupling_stability", "two_scale", "two_scale_peers")
 
 
 def equality(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
-    """Return how much the histories of each placement differ from those of one rank."""
+    """Return the difference between the histories of each placement and those of one rank."""
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     reference, _ = launch(request, {"total": 1, "placement": "shared"}, folder / f"{scheme}_1")
-    found = {}
+    differences = {}
     for total in (2, 3, 4):
         for placement in ("shared", "disjoint"):
             name = f"{scheme}, {total} ranks {placement}"
             ranks = {"total": total, "placement": placement}
             history, _ = launch(request, ranks, folder / f"{scheme}_{total}_{placement}")
-            found[name] = largest_difference(history, reference)
-            print(f"{name}: {found[name]:.2e}", flush=True)
-    return found
+            differences[name] = largest_difference(history, reference)
+            print(f"{name}: {differences[name]:.2e}", flush=True)
+    return differences
 
 
 def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
-    """Return what the program tells of a run on two ranks that share both models."""
+    """Return the load figures that the program reports for two ranks that share both models."""
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     _, result = launch(request, {"total": 2, "placement": "shared"}, folder / f"{scheme}_balance")
     return {
@@ -60,35 +60,35 @@ def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def own_bars(found: dict[str, dict]) -> dict[str, dict]:
-    """Return the bars of ranks with what was measured."""
-    bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in found["equality"].items()}
-    for scheme, values in found["balance"].items():
+def own_bars(figures: dict[str, dict]) -> dict[str, dict]:
+    """Return the limits on ranks with their measured values."""
+    bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in figures["equality"].items()}
+    for scheme, values in figures["balance"].items():
         bars[f"coupling overhead, {scheme}, 2 ranks shared"] = turns.bar(values["coupling_overhead"], OVERHEAD, False)
         bars[f"busy share, {scheme}, 2 ranks shared"] = turns.bar(values["busy_share"], BUSY)
     return bars
 
 
 def table(bars: dict[str, dict[str, dict]]) -> str:
-    """Return the bars of all results as a table for people."""
+    """Format the limits of all results as a Markdown table."""
     rows = [
         f"| {source} | {name} | {item['holds_if']} {item['limit']:.3g} | {item['value']:.3g} |"
-        f" {'holds' if item['ok'] else 'MISSED'} |"
+        f" {'passed' if item['ok'] else 'FAILED'} |"
         for source, items in bars.items()
         for name, item in items.items()
     ]
-    return "\n".join(["| from | what | bar | measured | |", "|---|---|---|---|---|", *rows])
+    return "\n".join(["| benchmark | quantity | limit | measured | |", "|---|---|---|---|---|", *rows])
 
 
 def other_bars() -> dict[str, dict[str, dict]]:
-    """Return the bars in the results of the other benchmarks."""
-    found = {}
+    """Return the limits in the results of the other benchmarks."""
+    bars = {}
     for name in SOURCES:
         if figures := results.read_figures(name):
-            found[name] = figures["bars"]
+            bars[name] = figures["bars"]
         else:
             print(f"no results of {name}: run benchmarks/{name}.py")
-    return found
+    return bars
 
 
 def main() -> None:
@@ -98,12 +98,12 @@ def main() -> None:
         for name in ("small", "reduced"):
             (folder / name).mkdir()
         small, reduced = DropScene.write(folder / "small", SMALL), DropScene.write(folder / "reduced", REDUCED)
-        found = {
+        figures = {
             "equality": {k: value for scheme in schemes for k, value in equality(small, scheme, folder).items()},
             "balance": {scheme: balance(reduced, scheme, folder) for scheme in schemes[:2]},
         }
-    bars = own_bars(found)
-    results.write_and_print("coupling", found | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
+    bars = own_bars(figures)
+    results.write_and_print("coupling", figures | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
     print(table({"coupling": bars} | other_bars()))
 
 

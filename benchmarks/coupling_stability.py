@@ -1,12 +1,12 @@
-"""Growth of one window of every coupling scheme over a grid of pairs, long runs, and momentum of a free pair.
+"""Stability of every coupling scheme: growth of one window over a grid of model pairs, long runs, and momentum.
 
     PYTHONPATH=. python benchmarks/coupling_stability.py [--quick]  (half an hour, one core)
 
-A board of orthotropic FR4 and a block tied to it off its grid: m from 1 to 40, impedances from a tenth to ten times the
-board's, mesh ratios from 1 to 8, flat, distorted and curved interfaces, interfaces below the block and beside it. The
-amplification matrix of a window is made of the program's own operators at the steps that the program chooses, step
-fractions 0.9 and the largest that is allowed, 0.95; its spectral radius must be at most 1 + 1e-8. The paper's scheme
-(fine elements at the interface, internal force only, no interface mass) is in the same table.
+A block is tied to a board of orthotropic FR4 off its grid: m from 1 to 40, impedance ratios from 0.1 to 10, mesh ratios
+from 1 to 8, flat, distorted and curved interfaces, below the block or next to it. The amplification matrix of one
+window is assembled from the program's own operators at the program's own steps, with step fractions 0.9 and 0.95 (the
+largest allowed). Its spectral radius must be at most 1 + 1e-8. The scheme as printed in the paper (fine elements at the
+interface, internal force only, no interface mass) is in the same table.
 """
 
 import argparse
@@ -42,8 +42,8 @@ def grid() -> Iterator[tuple[Pair, float]]:
 
 
 def growths(pair: Pair, fraction: float) -> dict[str, float]:
-    """Return spectral radius - 1 of every scheme."""
-    finer = pair.substeps > 1  # else there is nothing for local steps to do
+    """Return the spectral radius minus 1 for every scheme."""
+    finer = pair.substeps > 1  # otherwise local steps equal the window
     chosen = {name: coupling for name, coupling in SCHEMES.items() if finer or coupling.scheme != "local_steps"}
     made = {name: pair.coupled(coupling, fraction) for name, coupling in chosen.items()}
     made[PRINTED] = pair.printed(fraction)
@@ -51,28 +51,33 @@ def growths(pair: Pair, fraction: float) -> dict[str, float]:
 
 
 def table(rows: list[dict]) -> dict[str, dict]:
-    """Return per scheme how many samples grow, and the worst of them."""
+    """Return the number of unstable samples and the largest growth of every scheme."""
     result = {}
     for name in (*SCHEMES, PRINTED):
-        found = {row["pair"]: row["growth"][name] for row in rows if name in row["growth"]}
-        worst = max(found, key=lambda pair: found[pair])
-        unstable = sum(value > GROWTH for value in found.values())
-        result[name] = {"samples": len(found), "unstable": unstable, "worst": found[worst], "where": worst}
+        growth_of_pair = {row["pair"]: row["growth"][name] for row in rows if name in row["growth"]}
+        worst = max(growth_of_pair, key=lambda pair: growth_of_pair[pair])
+        unstable = sum(value > GROWTH for value in growth_of_pair.values())
+        result[name] = {
+            "samples": len(growth_of_pair),
+            "unstable": unstable,
+            "worst": growth_of_pair[worst],
+            "where": worst,
+        }
     return result
 
 
 def bars_of(result: dict) -> dict[str, dict]:
-    """Return the bars with what was measured."""
-    schemes, kept = result["schemes"], result["momentum_error"]
+    """Return the limits with their measured values."""
+    schemes, momentum_errors = result["schemes"], result["momentum_error"]
     bars = {f"growth of a window, {name}": turns.bar(schemes[name]["worst"], GROWTH, False) for name in SCHEMES}
     bars[f"growth of a window, {PRINTED}"] = turns.bar(schemes[PRINTED]["worst"], GROWTH)
     for name, run in result["long_runs"].items():
         bars[f"energy drift, {name}, {run['windows']} windows"] = turns.bar(run["energy_drift"], DRIFT, False)
-    return bars | {f"momentum, {name}": turns.bar(value, MOMENTUM, False) for name, value in kept.items()}
+    return bars | {f"momentum, {name}": turns.bar(value, MOMENTUM, False) for name, value in momentum_errors.items()}
 
 
 def long_runs(windows: int) -> dict[str, dict]:
-    """Return drift of energy, and what the interface holds, after a push without damping."""
+    """Return the energy drift and the largest interface energy after an undamped push."""
     result = {}
     for name in ("held_velocity", "impulse", "local_steps"):
         coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[name])
@@ -83,9 +88,9 @@ def long_runs(windows: int) -> dict[str, dict]:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run all measurements and store the results."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="every twentieth pair, 1e4 windows")
+    parser.add_argument("--quick", action="store_true", help="take every twentieth pair and 1e4 windows")
     quick = parser.parse_args().quick
     rows = []
     for pair, fraction in list(grid())[:: 20 if quick else 1]:

@@ -1,18 +1,20 @@
-"""Droplets and the dam break beside other codes: OpenFOAM's interFoam (volume of fluid) and PySPH (delta-SPH's kin).
+"""Droplet impacts and a dam break compared with OpenFOAM's interFoam (volume of fluid) and PySPH (delta-SPH).
 
     PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py         (all, half an hour; results/droplet_peers.json)
     PYTHONPATH=. .venv/bin/python benchmarks/droplet_peers.py impact  (one of them)
 
-`impact`: drops that strike a wall that holds the liquid, 90 degrees, at Weber and Reynolds numbers: width over time,
-its largest, seconds of one core. interFoam solves a wedge of a body of revolution with air, 40 cells a diameter: one
-layer of cells against particles in three dimensions, which is to its advantage. It is the Debian package openfoam.
-`widths`: why both spread wider than measured drops do: the largest width with 20 to 60 cells a diameter, with the
-contact angle that advances, which is that of measured drops, and by correlations with both angles; a picture.
-`dam_break`: the front of a column twice as high as wide against Martin & Moyce (1952), seconds a particle-step; both
-with as many particles in the height, the same kernel and length of it, and the speed of sound. PySPH's example has a
-stiffer equation of state, an artificial viscosity of 0.1 in place of 0.02, and no diffusion of density; with 80
-particles in the height its values become nan at 1.9 sqrt(a / 2 g), so that it is compared with fewer. It comes from
-PyPI into an environment of its own under ``build/``, and is built there in two minutes.
+``impact``: drops that strike a no-slip wall with a contact angle of 90 degrees, at several Weber and Reynolds numbers:
+width over time, maximum width, and seconds of one core. interFoam (Debian package openfoam) solves an axisymmetric
+wedge with air and 40 cells per diameter; one layer of cells against three-dimensional particles is in its favour.
+
+``widths``: why both codes spread wider than measured drops: maximum width with 20 to 60 cells per diameter, with the
+advancing contact angle of the measured drops, and by correlations with both angles.
+
+``dam_break``: front of a column with an aspect ratio of 2 against Martin & Moyce (1952), and seconds per
+particle-step, for both codes with the same resolution, kernel, smoothing length and speed of sound. The PySPH example
+has a stiffer equation of state, an artificial viscosity of 0.1 instead of 0.02, and no density diffusion. With 80
+particles over the height its values become nan at 1.9 sqrt(a / 2 g), so that it runs with fewer. PySPH is built from
+PyPI in an environment under ``build/`` (two minutes).
 """
 
 import json
@@ -39,10 +41,10 @@ from reflowshock.particles.flows.dam_break import DamBreak
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.reference.impact_spread import laan, of_measured, pasandideh_fard, roisman, wildeman
-from reflowshock.particles.sph.surface_care import SurfaceLost
 from reflowshock.particles.sph_flows.dam_break import solve_dam_break
 from reflowshock.particles.sph_flows.droplet import solve_droplet
 from reflowshock.particles.steps.time_step import capillary_limit
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 mpl.use("Agg")
 NAME = "droplet_peers"
@@ -53,7 +55,7 @@ SOLDER = {"diameter": 78e-6, "density": 8150.0, "surface_tension": 0.55}
 
 
 class Impact(NamedTuple):
-    """Liquid, Weber and Reynolds number, how many D / U it is followed for, particles a diameter."""
+    """Impact scene: liquid, Weber and Reynolds number, duration in D / U, particles per diameter."""
 
     liquid: dict
     weber: float
@@ -69,30 +71,30 @@ IMPACTS = {
     "solder, We 100, Re 1000": Impact(SOLDER, 100.0, 1000.0, 2.5, 20),
     "solder, We 300, Re 2000": Impact(SOLDER, 300.0, 2000.0, 3.5, 20),
 }
-# The fastest ones, which film and rim stop.
+# The fastest impacts, which are limited by film and rim.
 FAST = list(IMPACTS)[2:]
 CELLS, SAMPLES = 40, 100
-# Contact angles [degrees], static and as it advances; cells a diameter with the first.
+# Static and advancing contact angle [degrees]; cells per diameter with the static one.
 ANGLES, FINENESS = (90.0, 120.0), (20, 40, 60)
-# Column of PySPH's example [m]; heights of columns in particles.
+# Column of the PySPH example [m]; column heights in particles.
 WIDTH, HEIGHT, TANK = 1.0, 2.0, 4.0
 IN_HEIGHT, FOLLOWED = (40, 60), 0.47
-# Time over sqrt(a / 2 g), place of the front over the width a: Martin & Moyce's figure 3 (a = 1.125, 2.25 inches), as
+# Time over sqrt(a / 2 g), front position over the width a: Martin & Moyce's figure 3 (a = 1.125, 2.25 inches), as
 # digitised for PySPH (BSD-3), `pysph/examples/db_exp_data.py`.
 MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
 
 
 def impact() -> dict:
-    """Every impact by both, and their widths over time as a picture."""
-    found = {name: one_impact(given) for name, given in IMPACTS.items()}
-    draw(found)
-    return found
+    """Run every impact with both codes and draw their widths over time."""
+    spreads = {name: one_impact(impact_scene) for name, impact_scene in IMPACTS.items()}
+    draw(spreads)
+    return spreads
 
 
-def draw(found: dict) -> None:
-    """Draw widths over time, a panel an impact, and where the correlations of measured drops lie."""
-    figure, panels = plt.subplots(1, len(found), figsize=(3.2 * len(found), 3.2), sharey=True, layout="constrained")
-    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+def draw(spreads: dict) -> None:
+    """Plot the widths over time, one panel for each impact, with the range of measured correlations."""
+    figure, panels = plt.subplots(1, len(spreads), figsize=(3.2 * len(spreads), 3.2), sharey=True, layout="constrained")
+    for panel, (name, sides) in zip(panels, spreads.items(), strict=True):
         for side, label, line in (("delta_sph", "delta-SPH, 3D", "-"), ("interfoam", "interFoam, wedge", "--")):
             row = sides[side]
             if row is not None and "time" in row:
@@ -106,22 +108,24 @@ def draw(found: dict) -> None:
     figure.savefig(results.path_of(NAME).with_suffix(".png"), dpi=100)
 
 
-def one_impact(given: Impact) -> dict:
-    """Width over time by both, in diameters and D / U, and its largest."""
-    scene = struck(given, ANGLES[0])
+def one_impact(impact_scene: Impact) -> dict:
+    """Return the width over time [D / U] and the maximum width [D] of both codes."""
+    scene = struck(impact_scene, ANGLES[0])
     return {"delta_sph": impact_by_particles(scene), "interfoam": impact_by_interfoam(scene, CELLS)}
 
 
-def struck(given: Impact, advancing: float) -> Droplet:
-    """A drop that strikes a wall; where its contact line advances, the angle there is so many degrees."""
-    numerics = DropletNumerics(particles_per_diameter=given.across)
+def struck(impact_scene: Impact, advancing: float) -> Droplet:
+    """Return the scene of an impact with an advancing contact angle [degrees]."""
+    numerics = DropletNumerics(particles_per_diameter=impact_scene.across)
     angles = {"contact_angle": np.radians(ANGLES[0]), "advancing_angle": np.radians(advancing)}
-    scene = Droplet(weber=given.weber, reynolds=given.reynolds, **angles, **given.liquid, numerics=numerics)
-    return scene.model_copy(update={"duration": given.units * scene.unit_of_time})
+    scene = Droplet(
+        weber=impact_scene.weber, reynolds=impact_scene.reynolds, **angles, **impact_scene.liquid, numerics=numerics
+    )
+    return scene.model_copy(update={"duration": impact_scene.units * scene.unit_of_time})
 
 
 def impact_by_particles(scene: Droplet) -> dict:
-    """Width over time by this program."""
+    """Return the width over time computed by this program."""
     start = process_time()
     try:
         history = solve_droplet(scene).history
@@ -132,20 +136,20 @@ def impact_by_particles(scene: Droplet) -> dict:
 
 
 def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
-    """What is kept of a width over time."""
+    """Return the figures of a width over time."""
     widest = int(np.argmax(spread))
-    kept = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
-    return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | kept
+    figures = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
+    return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | figures
 
 
 def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
-    """The same drop by interFoam, with so many cells a diameter; None where it is not installed."""
+    """Return the width over time by interFoam with ``cells`` per diameter; None if it is not installed."""
     if shutil.which("interFoam") is None:
-        print("interFoam is not installed (Debian package openfoam): nothing to compare with")
+        print("interFoam is not installed (Debian package openfoam): skipping it")
         return None
     cell, units = scene.diameter / cells, scene.until / scene.unit_of_time
     wedge = Wedge(cell, columns=int((0.8 + 0.45 * units) * cells), rows=int(1.3 * cells))
-    given = {
+    parameters = {
         "contactAngle": np.degrees(scene.advancing),
         "onWall": "noSlip",
         "solderViscosity": scene.liquid_viscosity / scene.density,
@@ -161,17 +165,17 @@ def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
         f"fieldValues ( volScalarFieldValue alpha.solder 1 volVectorFieldValue U (0 0 {-scene.impact_speed}) ); }}"
     )
     with tempfile.TemporaryDirectory() as name:
-        log = interfoam.run(Path(name), wedge, given, start)
-        found = list(interfoam.states(Path(name), log, wedge))
-    time = np.array([state.time for state in found]) / scene.unit_of_time
-    spread = np.array([2.0 * reach(state.alpha, wedge) for state in found]) / scene.diameter
+        log = interfoam.run(Path(name), wedge, parameters, start)
+        states = list(interfoam.states(Path(name), log, wedge))
+    time = np.array([state.time for state in states]) / scene.unit_of_time
+    spread = np.array([2.0 * reach(state.alpha, wedge) for state in states]) / scene.diameter
     return {"version": interfoam.version(log), "cells": wedge.rows * wedge.columns} | row(
-        time, spread, found[-1].seconds
+        time, spread, states[-1].seconds
     )
 
 
 def reach(alpha: np.ndarray, wedge: Wedge) -> float:
-    """Largest radius [m] at which the cells of a row are half full, from one cell to the next linear."""
+    """Return the largest radius [m] of half-full cells, interpolated linearly between cells."""
     middles, largest = 0.5 * (wedge.edges[1:] + wedge.edges[:-1]), 0.0
     for fractions in alpha:
         full = np.flatnonzero(fractions >= 0.5)
@@ -184,41 +188,48 @@ def reach(alpha: np.ndarray, wedge: Wedge) -> float:
 
 
 def widths() -> dict:
-    """Largest widths of the fastest impacts: with more cells, with the angle that advances, by correlations."""
-    found = {name: widths_of(IMPACTS[name]) for name in FAST}
-    draw_widths(found)
-    return found
+    """Return the maximum widths of the fastest impacts by cells, contact angle and correlation."""
+    largest_widths = {name: widths_of(IMPACTS[name]) for name in FAST}
+    draw_widths(largest_widths)
+    return largest_widths
 
 
-def widths_of(given: Impact) -> dict:
-    """Of one impact: by both with both angles, by interFoam with fewer and more cells, by correlations."""
-    numbers, static = given[1:3], ANGLES[0]
-    found: dict = {one.__name__: one(*numbers) for one in (roisman, laan)}
+def widths_of(impact_scene: Impact) -> dict:
+    """Return the maximum widths of one impact by both codes and by correlations."""
+    numbers, static = impact_scene[1:3], ANGLES[0]
+    largest_widths: dict = {correlation.__name__: correlation(*numbers) for correlation in (roisman, laan)}
     for angle in ANGLES:
-        scene, fineness = struck(given, angle), FINENESS if angle == static else (CELLS,)
-        found[f"{angle:.0f} degrees"] = {
+        scene, fineness = struck(impact_scene, angle), FINENESS if angle == static else (CELLS,)
+        largest_widths[f"{angle:.0f} degrees"] = {
             "delta_sph": impact_by_particles(scene),
             "interfoam": {cells: impact_by_interfoam(scene, cells) for cells in fineness},
-        } | {one.__name__: one(*numbers, np.radians(angle)) for one in (pasandideh_fard, wildeman)}
-    return found
+        } | {
+            correlation.__name__: correlation(*numbers, np.radians(angle))
+            for correlation in (pasandideh_fard, wildeman)
+        }
+    return largest_widths
 
 
-def draw_widths(found: dict) -> None:
-    """Draw largest widths over the contact angle that advances, a panel an impact."""
-    figure, panels = plt.subplots(1, len(found), figsize=(4.0 * len(found), 3.4), layout="constrained")
+def draw_widths(largest_widths: dict) -> None:
+    """Plot the maximum widths over the advancing contact angle, one panel for each impact."""
+    figure, panels = plt.subplots(
+        1, len(largest_widths), figsize=(4.0 * len(largest_widths), 3.4), layout="constrained"
+    )
     degrees = np.linspace(ANGLES[0], 180.0, 46)
-    for panel, (name, sides) in zip(panels, found.items(), strict=True):
+    for panel, (name, sides) in zip(panels, largest_widths.items(), strict=True):
         numbers = IMPACTS[name][1:3]
-        for one, label in ((pasandideh_fard, "measured: Pasandideh-Fard"), (wildeman, "computed: Wildeman")):
-            panel.plot(degrees, [one(*numbers, np.radians(angle)) for angle in degrees], label=label)
-        for one, line in ((roisman, ":"), (laan, "-.")):
-            panel.axhline(one(*numbers), color="C0", linestyle=line, label=f"measured: {one.__name__.title()}")
+        for correlation, label in ((pasandideh_fard, "measured: Pasandideh-Fard"), (wildeman, "computed: Wildeman")):
+            panel.plot(degrees, [correlation(*numbers, np.radians(angle)) for angle in degrees], label=label)
+        for correlation, line in ((roisman, ":"), (laan, "-.")):
+            panel.axhline(
+                correlation(*numbers), color="C0", linestyle=line, label=f"measured: {correlation.__name__.title()}"
+            )
         for angle in ANGLES:
             row, first = sides[f"{angle:.0f} degrees"], angle == ANGLES[0]
             panel.plot(angle, row["delta_sph"]["spread_max"], "C3o", label="delta-SPH" if first else None)
             if (finest := list(row["interfoam"].values())[-1]) is not None:
                 panel.plot(angle, finest["spread_max"], "kx", label="interFoam, finest" if first else None)
-        panel.set(title=name, xlabel="contact angle that advances (degrees)")
+        panel.set(title=name, xlabel="advancing contact angle (degrees)")
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest width over D")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
@@ -226,7 +237,7 @@ def draw_widths(found: dict) -> None:
 
 
 def dam_break() -> dict:
-    """The front by both, with so many particles in the height."""
+    """Return the front of the dam break by both codes for each resolution."""
     there = install()
     return {
         str(count): {"delta_sph": dam(count)} | ({"pysph": dam_by_pysph(count)} if there else {}) for count in IN_HEIGHT
@@ -234,7 +245,7 @@ def dam_break() -> dict:
 
 
 def dam(count: int) -> dict:
-    """The column by this program."""
+    """Return the dam break by this program with ``count`` particles over the height."""
     scene = DamBreak(
         height=HEIGHT, width=WIDTH, tank_length=TANK, sensor_height=0.4, duration=FOLLOWED, density=1000.0,
         viscosity=1e-3, numerics=SphNumerics(particles_across=count),
@@ -248,7 +259,7 @@ def dam(count: int) -> dict:
 
 
 def dam_by_pysph(count: int) -> dict:
-    """The same column by PySPH, whose particles start half a spacing off the wall, too."""
+    """Return the dam break by PySPH, whose particles also start half a spacing from the wall."""
     spacing = HEIGHT / count
     with tempfile.TemporaryDirectory() as name:
         command = [str(PYTHON), str(Path(__file__).parent / "support" / "peer_pysph.py")]
@@ -256,25 +267,30 @@ def dam_by_pysph(count: int) -> dict:
             [*command, str(spacing), str(FOLLOWED), name], capture_output=True, text=True, check=True,
             env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
         )  # fmt: skip
-    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
-    place = np.array(found.pop("front"))
-    front = front_errors(np.array(found.pop("time")), place + WIDTH - place[0])
-    return found | rate(found["particles"], found["steps"], found["seconds"]) | front
+    figures = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
+    position = np.array(figures.pop("front"))
+    front = front_errors(np.array(figures.pop("time")), position + WIDTH - position[0])
+    return figures | rate(figures["particles"], figures["steps"], figures["seconds"]) | front
 
 
 def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
-    """The front's place over what was measured, less one, at each time measured."""
-    place = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
-    return {"front_error": [float(one / measured - 1.0) for one, (_, measured) in zip(place, MEASURED, strict=True)]}
+    """Return the relative error of the front position at each measured time."""
+    measured_positions = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
+    return {
+        "front_error": [
+            float(position / measured - 1.0)
+            for position, (_, measured) in zip(measured_positions, MEASURED, strict=True)
+        ]
+    }
 
 
 def rate(particles: int, steps: int, seconds: float) -> dict:
-    """Particle-steps of the liquid per second of one core."""
+    """Return the particle-steps of the liquid per second of one core."""
     return {"particle_steps_per_second": particles * steps / seconds}
 
 
 def install() -> bool:
-    """Build PySPH in its own environment; whether it is there."""
+    """Install PySPH in its own environment; return whether it is available."""
     if not PYTHON.exists():
         venv.create(PYTHON.parents[1], with_pip=True)
     command = [

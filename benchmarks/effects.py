@@ -1,6 +1,6 @@
-"""What effects cost: a step with each on against one with it off, in turns; the ratios are what plans tell as shares.
+"""Cost of each effect: time of a step with the effect over the time without it, measured in turns.
 
-Writes benchmarks/results/effects.json, and the table of the registry, workflow/effects/costs.json.
+The results feed the cost shares of plans. Writes benchmarks/results/effects.json and workflow/effects/costs.json.
 """
 
 import json
@@ -38,7 +38,7 @@ BOARD = dns_body(
 )
 
 LIQUID = [effect.name for effect in LIQUID_EFFECTS if effect.is_measured]
-# Effect -> how the measurement is described, the name of the side with it, that of the side without.
+# Effect -> description of the measurement, side with the effect, side without it.
 PAIRS = {
     name: (f"a step of {PER_EDGE**3} particles", f"reflow_{name}", f"reflow_without_{name}") for name in LIQUID
 } | {
@@ -52,13 +52,13 @@ PAIRS = {
 
 
 def reflow(**changes: bool) -> Callable[[], object]:
-    """Return a step of a cube of solder on a wall, which goes on flowing."""
+    """Return the step function of a cube of solder that keeps flowing on a wall."""
     cloud = box_cloud(DROP.volume ** (1.0 / 3.0), PER_EDGE)
     return start_flow(cloud, DROP, RESTING | changes, (contact_line(cloud, 0, np.inf, DROP),)).step
 
 
 def drop(*loads: Load) -> Callable[[], object]:
-    """Return an explicit step of a board under loads."""
+    """Return the explicit step function of a board under loads."""
     body, critical = BOARD
     motion = motion_of(body, 0.5 * critical, loads)
 
@@ -70,7 +70,7 @@ def drop(*loads: Load) -> Callable[[], object]:
 
 
 def force(material: Material, kinematics: Kinematics = "small", stretch: float = 0.0) -> Callable[[], object]:
-    """Return the force of a step of elements, stretched more and more."""
+    """Return the force evaluation of a step of elements under increasing stretch."""
     body, _ = BOARD
     terms = force_terms(body.elements, [material], kinematics, 1e-8)
     points, result = body.local.points, np.zeros_like(body.local.points)
@@ -87,7 +87,7 @@ def force(material: Material, kinematics: Kinematics = "small", stretch: float =
 
 
 def sides() -> dict[str, Callable[[], object]]:
-    """Return the work of each side."""
+    """Return the step function of each side."""
     body = BOARD[0]
     reflows = {PAIRS[name][2 - acts]: reflow(**{name: acts}) for name in LIQUID for acts in (True, False)}
     return reflows | {
@@ -104,7 +104,7 @@ def sides() -> dict[str, Callable[[], object]]:
 
 
 def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
-    """Return effect -> processor seconds with it over those without, the median over rounds."""
+    """Return effect -> processor seconds with it over those without it, the median over rounds."""
     return {
         name: {"ratio": float(np.median(seconds[acting] / seconds[left_out])), "of": what}
         for name, (what, acting, left_out) in PAIRS.items()
@@ -113,10 +113,10 @@ def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
 
 def main() -> None:
     seconds = turns.in_turns({name: turns.batch(work) for name, work in sides().items()})
-    found = ratios(seconds)
-    MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": found}, indent=1) + "\n")
+    cost_ratios = ratios(seconds)
+    MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": cost_ratios}, indent=1) + "\n")
     medians = {name: float(np.median(s)) for name, s in seconds.items()}
-    results.write_and_print("effects", {"effects": found, "seconds": medians})
+    results.write_and_print("effects", {"effects": cost_ratios, "seconds": medians})
 
 
 if __name__ == "__main__":

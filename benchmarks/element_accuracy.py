@@ -1,12 +1,12 @@
-"""Work-precision of the elements: error against cost for kind, size and solver, on a cantilever and a plate.
+"""Work-precision of the elements: error against cost by kind, size and solver, for a cantilever and a plate.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py --quick     (some seconds; coarse meshes)
      PYTHONPATH=. .venv/bin/python benchmarks/element_accuracy.py             (some minutes)
-Seconds are those of one core, to follow one period of the first mode: explicit steps of 0.9 of the smallest element
-critical step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period,
-whose error in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose
-plate is compared with Mindlin's. The linear one-point hexahedron has the stiffness of the incompatible-modes one
-(`fem/elements/one_point.py`), so one row stands for both; what it saves in finite strains is in the second table.
+Costs are seconds of one core for one period of the first mode: explicit steps of 0.9 of the smallest critical element
+step at the measured speed of a whole step; implicit steps (trapezoidal rule) of a fortieth of the period, whose error
+in the period is 0.2 %, with the measured factorisation. Errors are relative to the finest hexahedra, whose plate is
+compared with Mindlin's solution. The linear one-point hexahedron has the stiffness of the incompatible-modes one
+(``fem/elements/one_point.py``), so that one row represents both; its saving at finite strain is in the second table.
 """
 
 import argparse
@@ -46,7 +46,7 @@ NAMES = {
 }
 STEP_FRACTION, STEPS_PER_PERIOD = 0.9, 40
 KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
-SECONDS = 0.2  # that a speed is measured for
+SECONDS = 0.2  # duration of a speed measurement [s]
 YOUNG, DENSITY = 24e9, 1900.0
 STRIP = np.array([0.1, 0.004])  # [m] length and thickness of the cantilever
 SIDE, THICKNESS = 0.1, 0.002  # [m] of the square plate
@@ -54,7 +54,7 @@ SIDE, THICKNESS = 0.1, 0.002  # [m] of the square plate
 
 @dataclass(frozen=True, slots=True)
 class Refinement:
-    """Sizes of one problem, cells along and across; errors are against the finest hexahedra."""
+    """Mesh sizes of one problem in cells along and across, with the finest hexahedra as reference."""
 
     problem: str
     poisson: float
@@ -74,7 +74,7 @@ FULL = (
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A problem on one mesh: name, Poisson ratio, cells along and across, kind of element."""
+    """Problem on one mesh: name, Poisson ratio, cells along and across, kind of element."""
 
     name: str
     poisson: float
@@ -82,7 +82,7 @@ class Problem:
     kind: str
 
     def body(self, kinematics: Kinematics = "small") -> Body:
-        """The body with its supports; the plate is a quarter of it, the cantilever a strip of plane strain."""
+        """Return the body with its supports: a quarter of the plate, or a plane-strain strip of the cantilever."""
         along, across = self.cells
         if self.name == "plate":
             side = np.linspace(0, SIDE / 2, along + 1)
@@ -114,7 +114,7 @@ class Problem:
 
 
 def deflection(body: Body, equations: Equations) -> float:
-    """Largest deflection under a uniform pressure of 1 Pa on the top."""
+    """Return the largest deflection [m] under a uniform pressure of 1 Pa on the top."""
     local = body.local
     facets = boundary_facets(local.cells)[:, CYCLIC if local.cells.shape[1] == 8 else slice(None)]
     top = facets[np.all(local.points[facets][:, :, 2] > local.points[:, 2].max() - 1e-9, axis=1)]
@@ -128,14 +128,14 @@ def deflection(body: Body, equations: Equations) -> float:
 
 
 def answers(body: Body) -> dict:
-    """Deflection [m] and first frequency [Hz]."""
+    """Return the deflection [m] and the first natural frequency [Hz]."""
     equations = Equations.of(MPI.COMM_SELF, body)
     frequency = float(natural_modes(equations, 1).frequency[0])
     return {"deflection": deflection(body, equations), "frequency": frequency}
 
 
 def seconds_a_step(motion: ExplicitMotion | ImplicitMotion) -> float:
-    """Processor seconds of a whole step, force included; best of three batches."""
+    """Return the processor seconds of a whole step, force included; best of three batches."""
 
     def batch(steps: int) -> float:
         begin = process_time()
@@ -149,23 +149,23 @@ def seconds_a_step(motion: ExplicitMotion | ImplicitMotion) -> float:
 
 
 def explicit_motion(body: Body, step: float) -> ExplicitMotion:
-    """The motion of a body by explicit steps [s]."""
+    """Return the motion of a body with explicit steps [s]."""
     return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
 def speeds(cells: tuple[int, int]) -> dict:
-    """Element updates per second of whole steps with small and with finite strains, for every kind of element."""
-    found = {}
+    """Return element updates per second of whole steps at small and finite strain for every kind of element."""
+    updates = {}
     for kind in KINDS:
         bodies = {name: Problem("plate", 0.3, cells, kind).body(name) for name in KINEMATICS}
-        found[kind] = {
+        updates[kind] = {
             name: len(body.local.cells) / seconds_a_step(explicit_motion(body, 1e-9)) for name, body in bodies.items()
         }
-    return found
+    return updates
 
 
 def costs(body: Body, period: float) -> dict:
-    """What one period [s] costs either solver."""
+    """Return the cost of one period [s] with either solver."""
     count = len(body.local.cells)
     critical = float(critical_steps(body.elements, body.geometry.nodal_volume).min())
     steps = int(np.ceil(period / (STEP_FRACTION * critical)))
@@ -186,7 +186,7 @@ def costs(body: Body, period: float) -> dict:
 
 
 def mindlin_frequency(poisson: float) -> float:
-    """First frequency [Hz] of the simply supported square plate, shear factor 5/6 (Mindlin 1951)."""
+    """Return the first frequency [Hz] of the simply supported square plate, shear factor 5/6 (Mindlin 1951)."""
     wave = 2 * (np.pi / SIDE) ** 2
     shear = 5 / 6 * YOUNG / (2 * (1 + poisson)) * THICKNESS
     rigidity = YOUNG * THICKNESS**3 / (12 * (1 - poisson**2))
@@ -197,7 +197,7 @@ def mindlin_frequency(poisson: float) -> float:
 
 
 def measure(refinement: Refinement) -> Iterator[dict]:
-    """Rows of one refinement: every kind at every size, against the finest hexahedra."""
+    """Yield the rows of one refinement: every kind at every size against the finest hexahedra."""
     exact = answers(Problem(refinement.problem, refinement.poisson, refinement.finest, "incompatible_modes").body())
     for kind in NAMES:
         for cells in refinement.cells:
@@ -213,15 +213,15 @@ def measure(refinement: Refinement) -> Iterator[dict]:
 
 
 def reference_check(refinements: tuple[Refinement, ...]) -> dict:
-    """How far the finest plate is from Mindlin's frequency."""
+    """Return the relative difference between the finest plate and Mindlin's frequency."""
     plate = next(refinement for refinement in refinements if refinement.problem == "plate")
-    found = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
-    return {"finest_plate_over_mindlin": found / mindlin_frequency(plate.poisson) - 1.0}
+    frequency = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
+    return {"finest_plate_over_mindlin": frequency / mindlin_frequency(plate.poisson) - 1.0}
 
 
 def run_all(refinements: tuple[Refinement, ...]) -> dict:
-    """Measure the refinements; what is measured is on disk after each row."""
-    next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles what all rows use
+    """Run the refinements and store the results after each row."""
+    next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles the kernels of all rows
     speed = speeds(refinements[-1].cells[-1])
     result = {"rows": [], "speeds": speed, **reference_check(refinements)}
     for refinement in refinements:
@@ -233,7 +233,7 @@ def run_all(refinements: tuple[Refinement, ...]) -> dict:
 
 
 def cells_of(row: dict) -> list[str]:
-    """One row of the table as text."""
+    """Format the cells of a row."""
     return [
         f"{row['problem']}, nu {row['poisson_ratio']:g}",
         f"{row['elements']} {NAMES[row['kind']]}, {row['cells'][0]} x {row['cells'][1]}",
@@ -248,12 +248,12 @@ def cells_of(row: dict) -> list[str]:
 
 
 def seconds(value: float) -> str:
-    """Two digits without a power of ten."""
+    """Format seconds with two digits and without exponent."""
     return f"{value:.0f} s" if value >= 10 else f"{value:.2g} s"
 
 
 def main() -> None:
-    """Measure the coarse or all meshes."""
+    """Run the coarse or all meshes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="coarse meshes only")
     run_all(QUICK if parser.parse_args().quick else FULL)

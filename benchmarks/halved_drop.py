@@ -1,10 +1,11 @@
-"""A drop in which solder flows: what its critical joint bears on meshes with elements twice, once and half as long.
+"""Mesh convergence of a drop with plastic solder: measures of the critical joint on three meshes.
 
     PYTHONPATH=. python benchmarks/halved_drop.py [SIZE ...]  (half an hour on one core; halved_drop.json)
 
-A quarter of the 4 x 4 package of ``cases/jedec_bga`` on a board of 50 x 30 mm, held near its corners, under a half sine
-that is short and strong enough to bend it, and its corner joint beyond yield, in 0.15 ms. The corner joint is fine, in
-columns of board and substrate; the others are coarse. Elements of all follow their size as in the command ``accuracy``.
+A quarter of the 4 x 4 package of ``cases/jedec_bga`` on a board of 50 x 30 mm, held near its corners. The half sine of
+0.15 ms bends the board and drives the corner joint beyond yield. The corner joint is fine, with matching columns of
+board and substrate; the others are coarse. The element sizes scale as in the command ``accuracy``: twice, once and half
+as long.
 """
 
 import argparse
@@ -45,14 +46,14 @@ Measures = dict[str, float]
 
 
 def scene_at(size: float, folder: Path) -> DropScene:
-    """Mesh the scene with elements so many times as long."""
+    """Mesh the scene with element sizes multiplied by ``size``."""
     run = board_drop_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].run_at(size)
     sized = (f"{key}={value}" for key, value in run.settings.items() if key.startswith(("board.", "package.")))
     return DropScene.write(folder, (*SCENE, *sized), NAME)
 
 
 def measured(size: float) -> dict:
-    """Run the drop on a mesh; return the peaks of the fine joint's measures, <measure>@<end>."""
+    """Run the drop on a mesh; return the peaks of the fine joint's measures as ``<measure>@<end>``."""
     with tempfile.TemporaryDirectory() as folder:
         scene, coupling = scene_at(size, Path(folder)), {"fine_joints": [JOINT]}
         first, *others = (scene.request("two_scale", coupling, SHOCK | {"joint_layer": layer}) for layer in LAYERS)
@@ -66,9 +67,9 @@ def measured(size: float) -> dict:
         for name, parts in RESULTANTS.items():
             values[f"{name}@{end}"] = float(np.linalg.norm(section[:, parts], axis=1).max())
         for layer, history in zip(LAYERS, (run.history, *run.others), strict=True):
-            found = history.arrays()
+            averages = history.arrays()
             for name in AVERAGES:
-                values[f"{name}:{1e6 * layer:g}um@{end}"] = float(found[f"{name}_{end}"][:, joint].max())
+                values[f"{name}:{1e6 * layer:g}um@{end}"] = float(averages[f"{name}_{end}"][:, joint].max())
     return {
         "seconds": seconds,
         "elements": run.elements,
@@ -79,7 +80,7 @@ def measured(size: float) -> dict:
 
 
 def changes(coarse: Measures, fine: Measures) -> Measures:
-    """Return relative differences of a mesh to a finer one; of resultants over the section force (times radius)."""
+    """Return the relative differences between two meshes; resultants over the section force (times radius)."""
     scale = {}
     for end in ENDS:
         force = hypot(fine[f"axial_force@{end}"], fine[f"shear_force@{end}"])
@@ -91,19 +92,21 @@ def changes(coarse: Measures, fine: Measures) -> Measures:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sizes", nargs="*", type=float, help=f"of elements; without, {SIZES}")
+    parser.add_argument("sizes", nargs="*", type=float, help=f"element size factors, default {SIZES}")
     chosen = parser.parse_args().sizes or SIZES
-    found = results.read_figures(RESULTS) or {"meshes": {}}
+    figures = results.read_figures(RESULTS) or {"meshes": {}}
     for size in chosen:
-        found["meshes"][f"{size:g}"] = measured(size)
-        print(f"{size:g}", json.dumps(found["meshes"][f"{size:g}"]), flush=True)
-        sizes = sorted(map(float, found["meshes"]), reverse=True)
-        values = [found["meshes"][f"{size:g}"]["values"] for size in sizes]
-        found["changes"] = {f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)}
+        figures["meshes"][f"{size:g}"] = measured(size)
+        print(f"{size:g}", json.dumps(figures["meshes"][f"{size:g}"]), flush=True)
+        sizes = sorted(map(float, figures["meshes"]), reverse=True)
+        values = [figures["meshes"][f"{size:g}"]["values"] for size in sizes]
+        figures["changes"] = {
+            f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)
+        }
         limits = {key: richardson(sizes[-3:], [value[key] for value in values[-3:]], None) for key in values[0]}
-        found["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
-        results.write_figures(RESULTS, found)
-    print(json.dumps({key: found[key] for key in ("changes", "orders")}, indent=1))
+        figures["orders"] = {key: limit[1] for key, limit in limits.items() if limit}
+        results.write_figures(RESULTS, figures)
+    print(json.dumps({key: figures[key] for key in ("changes", "orders")}, indent=1))
 
 
 if __name__ == "__main__":

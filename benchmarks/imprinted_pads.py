@@ -1,12 +1,12 @@
-"""One joint between patches of board and substrate by the program's own meshes: does what it bears converge?
+"""Convergence of one joint between patches of board and substrate on the program's own meshes.
 
     PYTHONPATH=. python benchmarks/imprinted_pads.py [TABLE ...]  (one core; writes results/imprinted_pads.json)
 
-The scene of ``tests/support/imprinted_patch.py`` in static equilibrium, elastic or with solder that yields (deformation
-plasticity, which is what J2 gives under a load in proportion), by the program's own elements, meshes and ties. Tables:
-``meshes``  tied to boxes that ignore the pads; in columns; in columns, boxes shifted by half an element; free-form
-``halved``  every element of the imprinted mesh 1, 2/3 and 1/2 times as long, elastic and yielding
-``turned``  the motion turned against the mesh
+The scene of ``tests/support/imprinted_patch.py`` in static equilibrium, elastic or with plastic solder (deformation
+plasticity, equal to J2 flow under proportional load), with the program's own elements, meshes and ties. Tables:
+``meshes``  ties to boxes that ignore the pads; columns; columns with boxes shifted by half an element; free-form
+``halved``  element sizes of 1, 2/3 and 1/2 of the imprinted mesh, elastic and yielding
+``turned``  the motion rotated against the mesh
 """
 
 import os
@@ -30,21 +30,21 @@ Measures = dict[str, float]
 
 
 def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
-    """Return the measures of both ends, ``<measure>@<end>``."""
+    """Return the measures of both ends as ``<measure>@<end>``."""
     whole, _ = patch(mesh)
-    if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # then y = 0 is a line of it
+    if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # y = 0 is a line of the mesh
         whole = half_of(whole)
     problem = Problem(whole, yields, turned=angle)
-    found = ends(problem, problem.solve(), LAYERS)
-    return {f"{name}@{end}": value for end, values in found for name, value in values.items()}
+    measures = ends(problem, problem.solve(), LAYERS)
+    return {f"{name}@{end}": value for end, values in measures for name, value in values.items()}
 
 
 def described(mesh: Mesh) -> dict:
-    """Return what a mesh is like."""
+    """Return sizes, quality and critical steps of a mesh."""
     whole, joint = patch(mesh)
-    own, elements = whole.mesh, Problem(whole, False).elements
-    steps = critical_steps(elements, element_geometry(own.points, own.cells).nodal_volume)
-    parts = {name: own.part == number for number, name in enumerate(own.part_names)}
+    data, elements = whole.mesh, Problem(whole, False).elements
+    steps = critical_steps(elements, element_geometry(data.points, data.cells).nodal_volume)
+    parts = {name: data.part == number for number, name in enumerate(data.part_names)}
     return {
         "elements": {name: int(cells.sum()) for name, cells in parts.items()},
         "scaled_jacobian": min(float(scaled_jacobian(joint.points, cells).min()) for cells in joint.cells.values()),
@@ -55,7 +55,7 @@ def described(mesh: Mesh) -> dict:
 
 
 def meshes() -> dict:
-    """Return what each mesh is like, and its measures."""
+    """Return the properties and measures of each mesh."""
     return {
         name: described(mesh) | {"elastic": solved(mesh, False), "yielding": solved(mesh, True)}
         for name, mesh in MESHES.items()
@@ -63,9 +63,9 @@ def meshes() -> dict:
 
 
 def halved() -> dict:
-    """Return measures of three meshes, how far each is from the next, and what they tend to.
+    """Return the measures on three meshes, their differences and their Richardson limits.
 
-    Moments are told over the section force times the pad's radius.
+    Moments are relative to the section force times the pad radius.
     """
     result = {}
     for name, yields in (("elastic", False), ("yielding", True)):
@@ -74,20 +74,26 @@ def halved() -> dict:
         limits = {key: richardson(SIZES, [row[key] for row in values], None) for key in values[0]}
         result[name] = rows | {
             "changes": [_changes(coarse, fine) for coarse, fine in ((values[0], values[1]), (values[0], values[2]))],
-            "limits": {key: {"value": found[0], "order": found[1]} for key, found in limits.items() if found},
+            "limits": {key: {"value": limit[0], "order": limit[1]} for key, limit in limits.items() if limit},
         }
-        for told in result[name]["changes"]:
-            print(f"{name:9} " + "  ".join(f"{key} {told[key]:+.1%}" for key in told if key.split("@")[0] in PRINTED))
+        for differences in result[name]["changes"]:
+            print(
+                f"{name:9} "
+                + "  ".join(f"{key} {differences[key]:+.1%}" for key in differences if key.split("@")[0] in PRINTED)
+            )
     return result
 
 
 def turned() -> dict:
-    """Return measures under motions at angles, and how far they are from those along x."""
+    """Return the measures under rotated motions and their differences to the motion along x."""
     rows = {f"{angle:g}": solved(IMPRINTED, False, radians(angle)) for angle in ANGLES}
     first = next(iter(rows.values()))
     changes = {angle: _changes(row, first) for angle, row in rows.items()}
-    for angle, told in changes.items():
-        print(f"{angle:>3} deg " + "  ".join(f"{key} {told[key]:+.2%}" for key in told if key.split("@")[0] in PRINTED))
+    for angle, differences in changes.items():
+        print(
+            f"{angle:>3} deg "
+            + "  ".join(f"{key} {differences[key]:+.2%}" for key in differences if key.split("@")[0] in PRINTED)
+        )
     return {"values": rows, "changes": changes}
 
 
@@ -98,7 +104,7 @@ def _timed(size: float, yields: bool) -> dict:
 
 
 def _changes(coarse: Measures, fine: Measures) -> Measures:
-    """Return relative differences of a coarse to a fine mesh; of moments over force times radius."""
+    """Return the relative differences between a coarse and a fine mesh; moments over force times radius."""
     radius = 0.5 * PADS["diameter"]
     scale = {end: hypot(fine[f"axial_force@{end}"], fine[f"shear_force@{end}"]) for end in ("board", "package")}
     over = fine | {f"bending_moment@{end}": radius * force for end, force in scale.items()}

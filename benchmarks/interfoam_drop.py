@@ -1,12 +1,12 @@
-"""The same sessile drop by OpenFOAM's interFoam (volume of fluid) and by this program: time to rest and errors.
+"""Sessile drop by OpenFOAM's interFoam (volume of fluid) and by this program: time to rest and errors.
 
-Run: PYTHONPATH=. .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes results/interfoam_drop.json)
-Without interFoam (Debian package openfoam) it says so and measures nothing. 1 mm^3, 60 degrees, slip wall, no gravity,
-the values that Hu et al. print. interFoam starts from a cylinder as high as the cube and solves a wedge of a body of
-revolution: one layer of cells against particles in three dimensions, which is to its advantage; its lengths are
-compared at the volume that its cells hold. It does not stop swinging: its lengths are means over the last third of the
-run, and it is at rest from when on both stay within 2 % of them. Where it is never, the ratio is a lower bound.
-Seconds are those of the processor, one core each.
+Run: PYTHONPATH=. .venv/bin/python benchmarks/interfoam_drop.py   (four minutes; writes results/interfoam_drop.json) The
+benchmark is skipped without interFoam (Debian package openfoam). The drop has 1 mm^3, a contact angle of 60 degrees, a
+slip wall, no gravity, and the parameters of Hu et al. interFoam starts from a cylinder of the height of the cube and
+solves an axisymmetric wedge; one layer of cells against three-dimensional particles is in its favour. Its lengths are
+scaled to the exact volume and averaged over the last third of the run, since it keeps swinging; it counts as at rest
+once both lengths stay within 2 % of these means. If it never is, the ratio is a lower bound. Times are processor
+seconds of one core.
 """
 
 import json
@@ -41,7 +41,7 @@ PER_EDGE = 11
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The drop at one time: time and run time [s], height and width [m], volume [m^3], capillary number."""
+    """State of the drop at one time: time and run time [s], height and width [m], volume [m^3], capillary number."""
 
     time: float
     seconds: float
@@ -52,7 +52,7 @@ class Sample:
 
 
 def parameters(solder: Solder) -> dict[str, float | str]:
-    """What the OpenFOAM case includes."""
+    """Return the parameters that the OpenFOAM case includes."""
     return {
         "contactAngle": ANGLE,
         "onWall": "slip",
@@ -67,44 +67,44 @@ def parameters(solder: Solder) -> dict[str, float | str]:
 
 
 def samples(states: Iterable[State], solder: Solder) -> list[Sample]:
-    """The drop at each time that was written."""
-    found = []
+    """Return the drop at each written time."""
+    drop_samples = []
     for state in states:
         fastest = float(state.speed[state.alpha > 0.9].max())
         number = solder.viscosity * fastest / solder.surface_tension
-        found.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
-    return found
+        drop_samples.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
+    return drop_samples
 
 
 def extent(alpha: np.ndarray) -> tuple[float, float, float]:
-    """Height along the axis and width at the wall [m] from the volume fractions `(rows, columns)`; volume [m^3].
+    """Return height [m], width at the wall [m] and volume [m^3] from volume fractions, shape (rows, columns).
 
-    At the wall the radii of the two lowest rows are extrapolated.
+    The width at the wall is extrapolated from the radii of the two lowest rows.
     """
     radius = WEDGE.radii(alpha)
     volume = np.pi * WEDGE.cell * float((radius**2).sum())
     return WEDGE.cell * float(alpha[:, 0].sum()), 2.0 * float(1.5 * radius[0] - 0.5 * radius[1]), volume
 
 
-def settled(found: list[Sample]) -> tuple[Sample | None, list[Sample]]:
-    """The first sample from which on height and width stay near their means over the last third, and that third."""
-    third = found[-len(found) // 3 :]
+def settled(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
+    """Return the last third of the samples, and the first sample after which lengths stay near its means."""
+    third = drop_samples[-len(drop_samples) // 3 :]
     means = {name: np.mean([getattr(sample, name) for sample in third]) for name in ("height", "width")}
     moving = [
         number
-        for number, sample in enumerate(found)
+        for number, sample in enumerate(drop_samples)
         if any(abs(getattr(sample, name) / mean - 1.0) > STILL for name, mean in means.items())
     ]
     first = moving[-1] + 1 if moving else 0
-    return (found[first] if first < len(found) - len(third) else None), third
+    return (drop_samples[first] if first < len(drop_samples) - len(third) else None), third
 
 
 def by_interfoam(solder: Solder, exact: Meridian) -> dict:
-    """Time to rest and errors of interFoam."""
+    """Return time to rest and errors of interFoam."""
     with tempfile.TemporaryDirectory() as name:
         log = interfoam.run(Path(name), WEDGE, parameters(solder), START)
-        found = samples(interfoam.states(Path(name), log, WEDGE), solder)
-    rest, third = settled(found)
+        drop_samples = samples(interfoam.states(Path(name), log, WEDGE), solder)
+    rest, third = settled(drop_samples)
     volume, height, width, number = np.mean(
         [(sample.volume, sample.height, sample.width, sample.capillary_number) for sample in third], axis=0
     )
@@ -112,7 +112,7 @@ def by_interfoam(solder: Solder, exact: Meridian) -> dict:
     return {
         "version": interfoam.version(log),
         "cells": WEDGE.rows * WEDGE.columns,
-        "seconds": found[-1].seconds,
+        "seconds": drop_samples[-1].seconds,
         "physical_time_to_rest": rest and rest.time,
         "seconds_to_rest": rest and rest.seconds,
         "height_swing": float(np.ptp([sample.height for sample in third]) / height / 2.0),
@@ -121,7 +121,7 @@ def by_interfoam(solder: Solder, exact: Meridian) -> dict:
 
 
 def by_particles(exact: Meridian) -> dict:
-    """Time to rest and errors of this program, which leaves inertia out where only the rest is asked for."""
+    """Return time to rest and errors of this program, computed without inertia."""
     solder = molten(SolderNumerics(time_step_limit=100.0))
     coarse, drop = (
         Drop(volume=VOLUME, contact_angle=solder.pad_contact_angle, particles_per_edge=count) for count in (5, PER_EDGE)
@@ -139,7 +139,7 @@ def by_particles(exact: Meridian) -> dict:
 
 
 def errors(height: float, width: float, exact: Meridian, capillary_number: float) -> dict:
-    """Signed relative errors, and the capillary number that is left."""
+    """Return signed relative errors and the remaining capillary number."""
     return {
         "height_error": height / exact.height - 1.0,
         "width_error": width / exact.max_width - 1.0,
@@ -148,7 +148,7 @@ def errors(height: float, width: float, exact: Meridian, capillary_number: float
 
 
 def molten(numerics: SolderNumerics | None = None) -> Solder:
-    """The solder that both solve."""
+    """Return the solder of both codes."""
     return Solder(
         volume=VOLUME,
         pad_contact_angle=np.radians(ANGLE),
@@ -159,22 +159,22 @@ def molten(numerics: SolderNumerics | None = None) -> Solder:
 
 
 def main() -> None:
-    """Measure both, one after the other, and write the ratio."""
+    """Run both codes and store the ratio of their times."""
     if shutil.which("interFoam") is None:
-        print("interFoam is not installed (Debian package openfoam): nothing to compare with")
+        print("interFoam is not installed (Debian package openfoam): skipping the benchmark")
         return
     solder = molten()
     exact = sessile_meridian(VOLUME, solder.pad_contact_angle, solder.surface_tension)
     foam, particles = by_interfoam(solder, exact), by_particles(exact)
     spent = foam["seconds_to_rest"] or foam["seconds"]
-    found = {
+    figures = {
         "interfoam": foam,
         "particles": particles,
         "interfoam_came_to_rest": foam["seconds_to_rest"] is not None,
         "interfoam_over_particles": spent / particles["seconds_to_rest"],
     }
-    results.write_figures(NAME, found)
-    print(json.dumps(found, indent=1))
+    results.write_figures(NAME, figures)
+    print(json.dumps(figures, indent=1))
 
 
 if __name__ == "__main__":

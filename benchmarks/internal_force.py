@@ -1,18 +1,17 @@
-"""Element updates per second of the internal force: this program's paths, PETSc and dolfinx in one run; memory.
+"""Element updates per second of the internal force by this program, PETSc and DOLFINx, and memory per element.
 
     PYTHONPATH=. python benchmarks/internal_force.py  (a minute, one core; writes results/internal_force.json)
 
-All act on a cube of 40^3 hexahedra, sides in turns, medians of processor seconds. dolfinx assembles the plain trilinear
-form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler; ours have incompatible modes,
-which do not lock in bending: equal work for a user, not equal numbers.
-- ``congruent`` knows that the elements are boxes of one shape; ``turning`` are the same in corotational kinematics,
-  ``turning_any`` elements of any shape.
-- ``assembled`` and ``petsc_baij`` multiply by the matrix of a cube whose inner nodes were moved by up to 20 % of an
+All run on a cube of 40^3 hexahedra, in turns; figures are medians of processor seconds. DOLFINx assembles the trilinear
+form of linear elasticity with 2 x 2 x 2 Gauss points and the best flags of its compiler. Our elements have incompatible
+modes and do not lock in bending, so that the comparison is equal work for a user, not equal numbers.
+- ``congruent``: boxes of one shape; ``turning``: the same in corotational kinematics; ``turning_any``: elements of any
+  shape.
+- ``assembled`` and ``petsc_baij``: product with the matrix of a cube whose inner nodes are moved by up to 20 % of an
   edge.
-- ``yielding`` returns to the yield surface of a rate-dependent solder at nearly every point in every call, at a strain
-  rate of 100 1/s; ``below_yield`` has the same law at small strains. All Gauss points or one, on boxes; small or finite
-  rotations and strains.
-- Tetrahedra are a sixth of each distorted hexahedron; their rates are of tetrahedra.
+- ``yielding``: return mapping of a rate-dependent solder at nearly every point of every call, at a strain rate of
+  100 1/s; ``below_yield``: the same law at small strains. All Gauss points or one, on boxes, at small or finite strain.
+- Tetrahedra: each distorted hexahedron is cut into six; rates count tetrahedra.
 """
 
 import ctypes
@@ -54,14 +53,14 @@ def only_term(elements: Elements) -> ForceTerm:
 
 
 def linear(elements: Elements) -> Callable[[], object]:
-    """Return a call of the force of linear elements."""
+    """Return the force evaluation of linear elements."""
     term, displacement = only_term(elements), random_displacement(elements.points)
     force = np.zeros_like(displacement)
     return lambda: term.add(displacement, force)
 
 
 def turning(elements: Elements) -> Callable[[], object]:
-    """Return a call of the force of elastic hexahedra that are strained by 1e-3 and turned by 0.1."""
+    """Return the force evaluation of elastic hexahedra with a strain of 1e-3 and a rotation of 0.1."""
     (term,) = force_terms(elements, [STEEL], "corotational")
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]])
     moved = elements.points + random_displacement(elements.points, 1e-3)
@@ -70,7 +69,7 @@ def turning(elements: Elements) -> Callable[[], object]:
 
 
 def plastic(elements: Elements, kinematics: Kinematics, strain: float) -> Callable[[], object]:
-    """Return a call of the force of elements of solder, in which the strain goes on from the given one."""
+    """Return the force evaluation of solder elements under increasing strain."""
     (term,) = force_terms(elements, [SOLDER], kinematics, STEP)
     state, growth = (random_displacement(elements.points, part) for part in (strain, STEP * RATE))
     force = np.zeros_like(state)
@@ -112,7 +111,7 @@ def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
 
 
 def resident() -> int:
-    """Return the resident bytes of this process after all that is free has gone back to the system."""
+    """Return the resident bytes of this process after returning free memory to the system."""
     gc.collect()
     ctypes.CDLL("libc.so.6").malloc_trim(0)
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
@@ -123,7 +122,7 @@ def array_bytes(term: ForceTerm) -> int:
 
 
 def memory(elements: Elements) -> dict[str, float]:
-    """Return the bytes an element that a term holds: counted over its arrays, and as the growth of the process."""
+    """Return the bytes per element of a force term, counted over its arrays and as growth of the process."""
     warm = elements.subset(np.arange(64))
     only_term(warm)
     before = resident()
@@ -133,7 +132,7 @@ def memory(elements: Elements) -> dict[str, float]:
 
 
 def model_bytes(mesh: MeshData) -> float:
-    """Return the bytes an element of a whole model, nodal vectors and the mesh of DOLFINx included."""
+    """Return the bytes per element of a whole model, including nodal vectors and the DOLFINx mesh."""
     before = resident()
     model = motion_of(dns_body(mesh, STEEL)[0], STEP)
     grown = resident() - before
@@ -141,7 +140,7 @@ def model_bytes(mesh: MeshData) -> float:
 
 
 def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
-    """Return the works and how many elements each updates."""
+    """Return the force evaluations and their numbers of elements."""
     boxes, mesh = cube(), cube(distorted=True)
     linear_elements = {
         "congruent": elements_of(boxes),

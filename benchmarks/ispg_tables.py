@@ -1,13 +1,12 @@
-"""Tables of particles/ispg/README.md: what the scheme ispg finds in every kind of scene, and what it costs.
+"""Errors and costs of ISPG in every kind of scene.
 
     PYTHONPATH=. OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 .venv/bin/python benchmarks/ispg_tables.py drops joints
     ... benchmarks/ispg_tables.py --list                       (tables and their rows)
-    ... benchmarks/ispg_tables.py drops --only "7," --again    (rows whose name begins so; as if they were not stored)
+    ... benchmarks/ispg_tables.py drops --only "7," --again    (recompute the rows whose names begin with "7,")
 
-A row is a case of this repository with some settings, as `reflowshock run CASE --set ...` takes them, computed without
-products. Each is stored in results/ispg_tables.json as soon as it is there and is not computed again: after a change
-of the scheme give --again, or remove the file. All rows take an hour and a half of one core. Seconds are those of the
-processor, without loading.
+A row is a case of this repository with settings as in ``reflowshock run CASE --set ...``, computed without products.
+Each row is stored in results/ispg_tables.json when it is complete and is not computed again unless ``--again`` is
+given. All rows take an hour and a half of one core. Times are processor seconds without loading.
 """
 
 import argparse
@@ -34,7 +33,7 @@ Molten = DropCase | JointCase | DropsCase | OscillationCase
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A case with its settings, which are those of the option --set."""
+    """Case with settings as in the option ``--set``."""
 
     name: str
     case: str
@@ -51,19 +50,19 @@ HEAVY = 4.985 / (8930.0 * 1e-6)
 
 
 def drop(count: int, degrees: float, *settings: str, name: str = "") -> Row:
-    """Example 4.1 at another angle and resolution."""
-    given = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
-    return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *given))
+    """Return example 4.1 at another contact angle and resolution."""
+    drop_settings = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
+    return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *drop_settings))
 
 
 def heavy(count: int, degrees: float, bond: float, *settings: str) -> Row:
-    """The same under its weight."""
+    """Return the same drop under its weight."""
     weight = ("gravity=on", f"solder.gravity={bond * HEAVY:.6g} m/s^2")
     return drop(count, degrees, *weight, *settings, name=f"Bond number {bond:g}")
 
 
 def between(count: int, receding: float, advancing: float, wall: str = "free slip", symmetry: str = "none") -> Row:
-    """The same cube on a wall with hysteresis."""
+    """Return the same cube on a wall with contact angle hysteresis."""
     angles = f"receding_angle='{receding:g} deg',advancing_angle='{advancing:g} deg'"
     table = f"drop={{volume='1 mm^3',{angles},particles_per_edge={count},symmetry='{symmetry}'}}"
     name = f"{count}, {receding:g} to {advancing:g} deg, {wall}" + (f", {symmetry}" if symmetry != "none" else "")
@@ -71,57 +70,59 @@ def between(count: int, receding: float, advancing: float, wall: str = "free sli
 
 
 def ball(volume: float, count: int, wall: str = "free slip") -> Row:
-    """Example 4.2 at another resolution."""
-    given = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
-    return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *given))
+    """Return example 4.2 at another resolution."""
+    ball_settings = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
+    return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *ball_settings))
 
 
 def joint(spacing: float, name: str, *settings: str) -> Row:
-    """The joint of the case with other settings."""
+    """Return the solder joint case with other settings."""
     return Row(f"{spacing} mm, {name}", "solder_joint", (*PAPER, f"joint.spacing={spacing} mm", *settings))
 
 
 def standing(spacing: float, standoff: float) -> Row:
-    """A joint between plates that hold still."""
+    """Return a joint between fixed plates."""
     return joint(spacing, f"{standoff:.2f} mm", f"joint.standoff={standoff} mm")
 
 
 def floating(free: str, *settings: str) -> Row:
-    """A package on one joint under 1 mN."""
+    """Return a package that floats on one joint under a load of 1 mN."""
     return joint(0.06, free, f"joint.package={{load='1 mN',free={json.dumps(free.split(', '))}}}", *settings)
 
 
 def pulled(spacing: float, speed: float) -> Row:
-    """A package that is pulled off at a speed [mm/s]."""
+    """Return a package that is pulled off at a speed [mm/s]."""
     return joint(spacing, f"{speed:g} mm/s", f"joint.path={{standoff='1.2 mm',speed='{speed:g} mm/s'}}")
 
 
 def swing(shells: int, steps: int) -> Row:
-    """A free drop of real solder, 0.1 R, two periods."""
+    """Return a free drop of real solder with an amplitude of 0.1 R over two periods."""
     count = 1 + sum(10 * shell**2 + 2 for shell in range(1, shells + 1))
-    given = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
-    return Row(f"{count}, {steps} steps a period", "oscillating_drop", ("oscillation.scheme=ispg", *given))
+    oscillation_settings = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
+    return Row(
+        f"{count}, {steps} steps a period", "oscillating_drop", ("oscillation.scheme=ispg", *oscillation_settings)
+    )
 
 
 def section(count: int, degrees: float, bond: float = 0.0) -> Row:
-    """The meridian of a drop."""
+    """Return the axisymmetric meridian of a drop."""
     cut = "drop.section=axisymmetric"
     return heavy(count, degrees, bond, cut) if bond else drop(count, degrees, cut)
 
 
 def ridge(count: int, degrees: float) -> Row:
-    """A drop that is the same along y."""
+    """Return a drop that is uniform along y."""
     return drop(count, degrees, "drop.section=plane")
 
 
 def real(count: int) -> Row:
-    """Example 4.1 with real solder, nothing set but inertia."""
-    given = ("drop.contact_angle=60 deg", f"drop.particles_per_edge={count}")
-    return Row(f"{count}, 60 deg", "sessile_drop", (*MOVES[:2], *given))
+    """Return example 4.1 with real solder and inertia."""
+    drop_settings = ("drop.contact_angle=60 deg", f"drop.particles_per_edge={count}")
+    return Row(f"{count}, 60 deg", "sessile_drop", (*MOVES[:2], *drop_settings))
 
 
 def merging(spacing: float, on_wall: bool) -> Row:
-    """Drops of 0.5 and 0.25 mm^3 that become one."""
+    """Return drops of 0.5 and 0.25 mm^3 that merge."""
     wall = ("drops.contact_angle=60 deg", "drops.distance=1.3 mm") if on_wall else ()
     name = f"{spacing:.2f} mm, {'60 deg' if on_wall else 'free'}"
     return Row(name, "coalescence", (*PAPER, "gravity=off", f"drops.spacing={spacing} mm", *wall))
@@ -135,7 +136,7 @@ TABLES: dict[str, list[Row]] = {
         Row(str(count), "sessile_drop", (*PAPER, f"drop={{volume='1 mm^3',particles_per_edge={count}}}"))
         for count in (7, 9, 11)
     ],
-    # The largest cube of 7 particles an edge is too coarse for its pad.
+    # The largest cube with 7 particles per edge is too coarse for its pad.
     "pads": [ball(volume, 7) for volume in VOLUMES[:-1]]
     + [ball(volume, 11) for volume in VOLUMES]
     + [ball(VOLUMES[-1], 9), ball(VOLUMES[-1], 9, "no slip")]
@@ -185,7 +186,7 @@ TABLES: dict[str, list[Row]] = {
     "merging": [merging(0.15, True), merging(0.15, False), merging(0.13, True), merging(0.1, False)],
     "real": [real(count) for count in (5, 7, 11)],
 }  # fmt: skip
-# Columns that are printed: metric, its head, factor, digits.
+# Printed columns: metric, heading, factor, format.
 COLUMNS = (
     ("particles", "particles", 1.0, "{:.0f}"),
     ("height_error", "height", 100.0, "{:+.2f} %"),
@@ -204,66 +205,66 @@ COLUMNS = (
 
 
 def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]:
-    """Compute a case: its metrics under the program's names, and its health checks."""
+    """Compute a case; return its metrics under the program's names and its health checks."""
     match case:
         case DropCase():
-            found = drop_to_rest(case.drop, case.molten)
-            findings = stages.judge_drop(found.shape.metrics, found.shape.verdict, found.effects)
+            solution = drop_to_rest(case.drop, case.molten)
+            findings = stages.judge_drop(solution.shape.metrics, solution.shape.verdict, solution.effects)
         case JointCase():
-            found = joint_to_rest(case.joint, case.molten)
-            findings = stages.judge_joint(found.shape.metrics, found.shape.verdict, found.effects)
+            solution = joint_to_rest(case.joint, case.molten)
+            findings = stages.judge_joint(solution.shape.metrics, solution.shape.verdict, solution.effects)
         case DropsCase():
-            found = pair_to_rest(case.drops, case.molten)
-            findings = stages.judge_drops(found.shape.metrics, 1, found.effects)
+            solution = pair_to_rest(case.drops, case.molten)
+            findings = stages.judge_drops(solution.shape.metrics, 1, solution.effects)
         case OscillationCase():
-            found = solve_oscillation(case.oscillation, case.molten)
-            findings = stages.judge_oscillation(found.metrics, {})
+            solution = solve_oscillation(case.oscillation, case.molten)
+            findings = stages.judge_oscillation(solution.metrics, {})
     return findings.metrics, findings.health
 
 
 def compute(row: Row) -> dict[str, Any]:
-    """Metrics of a row [SI units], its core-seconds, and the health checks that do not hold; or why there are none."""
+    """Return metrics [SI units], core-seconds and failed health checks of a row, or its error."""
     begin = process_time()
     try:
         metrics, health = judged(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
-    except (CaseError, RuntimeError) as error:  # refused, no rest, or a solve that failed: a row, too
+    except (CaseError, RuntimeError) as error:  # a refusal or a failed solution is a result as well
         return {"error": f"{type(error).__name__}: {error}", "core_seconds": process_time() - begin}
-    found: dict[str, Any] = {name: given["value"] for name, given in metrics.items()}
+    figures: dict[str, Any] = {name: metric["value"] for name, metric in metrics.items()}
     unmet = [name for name, check in health.items() if not check["ok"]]
-    return found | {"core_seconds": process_time() - begin, "unmet": unmet}
+    return figures | {"core_seconds": process_time() - begin, "unmet": unmet}
 
 
-def line(name: str, found: dict[str, Any]) -> str:
-    """A row as it is printed."""
-    if "error" in found:
-        return f"| {name} | {found['error'][:120]} ({found['core_seconds']:.0f} core-s)"
-    cells = [f"{head} {text.format(factor * found[key])}" for key, head, factor, text in COLUMNS if key in found]
-    return f"| {name} | " + " | ".join(cells) + (f" | NOT MET: {found['unmet']}" if found["unmet"] else "")
+def line(name: str, figures: dict[str, Any]) -> str:
+    """Format a row for the terminal."""
+    if "error" in figures:
+        return f"| {name} | {figures['error'][:120]} ({figures['core_seconds']:.0f} core-s)"
+    cells = [f"{head} {text.format(factor * figures[key])}" for key, head, factor, text in COLUMNS if key in figures]
+    return f"| {name} | " + " | ".join(cells) + (f" | FAILED: {figures['unmet']}" if figures["unmet"] else "")
 
 
 def warm() -> None:
-    """Load and compile what most rows share."""
+    """Load and compile the code that most rows share."""
     compute(drop(5, 60, "solder.numerics.max_steps=3"))
 
 
 def main() -> None:
-    """Compute the rows that are named and not stored."""
+    """Compute the selected rows that are not stored."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(TABLES)}; all without")
-    parser.add_argument("--only", default="", metavar="BEGINNING", help="of the names of rows")
-    parser.add_argument("--again", action="store_true", help="rows that are stored, too")
-    parser.add_argument("--list", action="store_true", help="print what there is and compute nothing")
-    given = parser.parse_args()
-    unknown = set(given.tables) - set(TABLES)
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"tables among {', '.join(TABLES)} (default: all)")
+    parser.add_argument("--only", default="", metavar="BEGINNING", help="select rows by the beginning of their names")
+    parser.add_argument("--again", action="store_true", help="recompute stored rows")
+    parser.add_argument("--list", action="store_true", help="list the tables and their rows without computing")
+    options = parser.parse_args()
+    unknown = set(options.tables) - set(TABLES)
     if unknown:
-        parser.error(f"no table {', '.join(sorted(unknown))}; there are {', '.join(TABLES)}")
+        parser.error(f"unknown table {', '.join(sorted(unknown))}; available: {', '.join(TABLES)}")
     stored = results.read_figures(NAME)
-    is_warm = given.list
-    for table in given.tables or TABLES:
+    is_warm = options.list
+    for table in options.tables or TABLES:
         print(table, flush=True)
         rows = stored.setdefault(table, {})
-        for row in (row for row in TABLES[table] if row.name.startswith(given.only)):
-            if (row.name not in rows or given.again) and not given.list:
+        for row in (row for row in TABLES[table] if row.name.startswith(options.only)):
+            if (row.name not in rows or options.again) and not options.list:
                 if not is_warm:
                     warm()
                     is_warm = True

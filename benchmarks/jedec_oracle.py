@@ -1,12 +1,12 @@
-"""The bare JEDEC board at 1500 G, 0.5 ms: explicit against implicit steps, error against cost, forecast against both.
+"""Bare JEDEC board at 1500 G for 0.5 ms: explicit against implicit steps, error against cost, and cost predictions.
 
     PYTHONPATH=. python benchmarks/jedec_oracle.py [--quick]  (one core, some minutes; writes results/jedec_oracle.json)
 
-Three tables, all of histories at the centre of the board (relative L2 norms over 2 ms):
-``steps``  one mesh, implicit steps of many sizes and explicit ones: against explicit steps a tenth as large.
-``meshes`` kind of element x size x solver: against the finest hexahedra, seconds beside error.
-``factor`` operations, entries, speed and memory of MUMPS' factor for plates and cubes, and what was forecast of them.
-Seconds are process CPU seconds of set-up (assembly and factorisation) and steps, without meshing and output.
+Three tables of histories at the centre of the board (relative L2 norms over 2 ms):
+``steps``  one mesh; implicit steps of many sizes and explicit ones, against explicit steps a tenth as large.
+``meshes`` kind of element x size x solver, against the finest hexahedra; error and seconds.
+``factor`` operations, entries, speed and memory of the MUMPS factor for plates and cubes, with their predictions.
+Times are processor seconds of set-up (assembly and factorisation) and steps, without meshing and output.
 """
 
 import argparse
@@ -60,7 +60,7 @@ BOXES = [(40, 40, 1), (80, 80, 1), (24, 24, 4), (40, 40, 4), (80, 60, 4), (12, 1
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One run: kind of element, cells of the quarter board (x, y, z), solver, numerics."""
+    """Settings of one run: kind of element, cells of the quarter board (x, y, z), solver, numerics."""
 
     kind: str
     cells: tuple[int, int, int]
@@ -100,7 +100,7 @@ def input_of(setting: Setting, directory: Path) -> StructureInput:
 
 
 def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
-    """Run a setting; return its costs, forecast and measured, and its history."""
+    """Run a setting; return its costs, predicted and measured, and its history."""
     with tempfile.TemporaryDirectory() as directory:
         request = input_of(setting, Path(directory))
         problem = StructureDynamics.read(MPI.COMM_SELF, request)
@@ -142,9 +142,9 @@ def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
     return costs, history.arrays()
 
 
-def with_errors(found: tuple[dict, dict], reference: dict) -> dict:
-    """Return the costs of a run with its differences to a reference history."""
-    costs, history = found
+def with_errors(costs_and_history: tuple[dict, dict], reference: dict) -> dict:
+    """Return the costs of a run with its relative differences to a reference history."""
+    costs, history = costs_and_history
     errors = solver_differences(history, reference)
     named = {name: errors[f"{name}_difference@centre"] for name in ("displacement", "strain")}
     row = costs | {f"{name}_error": value for name, value in named.items()}
@@ -158,7 +158,7 @@ def with_errors(found: tuple[dict, dict], reference: dict) -> dict:
 
 
 def step_table(quick: bool) -> list[dict]:
-    """Return errors and costs of one mesh over the steps."""
+    """Return errors and costs over the step sizes on one mesh."""
     cells = (11, 6, 2) if quick else (33, 19, 2)
     explicit = Setting("incompatible_modes", cells, "explicit", {})
     _, reference = run(Setting("incompatible_modes", cells, "explicit", {"step_fraction": 0.09}))
@@ -172,7 +172,7 @@ def step_table(quick: bool) -> list[dict]:
 
 
 def mesh_table(quick: bool) -> list[dict]:
-    """Return errors and costs of kinds of elements, sizes and solvers."""
+    """Return errors and costs over element kinds, sizes and solvers."""
     _, reference = run(Setting("incompatible_modes", (22, 13, 2) if quick else FINEST, "implicit", {}))
     return [with_errors(run(setting), reference) for setting in mesh_settings(quick)]
 
@@ -186,7 +186,7 @@ def mesh_settings(quick: bool) -> Iterator[Setting]:
 
 
 def factor_table(quick: bool) -> list[dict]:
-    """Return what MUMPS needs for boxes held on one side, and its forecast."""
+    """Return the cost of the MUMPS factor for boxes held on one side, with its prediction."""
     return [factor_row(cells) for cells in (BOXES[:3] if quick else BOXES)]
 
 
@@ -232,7 +232,7 @@ def factor_row(cells: tuple[int, int, int]) -> dict:
 
 
 def blas() -> list[str]:
-    """Return the files of the BLAS that MUMPS calls: it decides the speed of the factorisation."""
+    """Return the BLAS libraries that MUMPS calls, which determine the speed of the factorisation."""
     mapped = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "libblas" in line}
     return sorted(str(Path(path).resolve()) for path in mapped)
 

@@ -2,15 +2,15 @@
 
     PYTHONPATH=. python benchmarks/joint_oracle.py [TABLE ...]  (one core; writes results/joint_oracle.json)
 
-``tests/support/joint_patch.py`` describes the scene, ``joint_oracle.py`` beside it the oracle: quadratic hexahedra in
-DOLFINx forms, Newton's method, HHT steps. Tables, each with the processor seconds of its rows:
+``tests/support/joint_patch.py`` describes the scene and ``tests/support/joint_oracle.py`` the oracle: quadratic
+hexahedra in DOLFINx forms, Newton's method, HHT steps. Tables, each with the processor seconds of its rows:
 ``elastic``  at rest: the oracle on three meshes, the program with imprinted pads and tied to boxes (2 minutes)
 ``yielding`` at rest: the oracle on two meshes (5 minutes)
-``blow``     there and back in 20 us, elastic: the oracle in 80 and 160 steps, the program in explicit ones (2 minutes)
-``slow``     there and back in 0.2 ms, yielding, up to 0.12 ms, past all peaks: the oracle on two meshes, the program on
-             three (40 minutes)
-A row has its differences to the first row of its table: at rest of the measure itself, in motion of its largest
-absolute value. Plastic measures are those of the solder within 25 um of either pad unless they say otherwise.
+``blow``     a pulse of 20 us, elastic: the oracle in 80 and 160 steps, the program in explicit ones (2 minutes)
+``slow``     a pulse of 0.2 ms, yielding, up to 0.12 ms, after all peaks: the oracle on two meshes, the program on three
+             (40 minutes)
+Each row has its differences to the first row of its table: of the measure at rest, of its largest absolute value in
+motion. Plastic measures are averages over the solder within 25 um of either pad unless stated otherwise.
 """
 
 import os
@@ -27,7 +27,7 @@ from tests.support.joint_program import Course, ProgramPatch, box_mesh, matching
 NAME = "joint_oracle"
 PATCH = JointPatch()
 BLOW, SLOW = 20e-6, 0.2e-3
-SHARE = 0.6  # of the slow motion
+SHARE = 0.6  # computed share of the slow motion
 BOXES = (500 * UM, 250 * UM, 125 * UM)
 SCALED = ("copper", "solder")  # at 0.2 ms their added inertia is 0.4 % of the axial force
 PRINTED = ("axial@foot", "shear@foot", "moment@foot", "moment@head", "von_mises@foot:25um", "plastic_work@foot:25um")
@@ -40,15 +40,15 @@ def oracle(mesh: str, yields: bool) -> Patch:
 
 
 def program(mesh: str | float, course: Course) -> ProgramPatch:
-    """Return the program's patch: pads imprinted on one of its meshes, or boxes of a size [m]."""
+    """Return the program's patch with pads imprinted on a mesh, or tied to boxes of a size [m]."""
     imprinted = isinstance(mesh, str)
     data = matching_mesh(PATCH, TRILINEAR[mesh]) if imprinted else box_mesh(PATCH, TRILINEAR["middle"], mesh, (8, 4))
     return ProgramPatch(PATCH, data, course)
 
 
-def peaks(found: list[Measures]) -> Measures:
-    """Return the value of each measure where its absolute value is largest."""
-    return {name: max((row[name] for row in found), key=abs) for name in found[0] if name != "time"}
+def peaks(history: list[Measures]) -> Measures:
+    """Return each measure at its largest absolute value."""
+    return {name: max((row[name] for row in history), key=abs) for name in history[0] if name != "time"}
 
 
 def elastic() -> dict[str, Callable[[], Measures]]:
@@ -69,7 +69,7 @@ def yielding() -> dict[str, Callable[[], Measures]]:
 
 
 def blow() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the elastic patch in 20 us."""
+    """Return the rows of the elastic patch under a pulse of 20 us."""
     return {
         f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: peaks(
             steps_in_time(oracle(mesh, False), haversine(BLOW), BLOW / steps, steps)
@@ -82,7 +82,7 @@ def blow() -> dict[str, Callable[[], Measures]]:
 
 
 def slow() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the yielding patch in 0.2 ms."""
+    """Return the rows of the yielding patch under a pulse of 0.2 ms."""
     return {
         f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: peaks(
             steps_in_time(oracle(mesh, True), haversine(SLOW), SLOW / steps, round(SHARE * steps))
@@ -100,7 +100,7 @@ TABLES = {"elastic": elastic, "yielding": yielding, "blow": blow, "slow": slow}
 
 
 def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
-    """Compute the rows of a table, with differences to the first."""
+    """Compute the rows of a table and their differences to the first row."""
     table: dict[str, dict] = {}
     for name, compute in rows.items():
         begin = process_time()
@@ -109,10 +109,10 @@ def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
         first = next(iter(table.values()))["values"] if table else values
         differences = {key: value / first[key] - 1.0 for key, value in values.items() if first.get(key)}
         table[name] = {"seconds": seconds, "values": values, "differences": differences}
-        told = "  ".join(
+        printed = "  ".join(
             f"{key} {values[key]:.4g} ({differences[key]:+.1%})" for key in PRINTED if differences.get(key) is not None
         )
-        print(f"{name:32} {seconds:6.1f} s  {told}", flush=True)
+        print(f"{name:32} {seconds:6.1f} s  {printed}", flush=True)
     return table
 
 

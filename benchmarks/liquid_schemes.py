@@ -1,13 +1,13 @@
-"""delta-SPH and ISPG on one liquid: two drops that merge, a drop on a wall; errors and core-seconds.
+"""Comparison of delta-SPH and ISPG on one liquid: two merging drops and a drop on a wall; errors and core-seconds.
 
     PYTHONPATH=. .venv/bin/python benchmarks/liquid_schemes.py            (both, five minutes)
     PYTHONPATH=. .venv/bin/python benchmarks/liquid_schemes.py merging    (one of them)
 
-Balls of 1 mm^3 of the liquid of the paper, whose Ohnesorge number mu / sqrt(rho gamma D) is 0.031, and of one as tense
-and heavy, but 6.6 times as viscous (0.2). Merging starts with balls that touch at rest, and is followed for
-4 sqrt(rho D^3 / gamma): the neck r between two spheres of radius R grows with the root of time at first, d(r^2)/dt =
-C^2 (gamma R / rho)^(1/2), measured from 0.65 to 0.8 R. On a wall delta-SPH starts with a half sphere for a time given,
-ISPG with a cube until it rests.
+Balls of 1 mm^3 of the liquid of the paper, with an Ohnesorge number mu / sqrt(rho gamma D) of 0.031, and of a liquid
+with the same tension and density but 6.6 times the viscosity (0.2). Merging starts with touching balls at rest and runs
+for 4 sqrt(rho D^3 / gamma). The neck radius r between two spheres of radius R first grows with the square root of time,
+d(r^2)/dt = C^2 (gamma R / rho)^(1/2), fitted from 0.65 to 0.8 R. On a wall delta-SPH starts from a half sphere and runs
+for a fixed time; ISPG starts from a cube and runs to rest.
 """
 
 import os
@@ -34,60 +34,60 @@ from reflowshock.particles.surface.profile import section_areas
 NAME = "liquid_schemes"
 VOLUME = 1e-9
 RADIUS = float(np.cbrt(0.75 * VOLUME / pi))
-# Radius of the sphere of both [m].
+# Radius of the merged sphere [m].
 MERGED = RADIUS * 2.0 ** (1.0 / 3.0)
 PAPER = PROPERTIES["paper"]
 OHNESORGE = (0.0305, 0.2)
-# Particles across a diameter, in a radius, along the edge of a cube; how long drops are followed; part of the neck's
+# Particles per diameter, radius and cube edge; duration of merging; fitted range of the neck's
 # growth, in radii.
 ACROSS, IN_RADIUS, PER_EDGE = (10, 14), (4, 6), 7
 FOLLOWED, GROWTH = 4.0, (0.65, 0.8)
-# Of the swing of both as one drop, in the unit of time of one of them.
+# Period of the merged drop over the unit of time of one drop.
 PERIOD = 2.0 * pi / 32.0**0.5
 ANGLES = (60.0, 120.0)
 UNIT = float(np.sqrt(PAPER["density"] * (2.0 * RADIUS) ** 3 / PAPER["surface_tension"]))
 
 
 def viscosity(ohnesorge: float) -> float:
-    """Of a ball of that number [Pa s]."""
+    """Return the viscosity [Pa s] of a ball with an Ohnesorge number."""
     return ohnesorge * float(np.sqrt(PAPER["density"] * PAPER["surface_tension"] * 2.0 * RADIUS))
 
 
 def ink(ohnesorge: float, across: int, **more) -> Droplet:
-    """A ball of the liquid for delta-SPH."""
+    """Return a ball of the liquid for delta-SPH."""
     numerics = DropletNumerics(particles_per_diameter=across)
-    given = PAPER | {"diameter": 2.0 * RADIUS, "viscosity": viscosity(ohnesorge), "gravity": 0.0}
-    return Droplet(**given | {"duration": 1.0} | more, numerics=numerics)
+    parameters = PAPER | {"diameter": 2.0 * RADIUS, "viscosity": viscosity(ohnesorge), "gravity": 0.0}
+    return Droplet(**parameters | {"duration": 1.0} | more, numerics=numerics)
 
 
 def solder(ohnesorge: float) -> Fluid:
-    """The liquid for ISPG."""
+    """Return the liquid for ISPG."""
     effects, numerics = FlowEffects(inertia="on"), FlowNumerics(scheme="ispg")
     return Fluid(parameters="paper", viscosity=viscosity(ohnesorge), effects=effects, numerics=numerics)
 
 
 def neck(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Radius of the smallest cross-section between the drops, which lie along x, over R; as a disc."""
+    """Return the radius over R of a disc with the area of the smallest cross-section between drops that lie along x."""
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
     turned = np.ascontiguousarray(points[:, [1, 2, 0]])
     return float(np.sqrt(section_areas(turned, triangles, heights).min() / pi)) / RADIUS
 
 
 def state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:
-    """Time [sqrt(rho D^3 / gamma)], the neck over R until it has grown, the length over the sphere's of both."""
+    """Return time [sqrt(rho D^3 / gamma)], neck over R (inf once grown) and length over the merged diameter."""
     length = float(np.ptp(points[:, 0])) / (2.0 * MERGED)
     return time / UNIT, np.inf if grown else neck(points, triangles), length
 
 
 def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
-    """What is kept of drops that merged: growth of the neck, the last swing, radii of what they became."""
+    """Return growth rate of the neck, last swing and final radii of merged drops."""
     time, width, length = np.array(rows).T
     low, high = (int(np.argmax(width > share)) for share in GROWTH)
     slope = np.polyfit(time[low:high], width[low:high] ** 2, 1)[0] if high > low + 1 else float("nan")
     swings = time > time[-1] - PERIOD
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1) / MERGED
     return {
-        "growth": float(np.sqrt(slope)) / 8.0**0.25,  # times are in sqrt(rho D^3 / gamma), not of R
+        "growth": float(np.sqrt(slope)) / 8.0**0.25,  # times are in units of D, the growth law in units of R
         "neck_grown_after": float(time[high]),
         "last_swing": float(np.abs(length[swings] - 1.0).max()),
         "radius_error": float(distance.mean() - 1.0),
@@ -97,63 +97,63 @@ def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
 
 
 def merging_by_sph(ohnesorge: float, across: int) -> dict:
-    """Two balls by delta-SPH that are so near that they merge at once."""
+    """Merge two balls by delta-SPH, close enough to merge in the first step."""
     scene = ink(ohnesorge, across)
     simulation = pair(scene, TRACKED, 1.0, gap=0.9, speed=0.0)
-    simulation.step(1e-9 * UNIT)  # compiled
+    simulation.step(1e-9 * UNIT)  # compiles the kernels
     begin, rows = process_time(), []
     while simulation.time < FOLLOWED * UNIT:
         simulation.step(simulation.time_step())
         surface, grown = simulation.surface, bool(rows) and rows[-1][1] > 1.0
         rows.append(state(simulation.time, surface.points, surface.triangles, grown))
-    found = merged(rows, surface.points, process_time() - begin)
+    figures = merged(rows, surface.points, process_time() - begin)
     volume = surface.volume / (2.0 * VOLUME) - 1.0
-    return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | found
+    return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | figures
 
 
 def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
-    """Two balls by ISPG that touch."""
+    """Merge two touching balls by ISPG."""
     scene = Drops(
         volume_left=VOLUME, volume_right=VOLUME, distance=2.000002 * RADIUS, spacing=RADIUS / in_radius
     )  # fmt: skip
     liquid = solder(ohnesorge).resolve(scene, "off")
     acting = switched(decide_drop(liquid, True))
     old = [start_flow(cloud, liquid, acting, ()) for cloud in start_clouds(scene)]
-    made = rebuild(*(one.body for one in old)).cloud
-    start_flow(made, liquid, acting, ()).step()  # compiled
+    made = rebuild(*(flow.body for flow in old)).cloud
+    start_flow(made, liquid, acting, ()).step()  # compiles the kernels
     begin, rows, steps = process_time(), [], 0
-    one = start_flow(made, liquid, acting, ())
-    hand_over(old, [one])
-    while one.time < FOLLOWED * UNIT:
-        one.step()
+    flow = start_flow(made, liquid, acting, ())
+    hand_over(old, [flow])
+    while flow.time < FOLLOWED * UNIT:
+        flow.step()
         steps += 1
-        grown, count = bool(rows) and rows[-1][1] > 1.0, one.body.cloud.surface_count
-        rows.append(state(one.time, one.body.points[:count], one.body.triangles, grown))
-    surface = one.body.points[: one.body.cloud.surface_count]
-    found = merged(rows, surface, process_time() - begin)
-    volume = one.body.volume()[0] / (2.0 * VOLUME) - 1.0
-    return {"particles": len(one.body.points), "steps": steps, "volume_error": float(volume)} | found
+        grown, count = bool(rows) and rows[-1][1] > 1.0, flow.body.cloud.surface_count
+        rows.append(state(flow.time, flow.body.points[:count], flow.body.triangles, grown))
+    surface = flow.body.points[: flow.body.cloud.surface_count]
+    figures = merged(rows, surface, process_time() - begin)
+    volume = flow.body.volume()[0] / (2.0 * VOLUME) - 1.0
+    return {"particles": len(flow.body.points), "steps": steps, "volume_error": float(volume)} | figures
 
 
 def cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
-    """A half sphere on a wall by delta-SPH."""
+    """Let a half sphere relax on a wall by delta-SPH."""
     scene = ink(ohnesorge, across, contact_angle=radians(degrees), duration=FOLLOWED * UNIT)
     begin = process_time()
     metrics = {name: value for name, (value, _) in solve_droplet(scene).metrics.items()}
-    kept = {"height_error": metrics["height_error"], "base_error": metrics["base_error"]}
-    return {"particles": int(metrics["particles"]), "seconds": process_time() - begin} | kept
+    errors = {"height_error": metrics["height_error"], "base_error": metrics["base_error"]}
+    return {"particles": int(metrics["particles"]), "seconds": process_time() - begin} | errors
 
 
 def cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
-    """A cube on a wall by ISPG."""
+    """Let a cube relax on a wall by ISPG."""
     drop = Drop(volume=VOLUME, contact_angle=radians(degrees), particles_per_edge=per_edge)
     begin = process_time()
     metrics = drop_to_rest(drop, solder(ohnesorge).resolve(drop, "off")).shape.metrics
-    kept = {name: metrics[name][0] for name in ("height_error", "max_width_error", "at_rest")}
-    return {"particles": per_edge**3, "seconds": process_time() - begin} | kept
+    figures = {name: metrics[name][0] for name in ("height_error", "max_width_error", "at_rest")}
+    return {"particles": per_edge**3, "seconds": process_time() - begin} | figures
 
 
-def told(name: str, row: dict) -> dict:
+def print_row(name: str, row: dict) -> dict:
     """Print a row and return it."""
     words = (f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items())
     print(f"  {name}:", "  ".join(words), flush=True)
@@ -161,24 +161,24 @@ def told(name: str, row: dict) -> dict:
 
 
 def merging() -> dict:
-    """Merging by both."""
-    found = {}
+    """Return the figures of merging by both schemes."""
+    rows = {}
     for ohnesorge in OHNESORGE:
         for scheme, run, sizes in (("delta-SPH", merging_by_sph, ACROSS), ("ISPG", merging_by_ispg, IN_RADIUS)):
             for size in sizes:
                 name = f"Oh {ohnesorge:g}, {scheme}, {size}"
-                found[name] = told(name, run(ohnesorge, size))
-    return found
+                rows[name] = print_row(name, run(ohnesorge, size))
+    return rows
 
 
 def caps() -> dict:
-    """Caps by both, of the more viscous liquid: the other one still swings by delta-SPH."""
-    found, ohnesorge = {}, OHNESORGE[-1]
+    """Return the figures of caps by both schemes for the more viscous liquid, since the other one still swings."""
+    rows, ohnesorge = {}, OHNESORGE[-1]
     for degrees in ANGLES:
         for scheme, run, size in (("delta-SPH", cap_by_sph, ACROSS[-1]), ("ISPG", cap_by_ispg, PER_EDGE)):
             name = f"{degrees:g} degrees, {scheme}, {size}"
-            found[name] = told(name, run(ohnesorge, degrees, size))
-    return found
+            rows[name] = print_row(name, run(ohnesorge, degrees, size))
+    return rows
 
 
 if __name__ == "__main__":

@@ -1,28 +1,27 @@
-"""What rotation and yielding cost, against their bars: forces, steps, windows, two scales over one model.
+"""Cost of finite rotation and plasticity against limits: forces, steps, windows, and two scales over one model.
 
     PYTHONPATH=. python benchmarks/nonlinear.py [PART ...]  (ten quiet minutes, one core; writes results/nonlinear.json)
 
-Parts, each by itself where it is named; figures of earlier calls stay:
-- ``forces``: the cube of 40^3 boxes in finite rotation, alone and in whole steps; solder that yields, one-point and
-  with incompatible modes, on 12^3 distorted elements that stay in the cache; Akantu's linear loop, if pip installs it.
-- ``against_peers``: whole steps of those elements, turned by 0.3, in Akantu (elastic) and Kratos (elastic, J2).
-- ``bending``: the moment of a plastic hinge of four elements over its height, and the elastic stiffness of a distorted
-  one-point element over that of the element with incompatible modes: what the faster element gives up.
+Each part can run alone; figures of earlier runs are kept:
+- ``forces``: the cube of 40^3 boxes in finite rotation, alone and in whole steps; yielding solder with one-point and
+  incompatible-modes elements on 12^3 distorted elements that fit the cache; Akantu's linear loop if pip installs it.
+- ``against_peers``: whole steps of those elements, rotated by 0.3, in Akantu (elastic) and Kratos (elastic, J2).
+- ``bending``: moment of a plastic hinge of four elements over its height, and the elastic stiffness of a distorted
+  one-point element over the stiffness with incompatible modes: the accuracy lost by the faster element.
 - ``effects``: windows of bga_drop (held velocity, one fine joint, copper at its true mass) in finite rotation and with
-  solder that yields, over the linear ones of the same scheme, and of the scheme that a linear model would take.
-- ``interpreter``: what Python costs between substeps, one by one and in one call.
-- ``two_scales``: core seconds of a simulated second over those of one model, with three joints fine and with one, in
-  finite rotation, solder that yields; ``errors``: their histories on a smaller board under a shorter pulse, in
-  which solder flows.
+  yielding solder, over the linear windows of the same scheme and of the scheme that a linear model would use.
+- ``interpreter``: Python overhead of a substep, taken singly and in one call.
+- ``two_scales``: core-seconds of a simulated second over those of one model, with three fine joints and with one, in
+  finite rotation with yielding solder; ``errors``: their histories on a smaller board under a shorter pulse.
 - ``implicit``: one model in implicit steps (``support/newton_steps.py``) on that board, under its pulse and one five
-  times as long: processor seconds and errors against explicit steps, beside those of two scales.
-- ``drift``: energy over 1e5 windows of two models in finite rotation, elastic, no damping, by each scheme.
-- ``growth``: of one window of every scheme, over the grid of coupling_stability.py, where the models have turned by 40
-  degrees and strained by half a per cent, and the block flows: its elements have their tangents. One-point elements;
-  ``growth_of_modes``, ``errors_of_modes``: those with incompatible modes.
+  times as long: processor seconds and errors against explicit steps and two scales.
+- ``drift``: energy over 1e5 windows of two elastic undamped models in finite rotation, by each scheme.
+- ``growth``: growth of one window of every scheme over the grid of coupling_stability.py, with models rotated by 40
+  degrees and strained by 0.5 %, and the tangents of a flowing block. One-point elements; ``growth_of_modes`` and
+  ``errors_of_modes``: elements with incompatible modes.
 
-Sides take turns; ratios are of processor seconds. Wall times of whole cases are those of their runs in ``runs``; where
-there is none, ``not_measured`` has the command.
+Sides take turns; ratios are of processor seconds. Wall times of whole cases are read from ``runs``; ``not_measured``
+lists the commands of missing runs.
 """
 
 import argparse
@@ -44,9 +43,9 @@ from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
 from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
-from benchmarks.support.kept_rows import KeptRows
 from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
+from benchmarks.support.stored_rows import StoredRows
 from benchmarks.support.whole_runs import found_in_runs
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
@@ -79,7 +78,7 @@ FINE = {"three_joints": CRITICAL, "one_joint": CRITICAL[:1]}
 MATERIAL = "materials.solder='SAC405'"
 PEAK, DURATION = 4000 * STANDARD_GRAVITY, 1.2e-4  # [m/s^2], [s], of errors: solder flows
 ALONG_PATHS = ("held_velocity, levels auto", "impulse", "gravouil_combescure")
-WINDOWS, SAMPLES = 100_000, 2000  # with 200 a slow beat of both models is taken for a drift of 4e-3
+WINDOWS, SAMPLES = 100_000, 2000  # 200 samples would show a slow beat of both models as a drift of 4e-3
 DRIFTING = {
     "held_velocity": Pair(3, 3.0),
     "held_velocity, levels auto": Pair(12, 3.0, height=3, thinnest=0.2),
@@ -92,7 +91,7 @@ TURN = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.
 STRETCHED = np.array([[1.0, 0.3, 0.0], [0.3, -0.36, 0.0], [0.0, 0.0, -0.36]])
 ELASTIC_SOLDER = SOLDER.model_copy(update={"plasticity": None})
 IDEAL_SOLDER = SOLDER.model_copy(update={"plasticity": JohnsonCook(A=SOLDER.plasticity.A)})
-PEERS = {  # law -> material, strain, peers that have it, elements of this program
+PEERS = {  # law -> material, strain, peers with this law, elements of this program
     "finite": (ELASTIC_SOLDER, 1e-4, ("akantu", "kratos"), ("incompatible_modes",)),
     "plastic": (IDEAL_SOLDER, 3e-3, ("kratos",), ("one_point", "incompatible_modes")),
 }
@@ -101,7 +100,7 @@ Bars = dict[str, dict[str, Any]]
 
 
 def forces() -> tuple[Bars, dict]:
-    """Return element updates a second."""
+    """Return element updates per second."""
     boxes, small = cube(), cube(distorted=True, edge=12)
     body, critical = nonlinear_body(boxes, STEEL, ForceOptions("corotational", 1e-8), "incompatible_modes")
     motion = motion_of(body, 0.5 * critical)
@@ -142,20 +141,20 @@ def forces() -> tuple[Bars, dict]:
 
 
 def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
-    """Return Akantu with the linear cube; None where pip cannot install it."""
+    """Return Akantu with the linear cube; None if pip cannot install it."""
     peers.FOLDER.mkdir(parents=True, exist_ok=True)
     return peers.Peer("akantu", peers.write_problem(mesh, displacement, 1e-8)) if "akantu" in peers.install() else None
 
 
 def against_peers() -> tuple[Bars, dict]:
-    """Return whole steps in finite rotation over those of peers, from places where all must have the same forces."""
-    mesh, found = cube(distorted=True, edge=12), peers.install()
+    """Return whole steps in finite rotation over those of peers, from states with equal forces."""
+    mesh, installed = cube(distorted=True, edge=12), peers.install()
     bars, rest = {}, {}
     for law, (material, strain, names, kinds) in PEERS.items():
         displacement = mesh.points @ (TURN @ (np.eye(3) + strain * STRETCHED) - np.eye(3)).T
         motions = {kind: moved_body(mesh, material, kind, displacement) for kind in kinds}
-        given = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
-        running = {name: peers.Peer(name, given) for name in names if name in found}
+        problem_file = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
+        running = {name: peers.Peer(name, problem_file) for name in names if name in installed}
         force = np.zeros_like(displacement)
         force[motions[kinds[0]].body.local.nodes] = motions[kinds[0]].force
         batches = {kind: turns.batch(partial(motion.take_steps, 1)) for kind, motion in motions.items()}
@@ -171,7 +170,7 @@ def against_peers() -> tuple[Bars, dict]:
 
 
 def moved_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
-    """Return a body of a material in finite rotation at a displacement ``(n, 3)`` [m], with its force there."""
+    """Return a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
     step = 0.5 * nonlinear_body(mesh, material, ForceOptions("corotational"), kind)[1]
     motion = motion_of(nonlinear_body(mesh, material, ForceOptions("corotational", step), kind)[0], step)
     motion.displacement[:] = displacement[motion.body.local.nodes]
@@ -180,7 +179,7 @@ def moved_body(mesh: MeshData, material: Material, kind: str, displacement: np.n
 
 
 def bending() -> tuple[Bars, dict]:
-    """Return what the one-point element gives up."""
+    """Return the accuracy lost by the one-point element."""
     moments = {name: bent_moment(name, 4) for name in ("one_point", "incompatible_modes")}
     stiffness = [element_stiffness(elements_of(cube(True, 4), name)) for name in moments]
     difference = np.abs(stiffness[0] - stiffness[1]).max() / np.abs(stiffness[1]).max()
@@ -192,7 +191,7 @@ def bending() -> tuple[Bars, dict]:
 
 
 def effects() -> tuple[Bars, dict]:
-    """Return what windows cost."""
+    """Return the cost of windows with each effect."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
         runs = {name: ProgramRun(scene.request("two_scale", *side)) for name, side in SIDES.items()}
@@ -206,14 +205,14 @@ def effects() -> tuple[Bars, dict]:
 
 
 def seconds_of(runs: dict[str, ProgramRun]) -> dict[str, np.ndarray]:
-    """Return the processor seconds of a simulated second of runs, in turns."""
+    """Return the processor seconds per simulated second of runs, measured in turns."""
     for run in runs.values():
         run.step(STRETCH)
     return turns.in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
 
 
 def interpreter() -> tuple[Bars, dict]:
-    """Return what Python costs in a substep of a meso model [s]."""
+    """Return the Python overhead [s] of a substep of a meso model."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL, "scale=quick"))
         run = ProgramRun(scene.request("two_scale", {"scheme": "held_velocity", "fine_joints": ["A4"]}, FINITE))
@@ -230,7 +229,7 @@ def interpreter() -> tuple[Bars, dict]:
 
 
 def two_scales() -> tuple[Bars, dict]:
-    """Return core seconds of two scales over those of one model."""
+    """Return core-seconds of two scales over those of one model."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
         runs = {
@@ -255,7 +254,7 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
         "pulse_duration": PULSE,
         "duration": DURATION,
     }
-    found: dict[str, dict] = {}
+    rows: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*SHORT, MATERIAL))
         requests = {name: ("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
@@ -263,22 +262,22 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
         for name, (mode, coupling) in requests.items():
             arrays, seconds = ProgramRun(scene.request(mode, coupling, shock)).to_end()
             np.savez(Path(folder) / f"{name}.npz", **arrays)
-            found[name] = {"seconds": seconds}
+            rows[name] = {"seconds": seconds}
         for name, fine in FINE.items():
-            found[name] |= compare_histories(Path(folder) / f"{name}.npz", Path(folder) / "dns.npz", list(fine))
+            rows[name] |= compare_histories(Path(folder) / f"{name}.npz", Path(folder) / "dns.npz", list(fine))
     limits = {"three_joints": ("3 fine joints", 0.03), "one_joint": ("1 fine joint", 0.05)}
     bars = {
-        f"{words}, {formulation}: {metric}": turns.bar(found[name][metric], limit, False)
+        f"{words}, {formulation}: {metric}": turns.bar(rows[name][metric], limit, False)
         for name, (words, limit) in limits.items()
         for metric in ("critical_joint_peel_error", "critical_joint_work_error")
-        if metric in found[name]
+        if metric in rows[name]
     }
-    return bars, found
+    return bars, rows
 
 
 def implicit() -> tuple[Bars, dict]:
-    """Return what implicit steps cost and miss, of the pulse of ``errors`` and of one five times as long."""
-    found: dict[str, dict] = {}
+    """Return cost and errors of implicit steps for the pulse of ``errors`` and one five times as long."""
+    rows: dict[str, dict] = {}
     for pulse in (PULSE, 5.0 * PULSE):
         shock = FINITE | {"peak_acceleration": PEAK, "pulse_duration": pulse, "history_samples": SPARSE}
         with tempfile.TemporaryDirectory() as folder:
@@ -287,9 +286,9 @@ def implicit() -> tuple[Bars, dict]:
             runs = {"explicit": request("dns", HELD | {"fine_joints": "all"})}
             runs |= {name: request("two_scale", HELD | {"fine_joints": fine}) for name, fine in FINE.items()}
             runs |= {f"{count} steps a pulse": runs["explicit"] for count in STEPS_A_PULSE}
-            for name, given in runs.items():
-                run = ProgramRun(given)
-                if given is runs["explicit"] and name != "explicit":
+            for name, request_of_run in runs.items():
+                run = ProgramRun(request_of_run)
+                if request_of_run is runs["explicit"] and name != "explicit":
                     take_implicit_steps(run, pulse / int(name.split()[0]))
                 arrays, seconds = run.to_end()
                 path = Path(folder) / f"{name}.npz"
@@ -297,14 +296,14 @@ def implicit() -> tuple[Bars, dict]:
                 errors_found = compare_histories(
                     path, Path(folder) / "explicit.npz", list(FINE.get(name, CRITICAL[:1]))
                 )
-                found[f"{name}, pulse of {pulse:g} s"] = {"seconds": seconds, **errors_found}
+                rows[f"{name}, pulse of {pulse:g} s"] = {"seconds": seconds, **errors_found}
                 print(name, pulse, seconds, errors_found, flush=True)
-    return {}, found
+    return {}, rows
 
 
 def drift() -> tuple[Bars, dict]:
-    """Return the drift of energy over many windows in finite rotation, of each scheme."""
-    bars, found = {}, {}
+    """Return the energy drift of each scheme over many windows in finite rotation."""
+    bars, rows = {}, {}
     for name, pair in DRIFTING.items():
         models = pair.divided(SCHEMES[name])
         response = ForceOptions("corotational", models.division.meso_step)
@@ -316,48 +315,48 @@ def drift() -> tuple[Bars, dict]:
         coupled.swing(PUSH)
         change, interface = coupled.drift(WINDOWS, SAMPLES)
         bars[f"1e5 windows, elastic finite, no damping: energy drift, {name}"] = turns.bar(change, 1e-3, False)
-        found[name] = {
+        rows[name] = {
             "interface_energy": interface,
             "substeps": models.division.ratios,
             "elements": {role: len(body.elements.cells) for role, body in bodies.items()},
         }
-        print(name, change, found[name], flush=True)
-    return bars, found
+        print(name, change, rows[name], flush=True)
+    return bars, rows
 
 
 def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
-    """Return how many windows grow, and the worst of each scheme; of the grid each pair, or one of some.
+    """Return how many windows grow and the largest growth of each scheme, over every ``every``-th pair of the grid.
 
-    Each pair is kept in ``build`` when it is done: a run that was broken off goes on there.
+    Each pair is stored in ``build`` when it is done, so that an interrupted run continues.
     """
-    kept = KeptRows(BUILD / f"growth-{formulation}.jsonl", formulation)
-    found: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
+    stored_rows = StoredRows(BUILD / f"growth-{formulation}.jsonl", formulation)
+    growth_rates: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
     for number, (pair, fraction) in enumerate(list(grid())[::every], 1):
         label = f"{pair!r} at {fraction}"
-        row = kept.found(label, partial(window_growth, pair, fraction, formulation))
-        for name, values in found.items():
+        row = stored_rows.get(label, partial(window_growth, pair, fraction, formulation))
+        for name, values in growth_rates.items():
             values[label] = row[name]
         levels[label] = row["levels"]
         print(number, label, f"{max(row[name] for name in ALONG_PATHS):.1e}", flush=True)
-    grown = {name: sum(value > GROWTH for value in values.values()) for name, values in found.items()}
+    grown = {name: sum(value > GROWTH for value in values.values()) for name, values in growth_rates.items()}
     bars = {
         f"nonlinear windows that grow by more than {GROWTH:g}, {formulation}, {name}": turns.bar(count, 0, False)
         for name, count in grown.items()
     }
-    worst = {name: max(values.values()) for name, values in found.items()}
+    worst = {name: max(values.values()) for name, values in growth_rates.items()}
     return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
 
 
 def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
-    """Return by how much a window of each scheme grows, and in how many levels the first one is."""
-    found: dict[str, float] = {}
+    """Return the growth of a window by each scheme, and the number of step levels of the first scheme."""
+    growth_rates: dict[str, float] = {}
     for name in ALONG_PATHS:
         coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)
-        found[name] = coupled.spectral_radius() - 1.0
+        growth_rates[name] = coupled.spectral_radius() - 1.0
         if name == ALONG_PATHS[0]:
-            found["levels"] = len(coupled.meso.motion.body.schedule)
-    return found
+            growth_rates["levels"] = len(coupled.meso.motion.body.schedule)
+    return growth_rates
 
 
 PARTS = {
@@ -369,19 +368,19 @@ PARTS |= {f"{part.__name__}_of_modes": partial(part, formulation="incompatible_m
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; without, all")
-    parser.add_argument("--every", type=int, default=1, help="growth: takes one of so many pairs of the grid")
+    parser.add_argument("parts", nargs="*", help=f"parts among {', '.join(PARTS)} (default: all)")
+    parser.add_argument("--every", type=int, default=1, help="growth: take every N-th pair of the grid")
     options = parser.parse_args()
     parts = PARTS | {name: partial(PARTS[name], options.every) for name in ("growth", "growth_of_modes")}
     chosen = options.parts or list(parts)
-    found = results.read_figures("nonlinear") or {"bars": {}}
+    figures = results.read_figures("nonlinear") or {"bars": {}}
     for name in chosen:
         bars, rest = parts[name]()
-        found["bars"] |= bars
-        found[name] = rest
-        bars, found["not_measured"] = found_in_runs()
-        found["bars"] |= bars
-        results.write_and_print("nonlinear", found)
+        figures["bars"] |= bars
+        figures[name] = rest
+        bars, figures["not_measured"] = found_in_runs()
+        figures["bars"] |= bars
+        results.write_and_print("nonlinear", figures)
 
 
 if __name__ == "__main__":

@@ -2,12 +2,11 @@
 
     PYTHONPATH=. python benchmarks/peers.py  (a minute; writes results/peers.json)
 
-The peers come from PyPI into an environment of their own under ``build/``. All compute linear elasticity of small
-strains on 8-node hexahedra: the peers from 2 x 2 x 2 Gauss points at each call, through strains and stresses; this
-program, with incompatible modes besides, from one matrix that all boxes share (``congruent``), or from the assembled
-matrix that it uses for hexahedra of any shape (``assembled``). ``force`` is the internal force alone, ``step`` a whole
-step of central differences. Kratos offers no force alone. At a homogeneous strain all must give the same nodal forces:
-this is checked.
+The peers are installed from PyPI in an environment under ``build/``. All compute linear elasticity at small strain on
+8-node hexahedra. The peers integrate strains and stresses at 2 x 2 x 2 Gauss points in each call. This program has
+incompatible modes in addition, and uses one matrix for all boxes (``congruent``) or the assembled matrix for hexahedra
+of any shape (``assembled``). ``force`` is the internal force alone, ``step`` a whole central difference step. Kratos
+offers no force alone. At a homogeneous strain all nodal forces must be equal: this is checked.
 """
 
 import os
@@ -45,14 +44,14 @@ ROUNDS = 7
 
 
 class Peer:
-    """A process that works in a peer's environment when asked."""
+    """Process that runs a peer in its own environment and executes work on request."""
 
-    def __init__(self, name: str, given: Path) -> None:
-        """Start it and wait until it has written its ``force``."""
-        self._force = given.with_suffix(f".{name}.npy")
+    def __init__(self, name: str, problem_file: Path) -> None:
+        """Start the process and wait until it has written its internal force."""
+        self._force = problem_file.with_suffix(f".{name}.npy")
         script = Path(__file__).parent / "support" / f"peer_{name}.py"
         self._process = subprocess.Popen(
-            [str(PYTHON), str(script), str(given), str(self._force)],
+            [str(PYTHON), str(script), str(problem_file), str(self._force)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -62,12 +61,12 @@ class Peer:
         self.force = np.load(self._force)
 
     def ask(self, work: str) -> float:
-        """Return the processor seconds of one call of a work."""
+        """Return the processor seconds of one call of a named work."""
         print(work, file=self._process.stdin, flush=True)
         return float(self._answer())
 
     def end(self) -> None:
-        """End it."""
+        """End the process."""
         self._process.stdin.close()
         self._process.wait()
 
@@ -79,30 +78,30 @@ class Peer:
 
 
 def install() -> list[str]:
-    """Install the peers; return those that are there."""
+    """Install the peers; return the names of the available ones."""
     if not PYTHON.exists():
         venv.create(FOLDER / "venv", with_pip=True)
-    found = []
+    installed = []
     for name, packages in PACKAGES.items():
         command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode == 0:
-            found.append(name)
+            installed.append(name)
         else:
             print(f"{name} is left out, pip cannot install it: {done.stderr.strip().splitlines()[-1]}")
-    return found
+    return installed
 
 
 def write_problem(
     mesh: MeshData, displacement: np.ndarray, step: float, material: Isotropic = STEEL, finite: bool = False
 ) -> Path:
-    """Write the cube that a peer starts from; return the file.
+    """Write the cube as input of a peer; return the file.
 
     Args:
-        mesh: Of hexahedra.
-        displacement: ``(n, 3)`` [m].
-        step: [s].
-        material: Of all of it, see ``model_arrays``.
+        mesh: Mesh of hexahedra.
+        displacement: Nodal displacements [m], shape (n, 3).
+        step: Time step [s].
+        material: Material of all elements, see ``model_arrays``.
         finite: Whether strains are finite.
     """
     path = FOLDER / f"{'finite' if finite else 'small'}.npz"
@@ -112,7 +111,7 @@ def write_problem(
 
 
 def model_arrays(mesh: MeshData, material: np.ndarray, materials: Sequence[Isotropic]) -> dict[str, np.ndarray]:
-    """Return what ``support/kratos_model.py`` makes a model of; of a law that yields, only the yield stress at rest."""
+    """Return the arrays of a model for ``support/kratos_model.py``; plasticity enters by the yield stress only."""
     constants = [
         [item.density, item.young_modulus, item.poisson_ratio, item.plasticity.A if item.plasticity else np.nan]
         for item in materials
@@ -153,12 +152,14 @@ def main() -> None:
     gradient = np.random.default_rng(2).uniform(-1e-3, 1e-3, (3, 3))
     displacement = mesh.points @ gradient.T
     batches, force, step = own_batches(mesh, displacement)
-    given = write_problem(mesh, displacement, step)
-    peers = {name: Peer(name, given) for name in names}
+    problem_file = write_problem(mesh, displacement, step)
+    peers = {name: Peer(name, problem_file) for name in names}
     for name, peer in peers.items():
         difference = float(np.abs(peer.force - force).max() / np.abs(force).max())
         if not difference < SAME:
-            raise RuntimeError(f"{name} computes other forces at a homogeneous strain: they differ by {difference:.2e}")
+            raise RuntimeError(
+                f"{name} has different nodal forces at a homogeneous strain: relative difference {difference:.2e}"
+            )
         for work in WORKS[name]:
             batches[f"{name}_{work}"] = lambda peer=peer, work=work: peer.ask(work)
     seconds = turns.in_turns(batches, ROUNDS)

@@ -1,11 +1,11 @@
-"""Placements of two models on ranks: predicted and measured windows, how busy ranks are, what coupling costs.
+"""Placements of two models on ranks: predicted and measured window times, busy shares, and coupling overhead.
 
     PYTHONPATH=. python benchmarks/placement.py [RANKS ...]  (default 1 2; three minutes; writes results/placement.json)
 
 The package of ``cases/bga_drop`` on its board, linear, copper at its true mass, all joints fine, with both schemes; and
-``cases/jedec_bga``, turning and yielding, masses scaled as there, one joint fine. The script starts itself on the
-ranks. Ranks wait for each other, so that on a loaded machine what other programs take counts
-twice: figures are means over the fastest twentieth of the windows, and so are predictions of the least of few samples.
+``cases/jedec_bga`` in finite rotation with plastic solder, its scaled masses and one fine joint. The script starts
+itself on the ranks. Ranks wait for each other, so that interruptions by other programs count twice; figures are
+therefore means over the fastest twentieth of the windows, and predictions use the minimum of a few samples.
 """
 
 import json
@@ -40,7 +40,7 @@ PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
 
 
 def measure(world: MPI.Comm, request: RunInput) -> dict:
-    """Return the prediction, and the time of windows on all ranks."""
+    """Return the prediction and the measured window times on all ranks."""
     problem = PackageDrop.read(world, request)
     plan = problem.place(world)
     comms = Communicators(world, plan.placement)
@@ -68,20 +68,20 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
 
 
 def requests(folder: Path) -> dict[str, RunInput]:
-    """Return the inputs of both schemes and of the nonlinear case, on one rank; meshes are written to a folder."""
+    """Write the meshes to a folder; return the inputs of both schemes and of the nonlinear case on one rank."""
     for name in ("linear", "nonlinear"):
         (folder / name).mkdir()
     scene = DropScene.write(folder / "linear")
-    found = {name: scene.request("two_scale", {"scheme": name, "fine_joints": "all"}, {}) for name in SCHEMES}
+    inputs = {name: scene.request("two_scale", {"scheme": name, "fine_joints": "all"}, {}) for name in SCHEMES}
     scene = DropScene.write(folder / "nonlinear", SCALED, "jedec_bga")
-    found["jedec_bga"] = scene.request("two_scale", {"fine_joints": ["A10"], "levels": 1}, NONLINEAR)
-    return found
+    inputs["jedec_bga"] = scene.request("two_scale", {"fine_joints": ["A10"], "levels": 1}, NONLINEAR)
+    return inputs
 
 
-def placed(found: dict[str, RunInput], size: int) -> dict[str, str]:
-    """Return inputs with all placements on some ranks."""
+def placed(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
+    """Return the inputs with all placements on ``size`` ranks."""
     table = {}
-    for name, request in found.items():
+    for name, request in inputs.items():
         for placement in ("shared", "disjoint") if size > 1 else ("shared",):
             shock = request.shock.model_copy(update={"ranks": Ranks(total=size, placement=placement)})
             text = request.model_copy(update={"shock": shock}).model_dump_json()
@@ -92,9 +92,9 @@ def placed(found: dict[str, RunInput], size: int) -> dict[str, str]:
 def main(counts: list[int]) -> None:
     table: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
-        found, path = requests(Path(folder)), Path(folder) / "requests.json"
+        inputs, path = requests(Path(folder)), Path(folder) / "requests.json"
         for count in counts:
-            path.write_text(json.dumps(placed(found, count)))
+            path.write_text(json.dumps(placed(inputs, count)))
             program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
             command = mpi_command(count, program, oversubscribe=True)
             subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.DEVNULL, check=True)
@@ -103,20 +103,20 @@ def main(counts: list[int]) -> None:
 
 
 def bars(row: dict) -> dict:
-    """Return what is asked of a placement: that of the ranks' work only where they share both models."""
-    found = {
+    """Return the limits of a placement; the busy share counts only where ranks share both models."""
+    figures = {
         "error of the prediction": turns.bar(abs(row["measured / predicted"] - 1.0), PREDICTION, at_least=False),
         "coupling_overhead": turns.bar(row["coupling_overhead"], OVERHEAD, at_least=False),
     }
-    return found | ({"busy_share": turns.bar(row["busy_share"], BUSY)} if row["chosen"].startswith("shared") else {})
+    return figures | ({"busy_share": turns.bar(row["busy_share"], BUSY)} if row["chosen"].startswith("shared") else {})
 
 
 def on_ranks(world: MPI.Comm, path: Path) -> None:
-    """Measure the inputs of a file, and write what was found in their place."""
-    given = json.loads(path.read_text())
-    found = {name: measure(world, RunInput.model_validate_json(text)) for name, text in given.items()}
+    """Measure the inputs of a file and overwrite the file with the results."""
+    inputs = json.loads(path.read_text())
+    rows = {name: measure(world, RunInput.model_validate_json(text)) for name, text in inputs.items()}
     if world.rank == 0:
-        path.write_text(json.dumps(found))
+        path.write_text(json.dumps(rows))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Two hundred joints of known shapes, meshed or refused: method, errors, quality, tries and cost of each kind.
+"""Meshing of two hundred joints of known shape: method, errors, quality, attempts and cost of each kind.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py           (about a minute; to benchmarks/results)
      PYTHONPATH=. .venv/bin/python benchmarks/remeshing.py --quick   (every eighth of each kind)
-Seconds are those of this process; Gmsh makes tetrahedra in processes of its own, which are not counted.
+Times are seconds of this process; the tetrahedra of Gmsh are made in separate processes, which are not counted.
 """
 
 import argparse
@@ -14,35 +14,39 @@ NAME = "remeshing"
 WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviation", "tries")
 
 
-def summary(kind: str, found: list[dict]) -> dict:
-    """The worst of one kind."""
-    meshed = [one for one in found if one["method"] != "refused"]
+def summary(kind: str, joints: list[dict]) -> dict:
+    """Return counts and worst values of one kind."""
+    meshed = [joint for joint in joints if joint["method"] != "refused"]
     return {
         "kind": kind,
-        "count": len(found),
-        **{way: sum(one["method"] == way for one in found) for way in ("swept", "free-form", "refused")},
-        **{name: max((one[name] for one in meshed), default=None) for name in WORST},
-        "scaled_jacobian": min((one["scaled_jacobian"] for one in meshed), default=None),
-        "smallest_length": min((one["smallest_length"] for one in meshed), default=None),
-        "seconds": sum(one["seconds"] for one in found) / len(found),
+        "count": len(joints),
+        **{way: sum(joint["method"] == way for joint in joints) for way in ("swept", "free-form", "refused")},
+        **{name: max((joint[name] for joint in meshed), default=None) for name in WORST},
+        "scaled_jacobian": min((joint["scaled_jacobian"] for joint in meshed), default=None),
+        "smallest_length": min((joint["smallest_length"] for joint in meshed), default=None),
+        "seconds": sum(joint["seconds"] for joint in joints) / len(joints),
     }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    found = [outcome(sample) for sample in samples(8 if parser.parse_args().quick else 1)]
-    table = [summary(kind, own) for kind in COUNTS if (own := [one for one in found if one["kind"] == kind])]
+    joints = [outcome(sample) for sample in samples(8 if parser.parse_args().quick else 1)]
+    table = [
+        summary(kind, joints_of_kind)
+        for kind in COUNTS
+        if (joints_of_kind := [joint for joint in joints if joint["kind"] == kind])
+    ]
     for row in table:
         print(
             "  ".join(
                 f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}" for name, value in row.items()
             )
         )
-    for one in found:
-        if one["method"] == "refused":
-            print(f"refused: {one['kind']}: {one['reason']}")
-    results.write_figures(NAME, {"kinds": table, "joints": found})
+    for joint in joints:
+        if joint["method"] == "refused":
+            print(f"refused: {joint['kind']}: {joint['reason']}")
+    results.write_figures(NAME, {"kinds": table, "joints": joints})
 
 
 if __name__ == "__main__":

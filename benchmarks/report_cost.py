@@ -1,7 +1,7 @@
-"""What a report costs: processor time beyond that of loading the program, and the size of the page.
+"""Cost of a report: processor time beyond loading the program, and size of the page.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/report_cost.py [RUN ...]   (a minute; writes results/report_cost.json)
-Without run folders it first runs the shortened case of the tests, into build/report_cost.
+Without run folders it first runs the shortened case of the tests in build/report_cost.
 """
 
 import json
@@ -19,21 +19,21 @@ CASE, RUN = ROOT / "tests/pipeline/small.toml", ROOT / "build/report_cost"
 
 
 def small_run() -> Path:
-    """Run the shortened case, unless it is there."""
+    """Run the shortened case unless it exists; return its folder."""
     line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(RUN)]
     subprocess.run(line, check=True, cwd=ROOT)
     return RUN
 
 
 def cost(run: Path) -> dict:
-    """Write the report of a run once, in a process of its own."""
+    """Write the report of a run in a separate process; return its cost."""
     line = [sys.executable, __file__, "--one", str(run)]
-    told = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
-    return json.loads(told.splitlines()[-1])
+    output = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
+    return json.loads(output.splitlines()[-1])
 
 
-def one(run: Path) -> dict:
-    """Write the report of a run into a temporary folder; return what that took."""
+def render_once(run: Path) -> dict:
+    """Write the report of a run into a temporary folder; return its cost."""
     from reflowshock.workflow.pipeline.points import read_case_of_run
     from reflowshock.workflow.pipeline.report import write_report
 
@@ -46,7 +46,7 @@ def one(run: Path) -> dict:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        print(json.dumps(one(Path(sys.argv[2]))))
+        print(json.dumps(render_once(Path(sys.argv[2]))))
         raise SystemExit
     rows = [cost(run) for run in map(Path, sys.argv[1:])] or [cost(small_run())]
     results.write_figures(NAME, {"reports": rows})

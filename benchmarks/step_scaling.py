@@ -1,13 +1,13 @@
-"""A whole step against its force alone, and two ranks against one, on the cube of 40^3 boxes of steel.
+"""Cost of a whole step against its force alone, and of two ranks against one, on a cube of 40^3 boxes of steel.
 
     PYTHONPATH=. python benchmarks/step_scaling.py  (half a minute; writes results/step_scaling.json)
 
-The script starts itself on two MPI ranks. Rank 0 first measures a model of its own (``COMM_SELF``) while rank 1 sleeps,
-then both step the same cube cut in two by DOLFINx, and so on in turns. A step is ExplicitMotion.advance and
-ExplicitMotion.update_force: update of velocities and displacements, internal force, sum over the copies of shared
-nodes; ``drop`` is the same step under a body force, whose work needs the momentum. Ranks wait for each other, so that
-on a loaded machine what other programs take counts twice: times are the least wall seconds of single calls, of the
-slower rank, at a moment when no other program came between.
+The script starts itself on two MPI ranks. In turns, rank 0 steps a model of its own (``COMM_SELF``) while rank 1
+sleeps, then both step the same cube cut in two by DOLFINx. A step is ``ExplicitMotion.advance`` and
+``ExplicitMotion.update_force``: update of velocities and displacements, internal force, sum over the copies of shared
+nodes. ``drop`` is the same step under a body force, whose work needs the momentum. Ranks wait for each other, so that
+interruptions by other programs count twice; times are therefore the minimum wall seconds of single calls on the slower
+rank.
 """
 
 import json
@@ -35,7 +35,7 @@ from reflowshock.materials.roles import Materials
 from reflowshock.workflow.process.launch import mpi_command
 
 ROUNDS, CALLS = 40, 10
-FRACTION = 0.5  # of the critical step
+FRACTION = 0.5  # step over the critical step
 PULSE = half_sine_drop(peak=1.5e4, duration=5e-4)
 NAP = 1e-3  # [s]
 
@@ -67,7 +67,7 @@ def force(motion: ExplicitMotion) -> Callable[[], None]:
 
 
 def least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
-    """Return the least wall seconds of a call, of the slower rank."""
+    """Return the minimum wall seconds of a call on the slower rank."""
     walls = np.empty(CALLS)
     for k in range(CALLS):
         comm.Barrier()
@@ -86,7 +86,7 @@ def asleep(comm: MPI.Comm) -> None:
 
 
 def measure(world: MPI.Comm) -> dict[str, float]:
-    """Return the least wall seconds of each work; of the single rank's on rank 0 only."""
+    """Return the minimum wall seconds of each work; single-rank values on rank 0 only."""
     both = motion_on(world, [])
     works = {"step_2": (world, step(both)), "force_2": (world, force(both))}
     if world.rank == 0:
@@ -105,7 +105,7 @@ def measure(world: MPI.Comm) -> dict[str, float]:
 
 
 def report(least: dict[str, float]) -> dict:
-    """Return rates, ratios and bars."""
+    """Return rates, ratios and limits."""
     count = len(cube().cells)
     pairs = {
         "step / force": ("force_1", "step_1", 0.8),

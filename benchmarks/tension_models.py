@@ -1,13 +1,13 @@
-"""Four models of surface tension in one delta-SPH: error against cost at rest, on a wall, swinging, merging.
+"""Four models of surface tension in one delta-SPH code: error against cost at rest, on a wall, swinging and merging.
 
     PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py         (all; results/tension_models.json and .png)
     PYTHONPATH=. .venv/bin/python benchmarks/tension_models.py swing   (one of them)
 
-A colour function with corrected normals, forces between pairs, a pressure on the free surface (`tension/`), and the
-program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; parameters are
-those published. The strength of the forces between pairs is calibrated on the pressure of a sphere, as their authors
-do (`strength`: over the theoretical one). Shapes are those of one level of a smoothed colour for all models. `cost`
-takes turns between the models; seconds of the runs are those of one core. Ten minutes.
+The models are a colour function with corrected normals, pairwise forces, a pressure on the free surface (``tension/``),
+and the program's own tracked surface. Particles, equation of state, viscosity, walls and steps are the same; parameters
+are the published ones. The strength of the pairwise forces is calibrated on the pressure of a sphere, as their authors
+do (``strength``: relative to theory). Shapes are measured by the same level of a smoothed colour function for all
+models. ``cost`` takes turns between the models; run times are seconds of one core. Ten minutes.
 """
 
 import json
@@ -28,11 +28,11 @@ from benchmarks.tension.scenes import MODELS, TRACKED, at_rest, cap_at_rest, mer
 
 mpl.use("Agg")
 NAME = "tension_models"
-# Particles a diameter; of the sphere on which the forces between pairs are calibrated, and whose cost is measured.
+# Particles per diameter of the scenes, and of the sphere for calibration and cost.
 SIZES, SMALLER, SPHERE = (10, 14), (8, 10), 14
-# Marks of core-seconds.
+# Axis ticks of core-seconds.
 TICKS = (2, 5, 10, 20)
-# What is drawn for each scene: its name, the exact value, a title.
+# Plotted quantity of each scene: metric, exact value, title.
 DRAWN = {
     "rest": ("pressure_error", 0.0, "pressure at rest"),
     "cap_60": ("height_error", 0.0, "height of the cap, 60 degrees"),
@@ -43,30 +43,30 @@ DRAWN = {
 
 
 def strength() -> float:
-    """Strength of the forces between pairs at which a sphere has its pressure, over the theoretical one."""
+    """Return the strength of the pairwise forces over theory that gives a sphere its exact pressure."""
     return 1.0 / (1.0 + at_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
 
 
 @cache
 def calibrated() -> float:
-    """Strength as it was found last."""
-    kept = results.read_figures(NAME)
-    return kept.get("strength") or strength()
+    """Return the stored strength, or calibrate it."""
+    figures = results.read_figures(NAME)
+    return figures.get("strength") or strength()
 
 
 def models(scene, sizes: tuple[int, ...]) -> dict:
-    """The scene with each model and size."""
-    found = {}
+    """Run the scene with each model and size."""
+    rows = {}
     for model in MODELS:
-        found[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
-        for size, row in found[model].items():
-            told = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
-            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in told.items()), flush=True)
-    return found
+        rows[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
+        for size, row in rows[model].items():
+            printed = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+            print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in printed.items()), flush=True)
+    return rows
 
 
 def cost() -> dict:
-    """Microseconds of a particle-step of a drop at rest with each model, in turns, and over the tracked one."""
+    """Return microseconds per particle-step of a drop at rest with each model, and the ratio to the tracked surface."""
 
     def step_of(simulation):
         return batch(lambda: simulation.step(simulation.time_step()), 0.5)
@@ -74,21 +74,21 @@ def cost() -> dict:
     drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
     seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
     tracked = seconds[TRACKED]
-    found = {
+    figures = {
         model: {
             "us_per_particle_step": 1e6 * float(np.median(seconds[model])) / drops[model].fluids,
             "over_tracked": float(np.median(seconds[model] / tracked)),
         }
         for model in MODELS
     }  # fmt: skip
-    print(json.dumps(found, indent=1))
-    return found
+    print(json.dumps(figures, indent=1))
+    return figures
 
 
-def draw(found: dict) -> None:
-    """Draw errors against core-seconds, a panel a scene; what was torn apart or cannot be computed has no point."""
-    figure, panels = plt.subplots(1, len(found), figsize=(3.4 * len(found), 3.2), layout="constrained")
-    for panel, (scene, sides) in zip(np.atleast_1d(panels), found.items(), strict=True):
+def draw(figures: dict) -> None:
+    """Plot errors against core-seconds, one panel for each scene; failed runs are omitted."""
+    figure, panels = plt.subplots(1, len(figures), figsize=(3.4 * len(figures), 3.2), layout="constrained")
+    for panel, (scene, sides) in zip(np.atleast_1d(panels), figures.items(), strict=True):
         name, exact, title = DRAWN[scene]
         for model, marker in zip(MODELS, "so^D", strict=True):
             rows = [row for row in sides[model].values() if name in row]
@@ -119,5 +119,5 @@ if __name__ == "__main__":
         },
         NAME,
     )
-    kept = results.read_figures(NAME)
-    draw({scene: kept[scene] for scene in DRAWN if scene in kept})
+    figures = results.read_figures(NAME)
+    draw({scene: figures[scene] for scene in DRAWN if scene in figures})

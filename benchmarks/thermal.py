@@ -1,12 +1,12 @@
-"""Warpage of a heated package: error against cost of this program's hexahedra, and of DOLFINx's own beside them.
+"""Warpage of a heated package: error against cost of the program's hexahedra and of DOLFINx elements.
 
     PYTHONPATH=. python benchmarks/thermal.py [--quick]   (one core, a minute or two; writes results/thermal.json)
 
-The package of bga_drop (quarter: FR4 11 x 11 x 0.4 mm under silicon 8 x 8 x 0.4 mm) is heated by 175 K. Errors are
-those of the height of its corner over its centre, against quadratic hexahedra (27 nodes) on the finest mesh.
-``meshes``: kind x cells x layers: ``incompatible_modes`` as the program solves it, ``trilinear`` and ``quadratic``
-assembled by DOLFINx from UFL forms, an independent code. Seconds are process CPU seconds from the mesh to the solution.
-``boards``: the same under a whole board: cells of its mesh, factor, memory, seconds, and what the gaps are.
+The package of bga_drop (quarter: FR4 11 x 11 x 0.4 mm under silicon 8 x 8 x 0.4 mm) is heated by 175 K. Errors are of
+the corner height over the centre, against quadratic hexahedra (27 nodes) on the finest mesh.
+``meshes``: kind x cells x layers: ``incompatible_modes`` by this program, ``trilinear`` and ``quadratic`` assembled by
+DOLFINx from UFL forms as independent codes. Times are processor seconds from the mesh to the solution.
+``boards``: the same package above a whole board: cells, factor, memory, seconds and gaps.
 """
 
 import argparse
@@ -55,25 +55,25 @@ BOARDS = {"as meshed for the shock, 0.5 mm": 0.5e-3, "as meshed for the shock, 2
 
 
 def package(cells: int, layers: int) -> MeshData:
-    """Return the quarter package: so many cells along the substrate, layers through substrate and through die."""
+    """Return the quarter package with ``cells`` along the substrate and ``layers`` through substrate and die."""
     x = np.linspace(0.0, SUBSTRATE, cells + 1)
     points, hexahedra = grid(x, x, np.linspace(0.0, 2.0 * THICKNESS, 2 * layers + 1))
     centre = points[hexahedra].mean(axis=1)
     upper = centre[:, 2] > THICKNESS
-    kept = ~upper | (centre[:, :2] < DIE).all(axis=1)
-    part = np.where(upper, "die", "substrate")[kept]
+    is_filled = ~upper | (centre[:, :2] < DIE).all(axis=1)
+    part = np.where(upper, "die", "substrate")[is_filled]
     planes = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, 0.0)}
-    return without_unused_nodes(mesh_of(points, hexahedra[kept], part, planes))[0]
+    return without_unused_nodes(mesh_of(points, hexahedra[is_filled], part, planes))[0]
 
 
 def warpage(points: np.ndarray, displacement: np.ndarray) -> float:
-    """Return the height that the corner of the lower face gains over its centre [m]."""
-    ends = [np.argmin(np.linalg.norm(points - place, axis=1)) for place in ([SUBSTRATE, SUBSTRATE, 0.0], [0.0] * 3)]
+    """Return the rise [m] of the corner of the lower face over its centre."""
+    ends = [np.argmin(np.linalg.norm(points - corner, axis=1)) for corner in ([SUBSTRATE, SUBSTRATE, 0.0], [0.0] * 3)]
     return float(displacement[ends[0], 2] - displacement[ends[1], 2])
 
 
 def ours(mesh: MeshData) -> tuple[float, dict]:
-    """Return the warpage by the program's hexahedra, and costs; a cell of board lies apart, as tables want one."""
+    """Return warpage and costs of the program's hexahedra, with a detached cell of board that the tables require."""
     board = mesh_of(*grid([0.0, SUBSTRATE], [0.0, SUBSTRATE], [-2e-3, -1e-3]), "board", {"symmetry_x": on(0, 0.0)})
     both = append([board, mesh])
     model = Thermoelastic(MPI.COMM_SELF, both, thermal_tables(both, np.zeros(3)), ELASTIC)
@@ -84,7 +84,7 @@ def ours(mesh: MeshData) -> tuple[float, dict]:
 
 
 def peer(mesh: MeshData, degree: int) -> tuple[float, dict]:
-    """Return the warpage by Lagrange hexahedra of a degree as DOLFINx assembles them, and costs."""
+    """Return warpage and costs of Lagrange hexahedra of a degree assembled by DOLFINx."""
     domain = dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells)
     kind = ("Lagrange", degree)
     old = dolfinx_api.OLD
@@ -105,8 +105,8 @@ def peer(mesh: MeshData, degree: int) -> tuple[float, dict]:
     dolfinx.fem.petsc.set_bc(right, held)
     solution, factor = right.duplicate(), Factorisation(matrix)
     factor.solve(right, solution)
-    found = warpage(space.tabulate_dof_coordinates(), solution.array.reshape(-1, 3))
-    return found, {"equations": matrix.size[0], "factor_bytes": factor.cost.memory}
+    warpage_value = warpage(space.tabulate_dof_coordinates(), solution.array.reshape(-1, 3))
+    return warpage_value, {"equations": matrix.size[0], "factor_bytes": factor.cost.memory}
 
 
 def strain(field: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
@@ -116,7 +116,7 @@ def strain(field: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
 
 
 def symmetry(domain: dolfinx.mesh.Mesh, space: dolfinx.fem.FunctionSpace) -> list:
-    """Hold planes of symmetry, and the height of one point."""
+    """Return the conditions of symmetry planes and the fixed height of one point."""
     held = []
     for axis in range(3):
         part = space.sub(axis).collapse()[0]
@@ -138,13 +138,20 @@ def solved(kind: str, cells: int, layers: int) -> dict:
     """Solve on a mesh; return warpage and costs."""
     mesh = package(cells, layers)
     begin = process_time()
-    found, costs = SOLVERS[kind](mesh)
+    warpage_value, costs = SOLVERS[kind](mesh)
     seconds = process_time() - begin
-    return {"kind": kind, "cells": cells, "layers": layers, "warpage_um": 1e6 * found, "seconds": seconds, **costs}
+    return {
+        "kind": kind,
+        "cells": cells,
+        "layers": layers,
+        "warpage_um": 1e6 * warpage_value,
+        "seconds": seconds,
+        **costs,
+    }
 
 
 def meshes(quick: bool) -> list[dict]:
-    """Compare kinds of element on meshes of the package."""
+    """Compare element kinds on meshes of the package."""
     for kind in SOLVERS:
         solved(kind, 5, 1)  # compiles
     exact = solved("quadratic", *((11, 2) if quick else REFERENCE))
@@ -161,7 +168,7 @@ def meshes(quick: bool) -> list[dict]:
 
 
 def boards(quick: bool) -> list[dict]:
-    """Measure the structure under boards of different fineness."""
+    """Compare boards of different mesh size."""
     case = read_case(CASE, ['warpage.corner="0 mm"', "board.numerics.layers=6"], oversubscribe=True)
     pads = pads_of(pad_table(case.package, case.board, case.warpage))
     rows = []
@@ -192,7 +199,7 @@ def pads_of(sites: list) -> Pads:
 
 
 def board_row(assembly: Assembly) -> dict:
-    """Build and solve once with wrenches; return costs, and how far heating opens the corner joint's gap."""
+    """Assemble and solve once with wrenches; return costs and the opening of the corner joint's gap."""
     begin = process_time()
     structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
     built = process_time()
@@ -213,7 +220,7 @@ def board_row(assembly: Assembly) -> dict:
 
 
 def main() -> None:
-    """Run both tables and write them."""
+    """Run both tables and store the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="fewer and smaller meshes")
     quick = parser.parse_args().quick

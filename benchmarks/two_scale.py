@@ -1,16 +1,16 @@
-"""Two scales against DNS on the composition of H 4.4: time ratio, error of the critical joint and of the die.
+"""Two scales against DNS on the composition of Hu et al. 4.4: time ratio, errors of the critical joint and the die.
 
     PYTHONPATH=. python benchmarks/two_scale.py [--full] [--only NAME ...]  (some minutes, one core)
 
 A quarter of a 10 x 10 array on its board, copper of 0.02 mm at its true mass, a quarter of all elements in the meso
-model. Costs are processor seconds of a simulated second, both modes in turns in one run, once with the kernels that the
-program chooses (``shipped``: boxes share a matrix and cost a half to a fifth of an element of a joint) and once with
-all elements on the assembled matrix (``same``: no element is a box). Errors are relative L2 against the DNS, of the
-same package on a smaller board that a shorter pulse bends. ``--full`` takes meshes as large as those of H, and errors
-over the whole pulse of the case.
+model. Costs are processor seconds per simulated second, both modes in turns in one run, once with the kernels that the
+program selects (``shipped``: boxes share a matrix and cost a half to a fifth of a joint element) and once with all
+elements on the assembled matrix (``same``: no element is a box). Errors are relative L2 against the DNS of the same
+package on a smaller board that a shorter pulse bends. ``--full`` uses meshes as large as those of Hu et al. and the
+whole pulse.
 
-``implicit`` is the same DNS in implicit steps (MUMPS factor once): the competitor of all of them as long as nothing
-yields. Its factor is in ``setup_seconds``; ``whole_case_seconds`` are for the pulse and duration of the case.
+``implicit`` is the same DNS in implicit steps (one MUMPS factor), the competitor as long as nothing yields. Its factor
+is in ``setup_seconds``; ``whole_case_seconds`` are for the pulse and duration of the case.
 """
 
 import argparse
@@ -36,7 +36,7 @@ SETTINGS: dict[str, dict] = {
     "three_joints_fine": {"scheme": "local_steps", "fine_joints": CRITICAL},
     "one_joint_fine": {"scheme": "local_steps", "fine_joints": CRITICAL[:1]},
 }
-# Time ratio, critical_joint_stress_error, die_displacement_error: at most.
+# Upper limits of time ratio, critical_joint_stress_error, die_displacement_error.
 ALL_FINE, CRITICAL_FINE = (0.25, 0.02, 0.01), (0.077, 0.03, np.inf)
 BARS = {"local_steps": ALL_FINE, "one_joint_fine": CRITICAL_FINE}
 REDUCED = ("package.joint_numerics.core=2", "package.joint_numerics.rings=1", "package.joint_numerics.layers=6")
@@ -47,15 +47,15 @@ FULL = (
     "board.numerics.coarse_size='0.5 mm'",
     "board.numerics.layers=6",
 )
-# A board on which bending reaches the joints soon; the package is the same.
+# The same package on a small board, whose bending reaches the joints early.
 SHORT = (*REDUCED, "board.length='60 mm'", "board.width='40 mm'")
 PULSE, DURATION = 1e-4, 2e-4  # [s], of errors on that board
-STRETCH = 2e-6  # [s] simulated by one side before it is the other's turn
+STRETCH = 2e-6  # [s] simulated by one side per turn
 ROUNDS = 7
 
 
 def runs_of(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
-    """Return the runs to be measured: settings, DNS, and the same DNS in implicit steps."""
+    """Return the measured runs: settings, DNS, and the same DNS in implicit steps."""
     runs = {name: ProgramRun(scene.request("two_scale", SETTINGS[name], {})) for name in names}
     runs["dns"] = ProgramRun(scene.request("dns", {}, {}))
     runs["implicit"] = ProgramRun(scene.request("dns", {}, {"dns_solver": "implicit"}))
@@ -63,7 +63,7 @@ def runs_of(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
 
 
 def cost_table(scene: DropScene, names: list[str]) -> dict:
-    """Return what each setting costs against DNS: processor seconds of both, in turns."""
+    """Return the cost of each setting over the DNS, from processor seconds in turns."""
     runs = runs_of(scene, names)
     for run in runs.values():
         run.step(STRETCH)
@@ -85,7 +85,7 @@ def cost_table(scene: DropScene, names: list[str]) -> dict:
 
 
 def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -> dict:
-    """Return the errors of each setting against a DNS of the same windows, and the processor seconds of the runs."""
+    """Return errors of each setting against a DNS with the same windows, and processor seconds."""
     rows: dict[str, dict] = {}
     references: dict[float, Path] = {}
     for name in names:
@@ -102,23 +102,23 @@ def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -
 
 
 def history_of(run: ProgramRun, path: Path) -> tuple[Path, float]:
-    """Go to the end of a run and write its history; return the path and the processor seconds."""
+    """Complete a run and write its history; return path and processor seconds."""
     arrays, seconds = run.to_end()
     np.savez(path, **arrays)
     return path, seconds
 
 
 def bars_of(costs: dict[str, dict], errors: dict) -> dict:
-    """Return the issue's bars with what was measured."""
-    found = {}
+    """Return the limits with their measured values."""
+    bars = {}
     for name in set(BARS) & set(errors):
         limits = BARS[name]
         for kernels, table in costs.items():
-            found[f"{name}: time ratio, {kernels} kernels"] = turns.bar(table[name]["time_ratio"], limits[0], False)
+            bars[f"{name}: time ratio, {kernels} kernels"] = turns.bar(table[name]["time_ratio"], limits[0], False)
         for metric, limit in zip(("critical_joint_stress_error", "die_displacement_error"), limits[1:], strict=True):
             if np.isfinite(limit):
-                found[f"{name}: {metric}"] = turns.bar(errors[name][metric], limit, False)
-    return found
+                bars[f"{name}: {metric}"] = turns.bar(errors[name][metric], limit, False)
+    return bars
 
 
 def main() -> None:

@@ -1,11 +1,10 @@
-"""What two scales cost and how exact they are: scheme, levels, buffer, direction and window against error and time.
+"""Accuracy and cost of two scales over scheme, levels, buffer, direction and window.
 
     PYTHONPATH=. python benchmarks/two_scale_accuracy.py [--quick]  (some minutes, one core)
 
 A quarter of 16 joints on a small board, copper of 0.02 mm at its true mass, under a half sine that is short enough to
-bend it. Each setting is run with smaller and smaller windows, the steps of the fine model with them; errors are
-relative L2 against a DNS with the same small step, and should fall as the square of the window. Seconds are of the
-processor.
+bend it. Each setting runs with decreasing windows and the fine steps in proportion. Errors are relative L2 against a
+DNS with the same small step and should fall with the square of the window. Times are processor seconds.
 """
 
 import argparse
@@ -38,7 +37,7 @@ ERRORS = ("critical_joint_stress_error", "die_displacement_error", "board_strain
 
 
 def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
-    """Run a setting, or ``dns``; return its sizes, seconds and, against the DNS that must be there, its errors."""
+    """Run a setting or ``dns``; return sizes, seconds and errors against the DNS of the same fraction."""
     mode, coupling = ("dns", {}) if name == "dns" else ("two_scale", SETTINGS[name])
     run = ProgramRun(scene.request(mode, coupling, SHOCK | {"step_fraction": fraction}))
     arrays, seconds = run.to_end()
@@ -57,8 +56,8 @@ def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
     }
 
 
-def shown(item: dict) -> str:
-    """Return a row of the table for people."""
+def table_row(item: dict) -> str:
+    """Format a row of the table."""
     errors = " | ".join(f"{100.0 * item[metric]:.3f}" for metric in ERRORS)
     return (
         f"| {item['setting']} | {item['window_ns']:.1f} | {item['m']} | {item['f']:.2f} | {item['time_ratio']:.3f} |"
@@ -67,14 +66,14 @@ def shown(item: dict) -> str:
 
 
 def orders(rows: list[dict]) -> dict[str, dict[str, float]]:
-    """Return by setting and metric the power of the window with which the error falls, fitted."""
-    found: dict[str, dict[str, float]] = {}
+    """Return the fitted order in the window of each setting and metric."""
+    fitted_orders: dict[str, dict[str, float]] = {}
     for name in dict.fromkeys(item["setting"] for item in rows):
         mine = [item for item in rows if item["setting"] == name]
         windows = np.log([item["window_ns"] for item in mine])
         fits = {metric: np.polyfit(windows, np.log([item[metric] for item in mine]), 1)[0] for metric in ERRORS}
-        found[name] = {metric: float(value) for metric, value in fits.items()}
-    return found
+        fitted_orders[name] = {metric: float(value) for metric, value in fits.items()}
+    return fitted_orders
 
 
 def main() -> None:
@@ -92,7 +91,7 @@ def main() -> None:
                 item = row(name, scene, fraction, folder)
                 item["time_ratio"] = item["seconds"] / dns["seconds"]
                 rows.append(item)
-                print(shown(item), flush=True)
+                print(table_row(item), flush=True)
     results.write_and_print("two_scale_accuracy", {"rows": rows, "orders": orders(rows)})
 
 

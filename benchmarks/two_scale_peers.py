@@ -1,16 +1,16 @@
-"""Two scales against Akantu and Kratos with one step for all: the same package, error against cost, in one run.
+"""Two scales against Akantu and Kratos with a uniform step: the same package, error against cost, in one run.
 
     PYTHONPATH=. python benchmarks/two_scale_peers.py  (five minutes, one core each; writes two_scale_peers.json)
 
-The quarter of a small package whose joints match the board node for node (Akantu knows no ties), copper of 0.02 mm,
-under a half sine. Errors are relative L2 over the histories of the centres of board and die against this program's DNS
-on elements half as large. Costs are processor seconds of a simulated second, in turns. This program's own ``dns`` shows
-what is gained by its kernels, ``two_scale`` what by the steps. ``linear`` is against Akantu; ``nonlinear`` against
-Kratos, rotations of any size and solder of J2 without hardening that flows: Akantu's J2 does not bear rotations.
+A quarter of a small package whose joints match the board node for node (Akantu has no ties), copper of 0.02 mm, under a
+half sine. Errors are relative L2 over the histories of the centres of board and die, against this program's DNS on
+elements half as large. Costs are processor seconds per simulated second, in turns. This program's own ``dns`` shows the
+gain by its kernels, ``two_scale`` the gain by local steps. ``linear`` is against Akantu. ``nonlinear`` is against
+Kratos, with finite rotation and J2 solder without hardening, since Akantu's J2 law does not support rotations.
 
-Kratos' wheel of CoSimulationApplication has a dual multi-time-step method (``feti_dynamic_coupled_solver``). It is not
-run here: with Kratos' own elements, at 2.3e5 updates a second (``peers.py``), two models of it would still cost more
-than Akantu's one where the fine share is above a half.
+Kratos' CoSimulationApplication has a dual multi-time-step method (``feti_dynamic_coupled_solver``). It is not run here:
+with Kratos' own elements, at 2.3e5 updates per second (``peers.py``), two of its models would still cost more than one
+Akantu model if more than half of the elements are fine.
 """
 
 import os
@@ -38,21 +38,21 @@ from reflowshock.materials.roles import Materials
 from tests.support.fem_models import write_msh
 
 PULSE, DURATION, SAMPLES = 1e-5, 2e-5, 200  # [s]
-STRETCH = 4e-7  # [s] simulated by one side before it is the other's turn
+STRETCH = 4e-7  # [s] simulated by one side per turn
 BAR = 10.0
 MODES = ("two_scale", "dns")
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A shock of the package.
+    """Shock of the package.
 
     Attributes:
-        peer: Who computes it, too.
-        peak: Of the half sine [m/s^2].
-        numerics: Of this program.
-        materials: Of the parts.
-        finite: Whether strains are.
+        peer: Name of the peer.
+        peak: Peak of the half sine [m/s^2].
+        numerics: Numerical settings of this program.
+        materials: Materials of the parts.
+        finite: Whether strains are finite.
     """
 
     peer: str
@@ -79,7 +79,7 @@ class Scene:
         )
 
     def problem(self, path: Path, dns: ProgramRun) -> Path:
-        """Write the problem for the peer, with the steps of a DNS; return the file's path."""
+        """Write the problem of the peer with the steps of a DNS; return the file's path."""
         mesh = read_mesh(path)
         roles = np.array([part.split("@")[0].split("_")[0] for part in mesh.part_names])[mesh.part]
         names, material = np.unique(roles, return_inverse=True)
@@ -120,19 +120,19 @@ SCENES = {
 
 
 def material_text(part: str, materials: Materials) -> str:
-    """Return the material of a part in Akantu's language."""
+    """Return the material of a part in Akantu's input format."""
     material = materials.by_role[part.split("@")[0].split("_")[0]]
     values = {"rho": material.density, "E": material.young_modulus, "nu": material.poisson_ratio}
     return "\n".join([f"material elastic [\n name = {part}", *(f" {key} = {values[key]:.17g}" for key in values), "]"])
 
 
 def centres(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the heights of board and die ``(samples, 2)`` [m] from a history."""
+    """Return the heights of board and die [m], shape (samples, 2), from a history."""
     return np.column_stack([arrays["board_centre"][:, 2], arrays["die_centre"][:, 2]])
 
 
 def compared(scene: Scene) -> tuple[dict, dict]:
-    """Return bars and figures of a scene."""
+    """Return limits and figures of a scene."""
     with tempfile.TemporaryDirectory() as directory:
         path, fine = Path(directory) / "package.msh", Path(directory) / "fine.msh"
         write_msh(conforming_package(), path)
@@ -141,19 +141,19 @@ def compared(scene: Scene) -> tuple[dict, dict]:
         runs = {mode: ProgramRun(scene.request(mode, path)) for mode in MODES}
         plan, histories = runs["dns"].plan, {mode: run.to_end()[0] for mode, run in runs.items()}
         reference = CubicSpline(exact["time"], centres(exact))(histories["dns"]["time"])
-        found = {mode: centres(arrays) for mode, arrays in histories.items()}
+        heights = {mode: centres(arrays) for mode, arrays in histories.items()}
         peer = Peer(f"{scene.peer}_shock", scene.problem(path, runs["dns"]))
-        found[scene.peer] = peer.force
+        heights[scene.peer] = peer.force
         batches = {mode: lambda run=run: run.step(STRETCH) for mode, run in runs.items()}
         seconds = turns.in_turns(batches | {scene.peer: lambda: peer.ask("step") / plan.step})
         peer.end()
-    errors = {name: relative_error(values, reference) for name, values in found.items()}
+    errors = {name: relative_error(values, reference) for name, values in heights.items()}
     rest = {
         "elements": runs["two_scale"].elements,
         "substeps": runs["two_scale"].plan.substeps,
         "seconds_per_simulated_us": {name: 1e-6 * float(np.median(values)) for name, values in seconds.items()},
         "errors": errors,
-        "difference_of_peer_and_dns": relative_error(found[scene.peer], found["dns"]),
+        "difference_of_peer_and_dns": relative_error(heights[scene.peer], heights["dns"]),
         "largest_plastic_strain": float(histories["dns"].get("plastic_strain_max", np.zeros(1)).max()),
     }
     bars = {f"{mode} / {scene.peer}": turns.bar(turns.ratio(seconds, mode, scene.peer), BAR) for mode in MODES}
@@ -169,7 +169,7 @@ def main() -> None:
             bars, result[name] = compared(scene)
             result["bars"] |= bars
     if not result["bars"]:
-        raise SystemExit("no peer can be installed: nothing to compare with")
+        raise SystemExit("no peer can be installed; the benchmark needs one of them")
     results.write_and_print("two_scale_peers", result)
 
 

@@ -1,4 +1,4 @@
-"""From a case file to a drop-shock report; the rooms beside this file are links to those at the top of the checkout.
+"""Solder reflow and drop shock of BGA packages, from a case file to a report.
 
     import reflowshock
 
@@ -7,7 +7,8 @@
     run = case.run("runs/first")  # or, later: reflowshock.Run.open("runs/first")
     run.metrics["peel_stress"], run.joints, run.history["two_scale"]["time"], run.surface("A10")
 
-Importing it loads no numerical library; each of these loads what it needs.
+The import loads no numerical library; each attribute loads its own. The packages in this folder are links to the
+folders at the top of the checkout.
 """
 
 from typing import TYPE_CHECKING, Any

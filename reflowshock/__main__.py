@@ -1,4 +1,4 @@
-"""``python -m reflowshock`` is the command; errors while the program loads are reported, too."""
+"""Entry point of ``python -m reflowshock``; errors during start-up are reported in one line, too."""
 
 from reflowshock.workflow.process.error_exit import handle_signals, one_line_errors
 

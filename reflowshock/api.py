@@ -1,4 +1,4 @@
-"""The program from Python: a case is loaded, planned and run; a run folder is opened and read."""
+"""Python interface: load, plan and run a case; open a run folder and read its results."""
 
 import subprocess
 import sys
@@ -35,19 +35,19 @@ if TYPE_CHECKING:
 
 __all__ = ["Case", "CaseError", "Metric", "Plan", "PlannedStage", "Run", "RunFailed", "UnknownName"]
 
-WIDTH = 120  # of a plan as text
+WIDTH = 120  # line width of a plan as text
 
 
 class UnknownName(LookupError):
-    """A joint, a mode or a folder that does not exist; the message says which name is nearest."""
+    """Unknown name of a joint, mode or folder; the message contains the nearest valid name."""
 
 
 class RunFailed(RuntimeError):
-    """A run that did not complete; the message is the command's."""
+    """Failed run; the message is the error message of the command."""
 
 
 class Metric(NamedTuple):
-    """A number with its SI unit."""
+    """Value with its SI unit."""
 
     value: float | str
     unit: str
@@ -55,13 +55,13 @@ class Metric(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a run would do and cost; printed, it reads as ``reflowshock plan``.
+    """Plan of a run; its text is the output of ``reflowshock plan``.
 
     Attributes:
-        stages: name -> what would be done, in order.
-        effects: name -> whether it acts ("on"), "why", and where it is predicted its "influence" on the results.
-        text: all of it in words.
-        compilation: predicted wall time [s] of kernels that a first run compiles.
+        stages: planned actions by stage, in order.
+        effects: decisions by effect: "on", "why" and, if predicted, "influence" on the results.
+        text: plan as text.
+        compilation: predicted wall time for compiling kernels in a first run [s].
     """
 
     stages: Mapping[str, PlannedStage]
@@ -83,12 +83,12 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A case file with settings, checked.
+    """Checked case file with settings.
 
     Attributes:
-        path: of the file.
-        settings: "dotted.key=value", applied over the file.
-        resolved: every value in SI units.
+        path: path of the case file.
+        settings: "dotted.key=value" settings that override the file.
+        resolved: case with every value in SI units.
     """
 
     path: Path
@@ -101,10 +101,10 @@ class Case:
 
         Args:
             path: TOML file.
-            overrides: dotted key -> value with its unit, as ``{"shock.duration": "2 ms"}``, or "dotted.key=value".
+            overrides: values with units by dotted key, e.g. ``{"shock.duration": "2 ms"}``, or "dotted.key=value".
 
         Raises:
-            CaseError: with all problems found, each with its place in the file, what is allowed, and the nearest name.
+            CaseError: with all problems, their positions in the file, allowed values and nearest valid names.
         """
         pairs = overrides.items() if isinstance(overrides, Mapping) else ()
         settings = tuple(f"{key}={_toml(value)}" for key, value in pairs) or tuple(overrides)
@@ -116,7 +116,7 @@ class Case:
         return self.resolved.case.name
 
     def plan(self, out: str | Path | None = None) -> Plan:
-        """Predict what a run in a folder would do and cost; nothing is run, nothing is written."""
+        """Return the plan of a run in a folder without running or writing anything."""
         store, point = self._store(out), Point({}, self.resolved)
         text = StringIO()
         plan.show_plan(store, point, Console(file=text, width=WIDTH, force_jupyter=False))
@@ -127,19 +127,19 @@ class Case:
     def run(
         self, out: str | Path | None = None, *, until: str = "report", cores: int | None = None, force: bool = False
     ) -> "Run":
-        """Make what is missing, stale or damaged, as ``reflowshock run`` does, in a process of its own.
+        """Run all missing, stale and damaged stages in a subprocess, like ``reflowshock run``.
 
         Args:
-            out: run folder; runs/<name of the case> if it is not given.
-            until: the last stage.
-            cores: to use; all of them if it is not given.
-            force: whether the folder may hold another case, and values may be implausible.
+            out: run folder; None for ``runs/<name of the case>``.
+            until: last stage to run.
+            cores: number of cores; None for all.
+            force: whether to accept a folder with another case, and implausible values.
 
         Returns:
-            The run, also where a health check failed: see ``Run.is_healthy``.
+            The run, even if a health check failed: see ``Run.is_healthy``.
 
         Raises:
-            RunFailed: a stage failed, or the command refused to run.
+            RunFailed: a stage failed, or the command could not start.
         """
         store = self._store(out)
         options = ["--out", str(store.folder), "--until", until, "--yes"]
@@ -161,11 +161,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Run:
-    """A run folder.
+    """Results in a run folder.
 
     Attributes:
-        folder: with the products.
-        case: as it was run, every value in SI units.
+        folder: run folder.
+        case: case of the run with every value in SI units.
     """
 
     folder: Path
@@ -176,14 +176,14 @@ class Run:
         """Open a run folder.
 
         Raises:
-            UnknownName: it is not a run folder; names the nearest one beside it.
-            CaseError: nothing was run in it, or its case is damaged.
+            UnknownName: the folder is not a run folder; the message contains the nearest run folder.
+            CaseError: the folder has no case, or its case is damaged.
         """
         folder = Path(folder)
         mark = read_mark(folder)
         if mark is None or mark["holds"] != "run":
-            beside = folder.parent.iterdir() if folder.parent.is_dir() else ()
-            names = [path.name for path in beside if (read_mark(path) or {}).get("holds") == "run"]
+            siblings = folder.parent.iterdir() if folder.parent.is_dir() else ()
+            names = [path.name for path in siblings if (read_mark(path) or {}).get("holds") == "run"]
             raise UnknownName(f"{folder} is not a run folder{_hint(folder.name, names)}")
         return cls(folder, read_case_of_run(folder))
 
@@ -195,22 +195,22 @@ class Run:
     @property
     def metrics(self) -> Metrics:
         """Results by name, each a ``Metric`` with its unit."""
-        found = self.summary["metrics"].items()
-        return Metrics({name: Metric(one["value"], one["unit"]) for name, one in found})
+        records = self.summary["metrics"].items()
+        return Metrics({name: Metric(record["value"], record["unit"]) for name, record in records})
 
     @property
     def report(self) -> ReportView:
-        """The report, which shows itself in a notebook: tables, charts, the 3D view."""
+        """Report with tables, charts and 3D view, which notebooks display."""
         return ReportView(self._product("report.html"))
 
     @property
     def is_healthy(self) -> bool:
-        """Whether every health check held."""
+        """Whether all health checks passed."""
         return all(check["ok"] for check in self.summary["health"].values())
 
     @cached_property
     def joints(self) -> "pandas.DataFrame":
-        """One row a joint: place, shape, verdict of the reflow, errors, mesh; SI units, contact angles in degrees."""
+        """Table with one row per joint: position, shape, reflow verdict, errors, mesh; SI units, angles in degrees."""
         import pandas
 
         from reflowshock.workflow.package_report.joint_records import joint_records
@@ -225,7 +225,7 @@ class Run:
 
     @cached_property
     def history(self) -> dict[str, dict[str, "np.ndarray"]]:
-        """Histories of each mode (or solver) of the shock: name -> array, "time" [s] among them; SI units."""
+        """Histories by mode (or solver) of the shock: arrays in SI units by name, including "time" [s]."""
         import numpy as np
 
         result = {}
@@ -238,10 +238,10 @@ class Run:
         """Return the closed surface of a joint in its own frame [m]; cell data "boundary": 0 free, 1 board, 2 package.
 
         Raises:
-            UnknownName: there is no such joint; names the nearest one.
+            UnknownName: no surface of this joint exists; the message contains the nearest name.
         """
         path = self.folder / "surface" / f"{joint}.vtu"
-        names = sorted(found.stem for found in path.parent.glob("*.vtu"))
+        names = sorted(file.stem for file in path.parent.glob("*.vtu"))
         if joint not in names:
             raise UnknownName(f"{self.folder} has no surface of a joint {joint!r}{_hint(joint, names)}")
         import pyvista
@@ -255,8 +255,8 @@ class Run:
 
     def _repr_html_(self) -> str:
         picture = self.folder / "geometry/preview.png"
-        shown = picture.read_bytes() if picture.exists() else None
-        return run_html(self.summary, self.case.case.title, shown)
+        content = picture.read_bytes() if picture.exists() else None
+        return run_html(self.summary, self.case.case.title, content)
 
     def _product(self, name: str) -> Path:
         path = self.folder / name
@@ -266,7 +266,7 @@ class Run:
 
 
 def _hint(name: str, names: Sequence[str]) -> str:
-    """Say which name is meant; nothing where there is none."""
+    """Return a hint with the nearest name, or an empty string without names."""
     return f"; did you mean {nearest(name, names) or names[0]}?" if names else ""
 
 
@@ -275,5 +275,5 @@ def _is_scalar(value: object) -> bool:
 
 
 def _toml(value: object) -> str:
-    """Write a value as the option ``--set`` takes it."""
+    """Return a value as text for the option ``--set``."""
     return value if isinstance(value, str) else as_toml(value)

@@ -1,4 +1,4 @@
-"""Types of the arrays that solvers and files hand over: C order, as kernels take them."""
+"""Array types of solvers and files, in C order as required by kernels."""
 
 import numpy as np
 from numpy.typing import NDArray

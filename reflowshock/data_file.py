@@ -1,8 +1,8 @@
-"""Files of data: reading one never runs anything that stands in it.
+"""Data files that can be read without executing any code in them.
 
-The first line has the format and the SHA-256 digest of all that follows, the second a header in JSON. The rest is an
-npz: arrays, and in JSON (`TREE`) how a value is put together of them. Records, dataclasses and pydantic models, stand
-there as their name and fields; a reader lists those that it takes, and makes no others.
+The first line contains the format and the SHA-256 digest of the rest, the second a JSON header. The rest is an npz
+archive with the arrays and a JSON tree (``TREE``) of the value. Records (dataclasses and pydantic models) are stored as
+name and fields; a reader lists the types that it accepts, and creates no others.
 """
 
 import hashlib
@@ -19,24 +19,24 @@ from numpy.typing import NDArray
 
 FORMAT = b"reflowshock data 1, sha256 "
 TREE = "tree"
-KIND = "@"  # key of what JSON does not know
+KIND = "@"  # key that marks types without a JSON equivalent
 LONGEST_LINE = 65536
 
 
 class NotData(ValueError):
-    """A file is broken off, changed, of another format or not of the records that a reader takes."""
+    """Truncated or modified file, another format, or records that the reader does not accept."""
 
 
 def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
-    """Replace a file; a kill at any moment leaves the old one or the new one.
+    """Write a value to a file atomically: after a kill, either the old or the new file exists.
 
     Args:
-        path: file; its folder is made where there is none.
-        header: what `read_header` returns.
+        path: path of the file; a missing folder is created.
+        header: header, which ``read_header`` returns.
         value: arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records.
 
     Raises:
-        TypeError: something in the value is no data; names it.
+        TypeError: a part of the value has an unsupported type; the message names it.
     """
     packing = _Packing()
     tree = np.frombuffer(json.dumps(packing.put(value, "value")).encode(), np.uint8)
@@ -49,19 +49,19 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """Return the header of a file without looking at the rest.
+    """Return the header of a file without reading the rest.
 
     Raises:
-        NotData: there is none.
+        NotData: the file has no valid header.
     """
     try:
         with path.open("rb") as file:
-            known = file.readline(LONGEST_LINE).startswith(FORMAT)
-            header = json.loads(file.readline(LONGEST_LINE)) if known else None
+            has_format = file.readline(LONGEST_LINE).startswith(FORMAT)
+            header = json.loads(file.readline(LONGEST_LINE)) if has_format else None
     except (OSError, ValueError):
         header = None
     if not isinstance(header, dict):
-        raise NotData(f"{path} is broken off, changed or of another format")
+        raise NotData(f"{path} is truncated, modified or of another format")
     return header
 
 
@@ -73,20 +73,20 @@ def read_data(path: Path, records: Collection[type] = ()) -> Any:
         records: dataclasses and pydantic models that may be in it.
 
     Raises:
-        NotData: it is not what was written, or there are other records in it.
+        NotData: the file was modified, or contains records of other types.
     """
     archive = _checked(path)
     try:
         with np.load(io.BytesIO(archive), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         tree = json.loads(arrays.pop(TREE).tobytes())
-        return _taken(tree, arrays, {_name_of(record): record for record in records})
-    except Exception as error:  # whatever it is: `write_data` has not written this
-        raise NotData(f"{path} is not made of what is expected: {type(error).__name__}: {error}") from error
+        return _unpack(tree, arrays, {_name_of(record): record for record in records})
+    except Exception as error:  # any error means that ``write_data`` has not written the file
+        raise NotData(f"{path} has unexpected contents: {type(error).__name__}: {error}") from error
 
 
 def _checked(path: Path) -> memoryview:
-    """Return the npz of a file that is whole."""
+    """Return the npz archive of a file after checking its digest."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -94,12 +94,12 @@ def _checked(path: Path) -> memoryview:
     begin = content.find(b"\n") + 1
     rest = memoryview(content)[begin:]
     if content[:begin] != FORMAT + hashlib.sha256(rest).hexdigest().encode() + b"\n":
-        raise NotData(f"{path} is broken off, changed or of another format")
+        raise NotData(f"{path} is truncated, modified or of another format")
     return rest[content.find(b"\n", begin) + 1 - begin :]
 
 
 def write_at_once(path: Path, *content: bytes | memoryview) -> None:
-    """Replace a file; a kill at any moment leaves the old one or the new one."""
+    """Replace a file atomically: after a kill, either the old or the new file exists."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     with partial.open("wb") as file:
@@ -109,18 +109,18 @@ def write_at_once(path: Path, *content: bytes | memoryview) -> None:
     partial.replace(path)
     descriptor = os.open(path.parent, os.O_RDONLY)
     try:
-        os.fsync(descriptor)  # makes the new name last
+        os.fsync(descriptor)  # flushes the new name to disk
     finally:
         os.close(descriptor)
 
 
 def columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
-    """Return rows that have the same names as arrays by name: a file with few arrays is written fast."""
+    """Return rows with equal keys as one array per key, which is written faster."""
     return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
 
 
 def rows(table: Mapping[str, NDArray]) -> list[dict[str, Any]]:
-    """Return the rows of which `columns` has made a table."""
+    """Return the rows of a table made by ``columns``."""
     parts = [column.tolist() if column.ndim == 1 else list(column) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*parts, strict=True)]
 
@@ -131,7 +131,7 @@ def fields_of(record: object) -> dict[str, Any]:
         return {field.name: getattr(record, field.name) for field in fields(record)}
     if hasattr(record, "model_dump"):
         return record.model_dump()
-    raise TypeError(f"{type(record).__name__} is no data")
+    raise TypeError(f"{type(record).__name__} is not a supported type")
 
 
 def _name_of(record: type) -> str:
@@ -139,64 +139,64 @@ def _name_of(record: type) -> str:
 
 
 class _Packing:
-    """Collects the arrays of a value; one that stands in several places is kept once.
+    """Collector of the arrays in a value; repeated arrays are stored once.
 
     Attributes:
-        arrays: name -> array.
+        arrays: arrays by name.
     """
 
     def __init__(self) -> None:
         self.arrays: dict[str, NDArray] = {}
         self._names: dict[int, str] = {}
 
-    def put(self, value: Any, place: str) -> Any:
-        """Return what JSON says of a value; `place` is where it stands, for names and messages."""
+    def put(self, value: Any, location: str) -> Any:
+        """Return the JSON tree of a value; ``location`` is its path for names and messages."""
         match value:
             case None | bool() | int() | float() | str():
                 return value
             case np.generic():
                 return value.item()
             case np.ndarray():
-                return {KIND: "array", "name": self._put_array(value, place)}
+                return {KIND: "array", "name": self._put_array(value, location)}
             case PurePath():
                 return {KIND: "path", "path": str(value)}
             case list():
-                return [self.put(item, f"{place}/{k}") for k, item in enumerate(value)]
+                return [self.put(item, f"{location}/{k}") for k, item in enumerate(value)]
             case tuple():
-                return {KIND: "tuple", "items": self.put(list(value), place)}
+                return {KIND: "tuple", "items": self.put(list(value), location)}
             case Mapping():
-                return self._put_items(value, place)
-        return {KIND: _name_of(type(value)), "fields": self._put_items(fields_of(value), place)}
+                return self._put_items(value, location)
+        return {KIND: _name_of(type(value)), "fields": self._put_items(fields_of(value), location)}
 
-    def _put_items(self, items: Mapping[str, Any], place: str) -> dict[str, Any]:
+    def _put_items(self, items: Mapping[str, Any], location: str) -> dict[str, Any]:
         odd = [key for key in items if not isinstance(key, str) or key == KIND]
         if odd:
-            raise TypeError(f"{place}: {odd[0]!r} is no name")
-        return {key: self.put(value, f"{place}/{key}") for key, value in items.items()}
+            raise TypeError(f"{location}: {odd[0]!r} is not a valid name")
+        return {key: self.put(value, f"{location}/{key}") for key, value in items.items()}
 
-    def _put_array(self, array: NDArray, place: str) -> str:
+    def _put_array(self, array: NDArray, location: str) -> str:
         if array.dtype.hasobject:
-            raise TypeError(f"{place}: an array of objects is no data")
+            raise TypeError(f"{location}: arrays of objects are not supported")
         if id(array) not in self._names:
-            name = place if place not in self.arrays else f"{place}~{len(self.arrays)}"
+            name = location if location not in self.arrays else f"{location}~{len(self.arrays)}"
             self.arrays[name], self._names[id(array)] = array, name
         return self._names[id(array)]
 
 
-def _taken(tree: Any, arrays: Mapping[str, NDArray], records: Mapping[str, type]) -> Any:
-    """Put a value together."""
+def _unpack(tree: Any, arrays: Mapping[str, NDArray], records: Mapping[str, type]) -> Any:
+    """Rebuild a value from its JSON tree and arrays."""
     if isinstance(tree, list):
-        return [_taken(item, arrays, records) for item in tree]
+        return [_unpack(item, arrays, records) for item in tree]
     if not isinstance(tree, dict):
         return tree
     match tree.get(KIND):
         case None:
-            return {key: _taken(value, arrays, records) for key, value in tree.items()}
+            return {key: _unpack(value, arrays, records) for key, value in tree.items()}
         case "array":
             return arrays[tree["name"]]
         case "path":
             return Path(tree["path"])
         case "tuple":
-            return tuple(_taken(tree["items"], arrays, records))
+            return tuple(_unpack(tree["items"], arrays, records))
         case kind:
-            return records[kind](**_taken(tree["fields"], arrays, records))
+            return records[kind](**_unpack(tree["fields"], arrays, records))

@@ -1,4 +1,4 @@
-"""Effects: physics that a scene may call for. Each is one class in the list of its kind; one that is off is absent."""
+"""Effects: optional physics of a scene, each a class; inactive effects are absent from the solver."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ GIVEN = "none: the case says it"
 
 
 class Decision(TypedDict):
-    """Whether an effect acts, why, and how much of the answer it is expected to change, or would, where predicted."""
+    """Decision on an effect: state, reason and, if predicted, its expected relative influence on the result."""
 
     on: bool
     why: str
@@ -21,16 +21,16 @@ class Decision(TypedDict):
 
 
 def decision(on: bool, why: str, influence: float | None = None) -> Decision:
-    """Return a decision as plans and results tell it."""
-    found: Decision = {"on": bool(on), "why": why}
+    """Return a decision as a plain dictionary for plans and results."""
+    result: Decision = {"on": bool(on), "why": why}
     if influence is not None:
-        found["influence"] = float(influence)
-    return found
+        result["influence"] = float(influence)
+    return result
 
 
 @dataclass(frozen=True, slots=True)
 class Toggle:
-    """The dotted key of a case that switches an effect, and its values with it and without it."""
+    """Dotted key of a case that toggles an effect, and its values with and without the effect."""
 
     key: str
     on: object
@@ -38,20 +38,20 @@ class Toggle:
 
 
 class Effect(ABC, Generic[Scene]):
-    """An effect. Those without a ``place`` are loads or parts of the method, not on the page of all effects.
+    """Effect of the model. Effects without a ``place`` are loads or parts of the method and not listed.
 
     Attributes:
-        name: As in plans, reports and ``summary.json``.
-        stage: In which it acts.
-        adds: What it adds to the equations.
-        number: Its dimensionless number.
-        influence: Expected relative change of the answer, as a formula of the number.
+        name: Name in plans, reports and ``summary.json``.
+        stage: Stage in which it acts.
+        adds: Term that it adds to the equations.
+        number: Dimensionless number that decides on it.
+        influence: Expected relative change of the result, as a formula of the number.
         place: Dotted name of the object that acts, or of the function that decides.
-        switch: The key of a case file, and its values.
-        source: Of the number or the law.
+        switch: Key of the case file, and its values.
+        source: Source of the number or the law.
         acts: Whether it acts above or below the threshold.
-        threshold: Of the number; None where the case says itself whether the effect is there.
-        toggle: What switches it in a case whose forecast knows its cost; None elsewhere.
+        threshold: Threshold of the number; None if the case specifies the effect explicitly.
+        toggle: Key and values that toggle it, if the forecast includes its cost, otherwise None.
     """
 
     name: str
@@ -68,15 +68,15 @@ class Effect(ABC, Generic[Scene]):
 
     @abstractmethod
     def decide(self, scene: Scene) -> Decision:
-        """Decide whether a scene calls for it."""
+        """Decide whether the effect acts in a scene."""
 
     def other_way(self, case: Any, acts: bool) -> Any | None:
-        """Return a case without the effect if it acts there, else with it; None if no forecast knows its cost."""
+        """Return the case with the effect toggled, or None if its cost cannot be predicted."""
         if self.toggle is None:
             return None
         return changed(case, self.toggle.key, self.toggle.off if acts else self.toggle.on)
 
 
 def decided(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
-    """Decide on the effects of a list; return name -> decision."""
+    """Return the decisions on a list of effects, by name."""
     return {effect.name: effect.decide(scene) for effect in effects}

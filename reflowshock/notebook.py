@@ -1,4 +1,4 @@
-"""How cases, plans and runs show themselves in a notebook: HTML of texts that are escaped, no numerical library."""
+"""HTML of cases, plans and runs for notebooks, with escaped texts and without numerical libraries."""
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,16 +7,16 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-FIRST = 24  # rows of a table that are shown unfolded
-HEIGHT = 720  # of a report in a notebook [px]
+FIRST = 24  # maximum number of rows of an unfolded table
+HEIGHT = 720  # height of a report in a notebook [px]
 
 
 @dataclass(frozen=True, slots=True)
 class ReportView:
-    """A report that shows itself, 3D view and all; its scripts reach nothing but the report.
+    """Report for a notebook, including its 3D view, in a sandboxed frame.
 
     Attributes:
-        path: of ``report.html``.
+        path: path of ``report.html``.
     """
 
     path: Path
@@ -28,20 +28,20 @@ class ReportView:
 
 
 class Metrics(dict):
-    """Results by name, each with its unit; it shows itself as a table."""
+    """Metrics by name, displayed as a table in notebooks."""
 
     def _repr_html_(self) -> str:
-        records = {name: {"value": found.value, "unit": found.unit} for name, found in self.items()}
+        records = {name: {"value": metric.value, "unit": metric.unit} for name, metric in self.items()}
         return _metrics(records)
 
 
 def case_html(name: str, title: str, values: Mapping[str, Any]) -> str:
-    """Return a case: its title, and every value, folded."""
+    """Return the HTML of a case: title and folded table of all parameters."""
     return heading(name, title) + folded(f"{len(values)} parameters", table(("key", "value"), values.items()), False)
 
 
 def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]], seconds: float) -> str:
-    """Return a plan: what each stage would do and cost, and which effects act."""
+    """Return the HTML of a plan: actions and costs of stages, and active effects."""
     from reflowshock.workflow.case.text import duration
 
     rows = [
@@ -50,23 +50,23 @@ def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]
         else (name, "skip", "", stage.why)
         for name, stage in stages.items()
     ]
-    rows.append(("all", "", duration(seconds) if seconds else "", "with nothing else to do"))
-    acting = [(_words(name), "on" if found["on"] else "off", found["why"]) for name, found in effects.items()]
-    shown = table(("stage", "", "predicted", "why"), rows)
-    return shown + folded(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
+    rows.append(("all", "", duration(seconds) if seconds else "", "on an otherwise idle machine"))
+    acting = [(_words(name), "on" if decision["on"] else "off", decision["why"]) for name, decision in effects.items()]
+    stage_table = table(("stage", "", "predicted", "why"), rows)
+    return stage_table + folded(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
 
 
 def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> str:
-    """Return a run: its answer, its figures, its health, and a picture of the meshes where there is one.
+    """Return the HTML of a run: answer, health checks, picture of the meshes and metrics.
 
     Args:
-        summary: of ``summary.json``.
-        title: of the case.
-        picture: as PNG.
+        summary: contents of ``summary.json``.
+        title: title of the case.
+        picture: PNG data, or None.
     """
     missed = [_words(name) for name, check in summary["health"].items() if not check["ok"]]
-    held = f"all {len(summary['health'])} health checks held"
-    health = f"health checks missed: {', '.join(missed)}" if missed else held
+    held = f"all {len(summary['health'])} health checks passed"
+    health = f"health checks failed: {', '.join(missed)}" if missed else held
     parts = [heading(summary["case"], title), _paragraph(summary.get("answer", "")), _paragraph(health)]
     if picture is not None:
         encoded = base64.b64encode(picture).decode()
@@ -75,24 +75,24 @@ def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> s
 
 
 def heading(name: str, title: str) -> str:
-    """Return a case's name and title."""
+    """Return the HTML of name and title of a case."""
     return f"<p><b>{escape(name)}</b> {escape(title)}</p>"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table of texts."""
+    """Return the HTML of a table of texts."""
     cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
-    titles = "".join(f"<th>{escape(one)}</th>" for one in head)
+    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{cells}</tbody></table>"
 
 
 def folded(title: str, inside: str, opened: bool = True) -> str:
-    """Return something that a click unfolds."""
+    """Return the HTML of a collapsible section."""
     return f"<details{' open' if opened else ''}><summary>{escape(title)}</summary>{inside}</details>"
 
 
 def _metrics(records: Mapping[str, dict]) -> str:
-    """Return metrics, each with its value and unit, in units that engineers read; many are folded."""
+    """Return the HTML of metrics in customary units, folded if there are many."""
     from reflowshock.workflow.report.tables import named_quantity
 
     rows = [(_words(name), named_quantity(dict(records), name)) for name in records]

@@ -1,4 +1,4 @@
-"""The base of all models of parameters."""
+"""Base class of all parameter models."""
 
 from typing import Any
 
@@ -6,12 +6,12 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Parameters(BaseModel):
-    """Immutable; unknown keys are errors."""
+    """Immutable parameter model in which unknown keys are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 def changed(model: BaseModel, key: str, value: object) -> Any:
-    """Return a model with another value at a dotted key; nothing is checked."""
+    """Return a copy of a model with another value at a dotted key, without validation."""
     name, _, rest = key.partition(".")
     return model.model_copy(update={name: changed(getattr(model, name), rest, value) if rest else value})

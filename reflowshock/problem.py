@@ -1,4 +1,4 @@
-"""One mistake in what the program is given, as the user reads it: the same record for all packages."""
+"""Input errors of all packages and their text for users."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 from reflowshock.names import nearest
 
-LONGEST = 120  # characters of a value or key in a message
+LONGEST = 120  # maximum length of a value or key in a message
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake in a case file or on the command line.
+    """Input error in a case file or on the command line.
 
     Attributes:
-        key: dotted key, e.g. "package.pitch"; empty where the file as a whole is meant.
-        message: what is wrong.
-        value: the value as the user wrote it; None where a value is missing.
+        key: dotted key, e.g. "package.pitch"; empty for errors of the whole file.
+        message: description of the error.
+        value: value as written by the user; None for a missing value.
         allowed: allowed range or dimension, or empty.
-        hint: the nearest valid name, or empty.
-        line: where the key stands in its file, from 1 on; None where it is not known.
-        column: the same in the line.
+        hint: nearest valid name, or empty.
+        line: line of the key in its file, counted from 1; None if unknown.
+        column: column of the key, counted from 1; None if unknown.
     """
 
     key: str
@@ -33,8 +33,8 @@ class Problem:
 
     def __str__(self) -> str:
         key = shortened(self.key)
-        place = key if self.value is None else f"{key} = {shortened(as_toml(self.value))}"
-        parts = [": ".join(part for part in (place, self.message) if part)]
+        location = key if self.value is None else f"{key} = {shortened(as_toml(self.value))}"
+        parts = [": ".join(part for part in (location, self.message) if part)]
         if self.allowed:
             parts.append(f"allowed: {self.allowed}")
         if self.hint:
@@ -43,7 +43,7 @@ class Problem:
 
     @property
     def position(self) -> str:
-        """Return ":line:column", as editors read it; empty where it is not known."""
+        """Position in the form ":line:column" that editors understand; empty if unknown."""
         return "" if self.line is None else f":{self.line}:{self.column or 1}"
 
 
@@ -55,7 +55,7 @@ def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterat
 
 
 def as_toml(value: object) -> str:
-    """Write a value as a user wrote it in TOML; of a table only that it is one."""
+    """Return a value as TOML text; tables are abbreviated."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -64,16 +64,16 @@ def as_toml(value: object) -> str:
         return "{ … }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(as_toml(item) for item in value) + "]"
-    if isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to write those of thousands of digits
+    if isinstance(value, int) and value.bit_length() > 1000:  # Python does not convert integers of thousands of digits
         return f"{'-' if value < 0 else ''}{abs(value) >> (value.bit_length() - 30)}…"
     return str(value)
 
 
 def shortened(text: str) -> str:
-    """Cut a text that would fill the terminal."""
+    """Return a text cut to at most ``LONGEST`` characters."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def one_line(text: str) -> str:
-    """Write characters that move the cursor, or that no terminal shows, as their escapes."""
+    """Replace unprintable characters, such as control characters, by escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -1,4 +1,4 @@
-"""The one pool of processes: `concurrent.futures`, and nothing is left behind by an error, an interrupt or a kill."""
+"""Process pool based on ``concurrent.futures`` that leaves no process behind after an error, interrupt or kill."""
 
 import multiprocessing
 import os
@@ -13,13 +13,13 @@ SPAWN = multiprocessing.get_context("spawn")  # a fork would share locks, thread
 
 
 class ProcessPool(ProcessPoolExecutor):
-    """Processes for a block: its end waits for them, an error or an interrupt in it kills them.
+    """Process pool of a block: its end waits for the processes, an error or interrupt kills them.
 
-    They also end when this process is killed. Only this process takes note of Ctrl-C, and then leaves the block.
+    The processes also end when this process is killed. They ignore Ctrl-C, which this process handles.
     """
 
     def __init__(self, workers: int, initializer: Callable[..., Any] | None = None, initargs: tuple = ()) -> None:
-        """Take the number of processes, and what each calls first, with which arguments."""
+        """Store the number of processes and the function, with arguments, that each calls first."""
         super().__init__(workers, SPAWN, _begin, (initializer, initargs))
 
     def __exit__(
@@ -35,11 +35,11 @@ class ProcessPool(ProcessPoolExecutor):
             raise
 
     def ending(self) -> str:
-        """Say how the processes of a broken pool have ended."""
+        """Describe how the processes of a broken pool ended."""
         processes = self._own()
-        self.shutdown()  # its thread reaps them: whoever also waits for one may be told no exit code
-        # The pool itself terminates the others.
-        code = next((one.exitcode for one in processes if one.exitcode not in (0, -signal.SIGTERM)), None)
+        self.shutdown()  # its thread reaps the processes; a second wait could miss the exit code
+        # The pool itself terminates the remaining processes with SIGTERM.
+        code = next((process.exitcode for process in processes if process.exitcode not in (0, -signal.SIGTERM)), None)
         killed = ": it was killed, as the system does when memory is short" if code == -signal.SIGKILL else ""
         return f"exit code {code}{killed}"
 
@@ -48,7 +48,7 @@ class ProcessPool(ProcessPoolExecutor):
             process.kill()
 
     def _own(self) -> list[Any]:
-        """Return the processes, which are public from Python 3.14 on only (``kill_workers``)."""
+        """Return the processes, which have no public interface before Python 3.14 (``kill_workers``)."""
         return list((self._processes or {}).values())
 
 
@@ -60,7 +60,7 @@ def _begin(initializer: Callable[..., Any] | None, initargs: tuple) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until the parent has ended, then end this process: it would compete with those of the run that continues."""
+    """Wait for the end of the parent, then end this process, which would compete with a continued run."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,4 +1,4 @@
-"""Quantities among parameters: text with a unit in a case file, floats in SI units in the program."""
+"""Quantities of parameter models: text with a unit in a case file, SI floats in the program."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +11,12 @@ from reflowshock import units
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Annotation of a float, or of a tuple of floats, that has a dimension: ``Annotated[float, Quantity("mm")]``.
+    """Annotation of a float or a tuple of floats with a dimension: ``Annotated[float, Quantity("mm")]``.
 
-    Models hold SI floats and check their ranges in them. A case file may use any unit of the same dimension.
+    Models store SI floats and validate their ranges. A case file may use any unit of the same dimension.
 
     Attributes:
-        unit: in which a user sees the value, e.g. "mm".
+        unit: unit for displaying values, e.g. "mm".
     """
 
     unit: str
@@ -28,15 +28,15 @@ class Quantity:
 
     @property
     def described(self) -> str:
-        """What a user may write, in words."""
+        """Description for users, such as "length, e.g. in mm"."""
         return f"{self.dimension}, e.g. in {self.unit}"
 
     def to_si(self, text: object) -> float:
-        """Convert what a case file has, e.g. "0.48 mm"; raise UnitError, in words, where it is no such quantity."""
+        """Convert text of a case file, e.g. "0.48 mm", to an SI float; raise UnitError if it is not a quantity."""
         return units.to_si(text, self.unit)
 
     def text(self, value: float, digits: int = 10) -> str:
-        """Write an SI value as a case file has it."""
+        """Return an SI value as text with unit."""
         return units.from_si(value, self.unit, digits)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:

@@ -1,15 +1,15 @@
-"""The sources of packages, to which checkpoints and compiled kernels belong."""
+"""Digest of source files, which identifies checkpoints and compiled kernels."""
 
 import hashlib
 from pathlib import Path
 
-MATERIALS = Path(__file__).parent / "materials"  # laws that solvers compile
+MATERIALS = Path(__file__).parent / "materials"  # material laws compiled into kernels
 
 
 def digest_of_sources(*folders: Path) -> bytes:
-    """Return a digest of all Python files below some folders: constants and decorators of a kernel are anywhere."""
-    found = hashlib.sha256()
+    """Return a digest of all Python files below some folders, since kernels use constants of any module."""
+    sha256 = hashlib.sha256()
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
-            found.update(path.read_bytes())
-    return found.digest()
+            sha256.update(path.read_bytes())
+    return sha256.digest()

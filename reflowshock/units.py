@@ -1,4 +1,4 @@
-"""Units: strings such as "0.48 mm" become SI floats, once, and SI floats become such strings again."""
+"""Units: conversion of strings such as "0.48 mm" to SI floats and back."""
 
 import math
 import re
@@ -6,44 +6,44 @@ from decimal import Decimal
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # it takes longer to load than the parameters of a rank, which never converts anything
+if TYPE_CHECKING:  # slow to load, and not needed by MPI ranks
     import pint
 
-# The digits of a number are counted: a pattern without bounds takes minutes for a megabyte of them.
+# Bounded repetitions, since unbounded ones would take minutes for a megabyte of digits.
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})(?:[eE][-+]?[0-9]{1,9})?)"
     r"\s*(?P<unit>(?:\S(?:.*\S)?)?)\s*"
 )
-PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")  # as JSON schemas have it, without names of groups
+PATTERN = re.sub(r"\?P<\w+>", "", f"^{QUANTITY.pattern}$")  # for JSON schemas, without group names
 COMMA = re.compile(r",\s*[0-9]")  # after the digits of a number: decimals, or thousands
 FACTOR = r"[^\W\d]\w*(?:(?:\^|\*\*)-?\d)?"
 UNIT = re.compile(rf"(?:1?\s*/\s*)?{FACTOR}(?:\s*[*/]\s*{FACTOR})*")
 FLOAT_MAX, LARGEST_EXPONENT = 1.0e308, 1000
-LONGEST = 1000  # characters of a quantity
+LONGEST = 1000  # maximum length of a quantity
 LONGEST_UNIT = 64
-# As people write units, and as pint reads them.
+# Spellings of units by users and in pint.
 SPELLINGS = {"°C": "degC", "℃": "degC", "°F": "degF", "°": "deg", "µ": "u", "μ": "u", "·": "*", "²": "^2", "³": "^3"}
-# Pint counts bits, percents and turns alike, as pure numbers.
+# Pint treats bits, per cent and turns as pure numbers.
 ANGLES = ("radian", "milliradian", "degree", "grade", "turn", "arcminute", "arcsecond")
-# What may stand in a unit of the wanted dimension, though it is a pure number itself.
+# Pure numbers that are allowed as factors in units of a dimension.
 PURE_FACTORS = {"angle": ANGLES, "frequency": ("radian", "turn", "degree"), "thermal expansion": ("ppm", "percent")}
 
 
 class UnitError(ValueError):
-    """A value that is not a number with a unit of the wanted dimension."""
+    """Invalid quantity: not a number with a unit of the expected dimension."""
 
 
 @cache
 def registry() -> "pint.UnitRegistry":
-    """Return the unit registry; G is the standard acceleration of gravity, as in shock specifications, mil a thou."""
+    """Return the unit registry; G is the standard acceleration of gravity, and mil is 0.001 inch."""
     import pint
 
-    # Decimals: "0.04 mm" and "40 um" are the same float, the one nearest to 4e-5.
+    # With decimals, "0.04 mm" and "40 um" give the same float.
     units: pint.UnitRegistry = pint.UnitRegistry(
         on_redefinition="ignore", autoconvert_offset_to_baseunit=True, non_int_type=Decimal
     )
     units.define("standard_gravity = 9.80665 * meter / second**2 = G")
-    units.define("thou = 0.001 * inch = mil = th")  # as in board drawings; pint's mil is an angle of the artillery
+    units.define("thou = 0.001 * inch = mil = th")  # as in board drawings; in pint, mil is an angle
     return units
 
 
@@ -52,7 +52,7 @@ def to_si(text: object, unit: str) -> float:
 
     Args:
         text: a number and a unit, e.g. "0.48 mm".
-        unit: any unit of the wanted dimension, e.g. "m".
+        unit: any unit of the expected dimension, e.g. "m".
 
     Returns:
         The float nearest to the value in SI base units (rad for angles, K for temperatures and for differences, e.g.
@@ -72,7 +72,7 @@ def to_si(text: object, unit: str) -> float:
         raise UnitError(f'needs a unit, such as "{match["number"]} {unit}"')
     parsed = _parse_unit(match["unit"], unit)
     number = Decimal(match["number"])
-    # Nine digits of exponent are more than decimals bear beside a unit.
+    # Decimal arithmetic overflows at exponents of nine digits.
     value = float(number) if abs(number.adjusted()) > LARGEST_EXPONENT else float(_in_base_units(number, parsed))
     if not math.isfinite(value):
         raise UnitError("is not finite")
@@ -87,7 +87,7 @@ def quantity_in_si(value: float, unit: str) -> float:
 
 
 def from_si(value: float, unit: str, digits: int = 10) -> str:
-    """Write an SI value in a unit, e.g. ``from_si(4.8e-4, "mm")`` is "0.48 mm"."""
+    """Return an SI value as text in a unit, e.g. ``from_si(4.8e-4, "mm")`` is "0.48 mm"."""
     return f"{in_unit(value, unit):.{digits}g} {unit}"
 
 
@@ -101,21 +101,21 @@ def in_unit(value: float, unit: str) -> float:
 
 @lru_cache(maxsize=1024)
 def _with_its_base(unit: str) -> "tuple[pint.Unit, pint.Unit]":
-    """Return a unit, and that of its dimension in SI base units."""
+    """Return a unit and the SI base unit of the same dimension."""
     parsed = registry().Unit(unit)
     return parsed, registry().Unit(registry().get_base_units(parsed)[1])
 
 
 @lru_cache(maxsize=1024)
 def dimension(unit: "str | pint.Unit") -> str:
-    """Name the dimension of a unit: "length" for "mm", "acceleration" for "G"; else its formula."""
-    wanted = registry().Unit(unit)
-    if wanted.dimensionless:
-        return "angle" if str(wanted) in ANGLES else "pure number"
+    """Return the name of a unit's dimension, such as "length" for "mm", or its formula."""
+    parsed = registry().Unit(unit)
+    if parsed.dimensionless:
+        return "angle" if str(parsed) in ANGLES else "pure number"
     for name, example in KINDS.items():
-        if registry().Unit(example).dimensionality == wanted.dimensionality:
+        if registry().Unit(example).dimensionality == parsed.dimensionality:
             return name
-    return str(wanted.dimensionality).replace("[", "").replace("]", "")
+    return str(parsed.dimensionality).replace("[", "").replace("]", "")
 
 
 KINDS = {
@@ -139,33 +139,33 @@ KINDS = {
 
 
 @lru_cache(maxsize=1024)
-def _parse_unit(text: str, wanted: str) -> "pint.Unit":
+def _parse_unit(text: str, target: str) -> "pint.Unit":
     import pint
 
-    expected = f"expected {_article(dimension(wanted))}, e.g. in {wanted}"
+    expected = f"expected {_article(dimension(target))}, e.g. in {target}"
     spelled = text
     for written, read in SPELLINGS.items():
         spelled = spelled.replace(written, read)
-    names = re.findall(r"[^\W\d]\w*", spelled)  # "¼" is a letter to a pattern, and no name
+    names = re.findall(r"[^\W\d]\w*", spelled)  # "¼" matches as a letter but is not a valid name
     if len(spelled) > LONGEST_UNIT or UNIT.fullmatch(spelled) is None or not all(map(str.isidentifier, names)):
         raise UnitError(f'"{text[:LONGEST_UNIT]}" is not a unit; {expected}')
     try:
         parsed = registry().parse_units(re.sub(r"^1?\s*/", "1/", spelled))
     except pint.UndefinedUnitError as error:
         raise UnitError(f'"{text}" is not a known unit; {expected}') from error
-    except (pint.PintError, ValueError, TypeError, ArithmeticError) as error:  # pint evaluates products and powers
+    except (pint.PintError, ValueError, TypeError, ArithmeticError) as error:  # errors in products and powers
         raise UnitError(f'"{text}" is not a unit; {expected}') from error
-    if parsed.dimensionality != registry().Unit(wanted).dimensionality or parsed == registry().Unit(""):
+    if parsed.dimensionality != registry().Unit(target).dimensionality or parsed == registry().Unit(""):
         raise UnitError(f"is {_article(dimension(parsed))}; {expected}")
-    # An angle has no dimension in SI; yet "1", "5 percent" and "3 bit" are not angles, nor is "1 mm*deg" a length.
+    # Angles are dimensionless in SI, but "1", "5 percent" and "3 bit" are not angles, and "1 mm*deg" is not a length.
     pure = [name for name in dict(registry().Quantity(1, parsed).unit_items()) if registry().Unit(name).dimensionless]
-    if foreign := [name for name in pure if name not in PURE_FACTORS.get(dimension(wanted), ())]:
+    if foreign := [name for name in pure if name not in PURE_FACTORS.get(dimension(target), ())]:
         raise UnitError(f'"{text}" contains the bare number {foreign[0]}; {expected}')
     return parsed
 
 
 def _in_base_units(number: Decimal, unit: "pint.Unit") -> Decimal:
-    """Convert a number; UnitError where the unit has a zero of its own inside a product, as degC/m."""
+    """Convert a number to SI base units; raise UnitError for products with offset units, such as degC/m."""
     import pint
 
     try:

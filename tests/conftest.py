@@ -1,6 +1,6 @@
-"""Before any test is loaded: compiled kernels belong to their sources, as in the command. Then: runs that tests share.
+"""Set-up of all tests: kernel cache, order of the test files, and shared runs.
 
-Tests that change a shared run work on copies of it.
+Kernels are compiled into the same folders as by the command. Tests that change a shared run work on copies of it.
 """
 
 import os
@@ -16,10 +16,10 @@ from tests.support.shared_run import shared_run
 
 choose_kernel_folder()
 compile_once()
-os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: ranks that wait leave them to others
+os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: waiting ranks yield
 
-# Two workers begin with these: one compiles kernels while the other needs none. Then what takes long comes first, and
-# many short files come last, which keep all workers at work to the end.
+# Two workers begin with the first two: one compiles kernels while the other needs none. Then long files come first, and
+# many short files come last, which keep all workers busy to the end.
 ORDER = (
     "tests/verification/test_effects.py", "tests/unit/test_code.py", "tests/unit/workflow/", "tests/pipeline/",
     "tests/faults/", "tests/mpi/", "tests/stability/", "cases/hard/", "tests/verification/",
@@ -28,25 +28,25 @@ ORDER = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort files, which workers are given in this order."""
+    """Sort the test files into the order in which workers receive them."""
     items.sort(key=lambda item: next((k for k, begin in enumerate(ORDER) if item.nodeid.startswith(begin)), len(ORDER)))
 
 
 @pytest.fixture(scope="session")
 def first_run(tmp_path_factory, worker_id) -> tuple[Path, subprocess.CompletedProcess]:
-    """The run folder of the shortened case, and how its run ended."""
+    """Return the run folder of the shortened case and its completed process."""
     return shared_run("small", tmp_path_factory, worker_id)
 
 
 @pytest.fixture
 def run_folder(first_run, tmp_path) -> Path:
-    """A copy of the run folder of the shortened case, with its modification times."""
+    """Return a copy of the run folder of the shortened case, with its modification times."""
     return shutil.copytree(first_run[0], tmp_path / "small")
 
 
 @pytest.fixture
 def drop_folder(tmp_path_factory, worker_id, tmp_path) -> Path:
-    """A copy of the run folder of a drop of 125 particles."""
+    """Return a copy of the run folder of a drop of 125 particles."""
     folder, ended = shared_run("drop", tmp_path_factory, worker_id)
     assert ended.returncode == 0, ended.stderr
     return shutil.copytree(folder, tmp_path / "run")
@@ -54,7 +54,7 @@ def drop_folder(tmp_path_factory, worker_id, tmp_path) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread() -> None:
-    """Workers share the cores: loops on two threads each would wait for each other, which costs a tenth of all time."""
+    """Run loops on one thread: threads of workers that share the cores would cost a tenth of the time."""
     import numba
 
     numba.set_num_threads(1)
@@ -62,7 +62,7 @@ def one_thread() -> None:
 
 @pytest.fixture
 def every_thread():
-    """Return how many threads there are; afterwards loops run on one again."""
+    """Yield the number of threads; afterwards loops run on one thread again."""
     import numba
 
     yield numba.config.NUMBA_NUM_THREADS

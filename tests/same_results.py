@@ -1,14 +1,13 @@
-"""Small cases of every kind, run by two systems or two checkouts, whose results must agree.
+"""Small cases of every kind, run on two systems or by two checkouts, whose results must agree.
 
     python -m tests.same_results run FOLDER [--checkout FOLDER]
     python -m tests.same_results compare FOLDER FOLDER [--exactly]
 
-Two systems: metrics agree to a relative difference of 1e-6; those without a unit also if they differ by less than 1e-6
-(errors and residuals are near zero, and what they are relative to is one). Two checkouts on one system: every metric
-and every array of histories, shapes and meshes is equal to the bit; on two ranks, whose shares of the mesh follow
-speeds measured at the start, to 1e-6, but for the energy balance, which is their rounding. Words and counts are the
-same. Only what the machine decides is left out: times, speeds, shares of time, and how its library of solvers stores a
-factor.
+Two systems: metrics agree to a relative difference of 1e-6. Metrics without a unit may also differ by 1e-6, since
+errors and residuals are near zero and relative to one. Two checkouts on one system: every metric and every array of
+histories, shapes and meshes is equal to the bit. Runs on two ranks agree to 1e-6, since the shares of the mesh follow
+speeds measured at the start; their energy balance, which is rounding, is not compared. Texts and counts are equal.
+Times, speeds, shares of time and the storage of factors are not compared.
 """
 
 import argparse
@@ -27,12 +26,12 @@ ROOT = Path(__file__).resolve().parents[1]
 TOLERANCE = 1e-6
 MEASURED_UNITS = {"1/s", "MB", "B"}
 MEASURED = ("seconds", "time_ratio", "core_ratio", "per_second", "factor_", "busy_share", "coupling_overhead")
-ONE_RANK = ("shock.ranks.total=1",)  # the shares of two follow speeds that are measured
+ONE_RANK = ("shock.ranks.total=1",)  # on two ranks the shares follow measured speeds
 HEATED = (
     "warpage.corner=0 mm", "thermal.melting=100 degC", "thermal.peak=200 degC", "thermal.solidification=200 degC",
     "thermal.steps=1", "thermal.effects.solder_force=on", "solder.numerics.time_step_limit=100",
 )  # fmt: skip
-# A drop in which solder that has cooled hardly flows would amplify rounding: its plastic work starts with the drop.
+# With a weak pulse the cooled solder would hardly flow and amplify rounding: its plastic work starts with the drop.
 COOLED = (
     "thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "materials.solder=SAC405",
     "shock.numerics.plasticity=on", "shock.peak_acceleration=15000 G",
@@ -82,13 +81,14 @@ EVERY_CASE = CASES | {
 
 
 def run_cases(folder: Path, checkout: Path, names: list[str]) -> int:
-    """Run the cases by the program of a checkout, each in a folder of its own; return how many have no summary."""
+    """Run the cases by the program of a checkout, each in its own folder; return the number without a summary."""
     missing = 0
     for name in names:
         path, settings = EVERY_CASE[name]
         line = [sys.executable, "-m", "workflow", "run", str(checkout / path), "--out", str(folder.resolve() / name)]
         line += [item for setting in settings for item in ("--set", setting)]
-        begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout)}
+        # Numba orders reassociated sums by sets of names: without a fixed seed each compilation rounds in its own way.
+        begin, environment = time.perf_counter(), os.environ | {"PYTHONPATH": str(checkout), "PYTHONHASHSEED": "0"}
         result = subprocess.run(line, capture_output=True, text=True, cwd=checkout, env=environment, check=False)
         complete = (folder / name / "summary.json").exists()
         print(f"{name:18}{time.perf_counter() - begin:6.0f} s  {'ran' if complete else 'FAILED'}", flush=True)
@@ -99,7 +99,7 @@ def run_cases(folder: Path, checkout: Path, names: list[str]) -> int:
 
 
 def differences(first: dict, second: dict) -> Iterator[tuple[str, object, object, float]]:
-    """Yield each metric of two summaries with both values and their difference in units of what is allowed."""
+    """Yield name, both values and difference over tolerance of each metric of two summaries."""
     first, second = first["metrics"], second["metrics"]
     for name in sorted(first.keys() | second.keys()):
         unit = (first.get(name) or second[name])["unit"]
@@ -115,22 +115,22 @@ def differences(first: dict, second: dict) -> Iterator[tuple[str, object, object
 
 
 def compare(first: Path, second: Path, names: list[str]) -> int:
-    """Print how far the results of two systems are apart; return how many metrics differ by more than allowed."""
+    """Print the differences between the results of two systems; return the number of metrics beyond tolerance."""
     count = 0
     for name in names:
         ours, theirs = (json.loads((folder / name / "summary.json").read_text()) for folder in (first, second))
-        found = list(differences(ours, theirs))
-        worst = max(found, key=lambda item: item[3])
-        print(f"{name:18}{len(found):4} metrics, most apart {worst[0]}: {worst[3] * TOLERANCE:.1e}")
-        for metric, value, other, excess in found:
-            if not excess <= 1.0:  # nan is no agreement
+        metrics = list(differences(ours, theirs))
+        worst = max(metrics, key=lambda item: item[3])
+        print(f"{name:18}{len(metrics):4} metrics, largest difference {worst[0]}: {worst[3] * TOLERANCE:.1e}")
+        for metric, value, other, excess in metrics:
+            if not excess <= 1.0:  # also true for nan
                 count += 1
                 print(f"    {metric}: {value} and {other}, {excess * TOLERANCE:.1e} apart")
     return count
 
 
 def arrays(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of a run folder: histories, shapes, meshes (their text), by file and name in it."""
+    """Yield the arrays of a run folder (histories, shapes, meshes as text) by file and name."""
     for path in sorted(folder.rglob("*")):
         file = str(path.relative_to(folder))
         if ".store" in path.parts or not path.is_file():
@@ -149,7 +149,7 @@ def arrays(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def compare_exactly(first: Path, second: Path, names: list[str]) -> int:
-    """Print which arrays and metrics of two checkouts differ at all; return how many do."""
+    """Print the arrays and metrics of two checkouts that differ; return their number."""
     count = 0
     for name in names:
         tolerance = TOLERANCE if name.endswith("_ranks") else 0.0
@@ -169,7 +169,7 @@ def compare_exactly(first: Path, second: Path, names: list[str]) -> int:
 
 
 def distance(first: np.ndarray | None, second: np.ndarray | None) -> float:
-    """Return the largest difference of two arrays over their largest value; infinite where they cannot be compared."""
+    """Return the largest difference of two arrays over the largest value; infinite if they cannot be compared."""
     if first is None or second is None or first.shape != second.shape or first.dtype != second.dtype:
         return float("inf")
     if np.array_equal(first, second, equal_nan=first.dtype.kind == "f"):
@@ -180,14 +180,14 @@ def distance(first: np.ndarray | None, second: np.ndarray | None) -> float:
 
 
 def main() -> int:
-    """Read the command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=("run", "compare"))
     parser.add_argument("folders", nargs="+", type=Path)
-    parser.add_argument("--only", nargs="+", choices=EVERY_CASE, help="cases, instead of all")
-    parser.add_argument("--every", action="store_true", help="all cases, those of two ranks and long ones too")
-    parser.add_argument("--checkout", type=Path, default=ROOT, help="whose program runs the cases")
-    parser.add_argument("--exactly", action="store_true", help="equal to the bit, arrays too")
+    parser.add_argument("--only", nargs="+", choices=EVERY_CASE, help="names of cases (default: all short ones)")
+    parser.add_argument("--every", action="store_true", help="include long cases and cases on two ranks")
+    parser.add_argument("--checkout", type=Path, default=ROOT, help="checkout whose program runs the cases")
+    parser.add_argument("--exactly", action="store_true", help="require equality to the bit, arrays included")
     arguments = parser.parse_args()
     names = arguments.only or list(EVERY_CASE if arguments.every else CASES)
     if arguments.command == "run":

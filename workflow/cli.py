@@ -44,7 +44,7 @@ Out = Annotated[
 Oversubscribe = Annotated[bool, typer.Option("--oversubscribe", help="allow more MPI ranks than cores")]
 Force = Annotated[
     bool,
-    typer.Option("--force", help="use the folder even if it holds another case; accept implausible values"),
+    typer.Option("--force", help="use the folder even if it contains another case; accept implausible values"),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask before runs of more than an hour")]
 MOST_AT_ONCE = 10_000  # cores, or jobs of a cluster
@@ -87,7 +87,7 @@ def plan(
         bool, typer.Option("--json", help="print stages, effects and predicted times for a script")
     ] = False,
 ) -> None:
-    """Show what a run would do and what it would cost; nothing is run."""
+    """Show the stages that a run would execute and their predicted cost, without running them."""
     from reflowshock.workflow.plan import plan_record, show_plan
     from reflowshock.workflow.run import WHAT
 
@@ -112,7 +112,7 @@ def run(
     force: Force = False,
     yes: Yes = False,
     fail_on_verdict: Annotated[
-        bool, typer.Option("--fail-on-verdict", help="exit code 3 where the verdict on the design is FAIL")
+        bool, typer.Option("--fail-on-verdict", help="exit code 3 if the verdict on the design is FAIL")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would run and its cost, as plan")] = False,
 ) -> None:
@@ -167,8 +167,8 @@ def accuracy(
 
     request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
     with interruptible("complete points and checkpoints are kept; repeat the command to continue"):
-        kept = show(request, out, console)
-    raise typer.Exit(0 if kept else 1)
+        is_satisfied = show(request, out, console)
+    raise typer.Exit(0 if is_satisfied else 1)
 
 
 @app.command()
@@ -196,7 +196,7 @@ def report(
     settings: Settings = None,
     out: Out = None,
     show: Annotated[bool, typer.Option("--open", help="open it in the browser")] = False,
-    movie: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="write what moves in it as a GIF too")] = None,
+    movie: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="also write its animation as a GIF")] = None,
 ) -> None:
     """Write the report again from the existing products."""
     from reflowshock.workflow.pipeline.report import write_report
@@ -253,9 +253,9 @@ def stress_test(
         typer.Option(metavar="FAMILY", help="reflow, elements, coupling, remesh, droplets (default: all)"),
     ] = None,
     random: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="random cases (default: 200, none beside given CASES)")
+        int | None, typer.Option(min=0, metavar="N", help="random cases (default: 200, 0 if CASES are given)")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="of the random cases")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random cases")] = 1,
     cores: Annotated[
         int | None, typer.Option("-j", "--cores", min=1, max=MOST_AT_ONCE, help="cases at a time (default: cores)")
     ] = None,
@@ -279,7 +279,7 @@ def effects(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Show all effects, or those of a case: on or off and why, expected influence, share of the cost."""
+    """Show all effects, or the effects of a case: on or off and why, expected influence, share of the cost."""
     from reflowshock.workflow.effects.page import show_effects, show_registry
 
     if case is None:
@@ -302,7 +302,7 @@ def study(
     force: Force = False,
     yes: Yes = False,
 ) -> None:
-    """Run a parametric study; only what is missing is computed. Writes tables, plots and a page."""
+    """Run a parametric study; only missing points are computed. Writes tables, plots and a page."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_forecast
@@ -337,7 +337,7 @@ def stage(
     key: str,
     cores: Annotated[int, typer.Option("--cores")] = 1,
     oversubscribe: Oversubscribe = False,
-    mark: Annotated[Path | None, typer.Option(help="file that tells Snakemake that the job is done")] = None,
+    mark: Annotated[Path | None, typer.Option(help="file that marks the job as done for Snakemake")] = None,
 ) -> None:
     """Make one product in the store in the working directory (called by Snakemake)."""
     from reflowshock.workflow.case.run import Run
@@ -360,15 +360,15 @@ for command in app.registered_commands:
 
 
 def main() -> None:
-    """Run the command line; exit codes: 0 done and healthy, 1 failed, 2 bad input, 3 a verdict FAIL, if asked for."""
+    """Run the command line; exit codes: 0 success, 1 failure, 2 bad input, 3 verdict FAIL (with --fail-on-verdict)."""
     with one_line_errors():
         handle_signals()
         prepare()
         run_app(app)
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         console.print(f"reflowshock {__version__}")
         raise typer.Exit
 
@@ -385,7 +385,7 @@ def _options(
 def _load(
     path: Path, settings: list[str] | None, out: Path | None, lenient: bool, force: bool = False
 ) -> tuple[Store, Point]:
-    """Read a case; ``lenient``: it may ask for more than this machine has, since it is not run here and now."""
+    """Read a case and open its store; ``lenient`` allows cases that are too large for this machine."""
     case = read_case(path, settings or [], lenient, force)
     store = Store(out or Path("runs") / case.run_name, one_run=True)
     if read_mark(store.folder) is not None:

@@ -1,4 +1,4 @@
-"""Examples of each command, which end its help text and stand on the site; a test parses each with the real parser."""
+"""Examples of each command for its help text and the documentation; a test parses each with the real parser."""
 
 EXAMPLES = {
     "new": ("reflowshock new mine", "reflowshock new mine --template sessile_drop"),
@@ -34,5 +34,5 @@ EXAMPLES = {
 
 
 def examples(command: str) -> str | None:
-    """Return the end of a command's help text: a paragraph for each line, as the help is set."""
+    """Return the examples at the end of a command's help text, one paragraph each; None without examples."""
     return "\n\n".join(("Examples:", *EXAMPLES[command])) if command in EXAMPLES else None

@@ -1,4 +1,4 @@
-"""All kinds of case: one record each, with all that the program does with a case of that kind."""
+"""Kinds of case: one record per kind with its model, checks, stages, forecast and report."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,33 +49,33 @@ from reflowshock.workflow.structure.problems import structure_problems
 
 
 class Forecast(Protocol):
-    """What the forecasts of all kinds say."""
+    """Interface of the forecasts of all kinds of case."""
 
     @property
     def effects(self) -> Mapping[str, Any]:
-        """Effect -> "on", "why" and, where it is predicted, "influence"."""
+        """Decisions by effect: "on", "why" and, if predicted, "influence"."""
 
     @property
     def seconds(self) -> Mapping[str, float]:
-        """Stage -> predicted wall time [s], where there is a prediction."""
+        """Predicted wall times by stage [s], for stages with a prediction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of case.
+    """Kind of case.
 
     Attributes:
-        case: the model of its case files.
-        problems: finds parameters that are each allowed, but impossible together.
-        stages: name -> function of each stage but the report, in order.
-        forecast: predicts effects and cost from the parameters alone.
-        size: predicts what its stages take on one core.
-        plan: what the plan shows below stages and effects, of a case and its forecast.
-        acts: what its effects belong to, for readers.
-        report: adds its sections to the context of a report: run folder, case, context, summary.
-        study: its convergence study.
-        effects: those that it may call for.
-        conclude: adds to a summary what follows from all stages: run folder, case, summary, discretisation errors.
+        case: model of its case files.
+        problems: check for combinations of parameters that are impossible.
+        stages: functions of the stages except the report, by name, in order.
+        forecast: prediction of effects and cost from the parameters.
+        size: prediction of time and memory of the stages.
+        plan: further tables of the plan, from a case and its forecast.
+        acts: subject of its effects in headings.
+        report: function that adds sections to the context of a report: run folder, case, context, summary.
+        study: convergence study of a case.
+        effects: effects that may act.
+        conclude: function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -88,11 +88,11 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     effects: Sequence[Effect]
-    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, known: None
+    conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, errors: None
 
     @property
     def name(self) -> str:
-        """The table that makes a file a case of this kind."""
+        """Name of the table that identifies this kind of case file."""
         return self.case.kind
 
 
@@ -109,10 +109,10 @@ def _board_drop_report(run_folder: Path, case: BoardDropCase, context: dict, sum
     add_shock(run_folder, case, context, summary)
 
 
-def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
+def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, errors: Discretisation) -> None:
     from reflowshock.workflow.package_report.conclusion import conclude
 
-    conclude(run_folder, case, summary, known)
+    conclude(run_folder, case, summary, errors)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -277,21 +277,21 @@ def kind_named_in(table: Mapping) -> Kind:
     """Return the kind of a case file.
 
     Raises:
-        CaseError: the file has the tables of no kind, or of several.
+        CaseError: the file has the table of no kind, or of several.
     """
-    found = [name for name in NAMES if name in table]
-    if found == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
+    names = [name for name in NAMES if name in table]
+    if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
         return PACKAGE
-    if len(found) == 1:
-        return next(kind for kind in KINDS if kind.name == found[0])
+    if len(names) == 1:
+        return next(kind for kind in KINDS if kind.name == names[0])
     choice = "exactly one of " + ", ".join(f"[{name}]" for name in NAMES)
-    if found:
-        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in found)
+    if names:
+        message = "has the tables of several kinds: " + " and ".join(f"[{name}]" for name in names)
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
         raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
     hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
-    raise CaseError("case", [Problem("", "does not say what kind of case it is", None, choice, hint)])
+    raise CaseError("case", [Problem("", "has no table that identifies the kind of case", None, choice, hint)])
 
 
 def stage_seconds(case: Case) -> dict[str, float]:
@@ -300,6 +300,6 @@ def stage_seconds(case: Case) -> dict[str, float]:
 
 
 def every_stage(case: Case, predicted: Mapping[str, float]) -> dict[str, float]:
-    """Return predicted wall times [s] with those of the stages that take about as long in every case."""
+    """Complete predicted wall times [s] with default values of the short stages."""
     usual = dict.fromkeys(case.pipeline.names, SECONDS_OF_STAGE) | {case.pipeline.names[-1]: SECONDS_OF_REPORT}
     return usual | dict(predicted)

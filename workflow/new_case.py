@@ -1,4 +1,4 @@
-"""Commands that write a case file: ``new`` from a template, ``init`` from five answers, ``import`` from ECAD."""
+"""Commands that write a case file: ``new`` from a template, ``init`` from five answers, ``import`` from ECAD data."""
 
 from pathlib import Path
 from typing import Annotated

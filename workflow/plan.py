@@ -1,4 +1,4 @@
-"""What a run would do, and what it would cost. Nothing is run, nothing is written."""
+"""Plan of a run: stages to run, reasons and predicted cost, without running or writing anything."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -21,12 +21,12 @@ from reflowshock.workflow.store.state import StageState, examine, why_stale
 from reflowshock.workflow.store.store import Store
 
 LONGEST_LIST = 4
-FORMER = "*"  # marks a cost that former runs in the folder have corrected
+FORMER = "*"  # marks a cost corrected by former runs in the folder
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedStage:
-    """What a run would do with a stage: whether it runs, why, and its predicted wall time [s] where that is known."""
+    """Planned action of a stage: whether it runs, reason, and predicted wall time [s] (None if unknown)."""
 
     runs: bool
     why: str
@@ -34,7 +34,7 @@ class PlannedStage:
 
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
-    """Return what a run would do with each stage, in order."""
+    """Return the planned action of each stage, in order."""
     costs = predicted_costs(store, point.case, stage_seconds(point.case))
     return {
         name: PlannedStage(state.stale, reason(state, point.case), costs[name].seconds)
@@ -43,7 +43,7 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 
 
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
-    """Return a plan for scripts: stages, effects as in ``summary.json``, wall times [s] of compilation and of all."""
+    """Return a plan as JSON data: stages, effects as in ``summary.json``, wall times of compilation and total [s]."""
     stages = planned_stages(store, point)
     once = compilation_time([name for name, stage in stages.items() if stage.runs])
     return {
@@ -64,12 +64,12 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
     console.print(styled("[bold]{}{}[/]  {}\n", case.case.name, scale, case.case.title))
     console.print(_stages(store, point, every_stage(case, outlook.seconds)))
     console.print(effects_table(case, outlook.effects, kind.acts))
-    for shown in kind.plan(case, outlook):
-        console.print(shown)
+    for table in kind.plan(case, outlook):
+        console.print(table)
 
 
 def change_text(change: Change, case: Case) -> str:
-    """Say what a parameter changed from and to, in the user's unit."""
+    """Return old and new value of a changed parameter as text in the user's unit."""
     fields = {key: field for key, _, field in leaves(case)}
 
     def text(value: object) -> str:
@@ -83,7 +83,7 @@ def change_text(change: Change, case: Case) -> str:
 
 
 def reason(state: StageState, case: Case) -> str:
-    """Say why a stage will run or not."""
+    """Return the reason why a stage will run or not."""
     if not state.stale:
         redone = ", ".join(state.because_of)
         return f"up to date if {redone} gives the same result" if redone else "up to date"
@@ -100,7 +100,7 @@ def reason(state: StageState, case: Case) -> str:
 
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
-    """Predict the wall time [s] of all that has to be made up to a stage."""
+    """Predict the wall time of all missing products up to a stage [s]."""
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
     stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
     return sum(costs[name].seconds for name in stale) + compilation_time(stale)
@@ -108,7 +108,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PredictedCost:
-    """Wall time [s] of a stage, and what is said of its source; empty where nothing has corrected it."""
+    """Predicted wall time of a stage [s], and the source of its correction (empty without correction)."""
 
     seconds: float
     source: str = ""
@@ -118,16 +118,17 @@ class PredictedCost:
 
 
 def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> dict[str, PredictedCost]:
-    """Correct predicted wall times [s] of stages by what accuracy measured of the case here, or else by former runs."""
+    """Correct predicted wall times [s] of stages by a convergence study of the case, otherwise by former runs."""
     from reflowshock.workflow.convergence.calibration import Calibration, calibration_from_store, calibration_from_study
 
     study, former = calibration_from_study(case) or Calibration({}, 0), calibration_from_store(store, seconds)
     costs = {}
     for stage, forecast in seconds.items():
-        known, source = former, FORMER
+        calibration, source = former, FORMER
         if study.covers(stage):
-            known, source = study, f" (measured: accuracy, {study.points} points)"
-        costs[stage] = PredictedCost(known.corrected(stage, forecast), source if known.covers(stage) else "")
+            calibration, source = study, f" (measured: accuracy, {study.points} points)"
+        seconds_corrected = calibration.corrected(stage, forecast)
+        costs[stage] = PredictedCost(seconds_corrected, source if calibration.covers(stage) else "")
     return costs
 
 
@@ -143,11 +144,11 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     left = sum(cost.seconds for cost in stale) + once
     remark = _about_time(left)
     if any(cost.source == FORMER for cost in stale):
-        remark += f"; {FORMER}: as former runs here took"
+        remark += f"; {FORMER}: corrected by former runs here"
     table.add_row("all", "", f"about {duration(left)}" if left else "nothing to do", remark, style="bold")
     return table
 
 
 def _about_time(seconds: float) -> str:
-    """Say of a run's predicted wall time [s] what a user has to know."""
-    return "more than an hour: run asks first; scripts need --yes" if seconds > LONG else "with nothing else to do"
+    """Return a remark on the predicted wall time [s]: whether confirmation is needed."""
+    return "more than an hour: run asks first; scripts need --yes" if seconds > LONG else "on an otherwise idle machine"

@@ -1,4 +1,4 @@
-"""The commands run, report, verify and clean: what they do with a run folder, and what the user sees."""
+"""Commands run, report, verify and clean: operations on a run folder, and their output."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,43 +20,43 @@ from reflowshock.workflow.store.state import StageState, examine, failed_checks,
 from reflowshock.workflow.store.store import TRACEBACK, Store
 from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
 
-WHAT = "run"  # a run folder holds
+WHAT = "run"  # kind of content in the mark of a run folder
 REPORT = "report"
 COLOURS = {"PASS": "green", "FAIL": "red", "NO LIMIT": "default"}
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a run ended: whether all products are there and every health check holds, and the verdict on the design."""
+    """Result of a run: whether all products exist and all health checks pass, and the verdict on the design."""
 
     healthy: bool
     verdict: str = ""
 
 
 def run_case(store: Store, point: Point, until: str, machine: Machine, *, force: bool = False) -> Ended:
-    """Make what is missing, stale or damaged of a run, and tell how it ended.
+    """Make the missing, stale and damaged products of a run and print the result.
 
     Args:
-        store: of the run folder.
-        point: the case.
-        until: the last stage.
-        machine: what it is computed with.
-        force: whether the folder may hold another case.
+        store: store of the run folder.
+        point: case of the run.
+        until: last stage to run.
+        machine: resources of the computation.
+        force: whether the folder may contain another case.
 
     Returns:
-        How it ended; the verdict is empty where there is no report, or nothing in the case is judged.
+        The result; the verdict is empty without a report or without limits in the case.
 
     Raises:
-        CaseError: the folder must not, or cannot be written into.
-        RunFolderBusy: another process is at work in it.
+        CaseError: the folder belongs to something else or is not writable.
+        RunFolderBusy: another process is running in the folder.
     """
     with locked(store.folder, WHAT, point.case.case.name, force) as lock:
         states = examine(store, point)
-        wanted = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
-        _tell_damage(wanted)
+        required = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
+        _tell_damage(required)
         for name in show_products(store, point):
             console.print(f"restored {store.folder / name}")
-        if any(state.stale for state in wanted.values()):
+        if any(state.stale for state in required.values()):
             watched = replace(machine, each_second=machine.each_second or _shower(store, point))
             run_points(store, [point], until, watched, lock)
         else:
@@ -72,7 +72,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
 
 
 def _conclude(store: Store, point: Point) -> str:
-    """Tell where the report is, its warnings and, last, its answer; return the verdict on the design."""
+    """Print the path of the report, its warnings and its answer; return the verdict on the design."""
     console.print(f"report: {store.folder / 'report.html'}")
     summary = read_json(store.product(point, REPORT) / "summary.json")
     for warning in summary.get("warnings", ()):
@@ -85,16 +85,16 @@ def _conclude(store: Store, point: Point) -> str:
 
 
 def check_movie(path: Path) -> None:
-    """Refuse a file that a GIF cannot be written to.
+    """Check that a GIF can be written to a path.
 
     Raises:
-        CaseError: it is not a GIF by its name, it exists and is none, or its folder does not exist.
+        CaseError: the name does not end in .gif, another file exists there, or the folder is missing.
     """
     why = ""
     if path.suffix.lower() != ".gif":
         why = "is not the name of a GIF; allowed: FILE.gif"
     elif not path.parent.is_dir():
-        why = f"cannot be written: there is no folder {path.parent}"
+        why = f"cannot be written: folder {path.parent} does not exist"
     elif path.exists() and (path.is_dir() or path.read_bytes()[:3] != b"GIF"):
         why = "exists and is not a GIF; give another --movie"
     if why:
@@ -102,34 +102,34 @@ def check_movie(path: Path) -> None:
 
 
 def write_run_movie(folder: Path, path: Path) -> None:
-    """Write what moves in the report of a run as a GIF.
+    """Write the first animated scene of a report as a GIF.
 
     Raises:
-        CaseError: nothing moves in it, since the stage that would has not run.
+        CaseError: no scene is animated, since its stage has not run.
     """
     from reflowshock.workflow.pipeline.report import moving_scene
     from reflowshock.workflow.report.movie import write_movie
 
     scene = moving_scene(folder, read_case_of_run(folder))
     if scene is None:
-        raise CaseError(str(folder), [Problem("", "has nothing that moves: its drop, or its reflow, has not been run")])
+        raise CaseError(str(folder), [Problem("", "has no animated scene; run its drop or reflow first")])
     write_movie(scene, path)
     console.print(f"movie: {path}, {len(scene.frames)} frames, {path.stat().st_size / 1e6:.2g} MB")
 
 
 def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], object], stage: Callable) -> bool:
-    """Write the report of a run folder again, from the products that are there and the case that they were made of.
+    """Rewrite the report of a run folder from its existing products and its stored case.
 
-    Where products are missing the report says what is there, and is no product: the next run replaces it.
+    If products are missing, the report is partial and not stored as a product: the next run replaces it.
 
     Args:
-        folder: the run folder.
-        name: of its case.
-        write: writes a report of a run folder and a case into a folder.
-        stage: function of the stage that does so.
+        folder: run folder.
+        name: name of its case.
+        write: function that writes the report of a run folder and a case into a folder.
+        stage: stage function of the report.
 
     Returns:
-        Whether it was written; not where a product is damaged.
+        Whether the report was written; False if a product is damaged.
 
     Raises:
         CaseError: nothing was run in the folder.
@@ -138,8 +138,8 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
     store, point = Store(folder, one_run=True), Point({}, case)
     with locked(folder, WHAT, name):
         states = examine(store, point)
-        upstream = {one: states[one] for one in point.case.pipeline.names[:-1]}
-        if _tell_damage(upstream, "run makes it again"):
+        upstream = {stage_name: states[stage_name] for stage_name in point.case.pipeline.names[:-1]}
+        if _tell_damage(upstream, "`reflowshock run` rebuilds it"):
             return False
         if any(state.stale for state in upstream.values()):
             show_products(store, point)
@@ -156,7 +156,7 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
 
 
 def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path, Case, Path], object]) -> None:
-    """Write a report that is no product, and put it into the run folder when it is complete."""
+    """Write a partial report and move it into the run folder when it is complete."""
     made = store.home / "work" / REPORT
     discard(made)
     made.mkdir(parents=True)
@@ -166,10 +166,10 @@ def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path,
 
 
 def verify(store: Store, point: Point) -> bool:
-    """Look at every file of a run, in its store and in its folder, and tell what is damaged or missing.
+    """Check every file of a run, in its store and in its folder, and print damaged and missing ones.
 
     Returns:
-        Whether every product is there and as it was written, and so is what the run folder shows.
+        Whether all products and all files of the run folder are present and unmodified.
     """
     states = examine(store, point)
     for name, state in states.items():
@@ -189,17 +189,17 @@ def verify(store: Store, point: Point) -> bool:
 
 
 def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False) -> None:
-    """Remove what the program has written into a run folder; what a user has put there stays.
+    """Remove the files of the program from a run folder; files of the user stay.
 
     Args:
         folder: the run folder.
-        name: of the case.
-        unused: remove only products that the run folder does not show, and work that was broken off.
-        force: whether the folder may hold another case, a study or a convergence study: all that is in it is removed.
+        name: name of the case.
+        unused: whether to remove only products without links in the run folder, and interrupted work.
+        force: whether to clean the folder even if it contains another case, a study or a convergence study.
 
     Raises:
-        CaseError: the folder holds another case.
-        RunFolderBusy: a run is at work in it.
+        CaseError: the folder contains another case.
+        RunFolderBusy: a run is active in the folder.
     """
     mark = read_mark(folder)
     if mark is None:
@@ -212,9 +212,9 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
             removed = [_count(products, "unused product"), *([_count(works, "unfinished stage")] if works else [])]
             console.print(f"removed {' and '.join(removed)} from {folder}")
             return
-        for one in (*(one for one in store.repeated if one.home.is_dir()), store):
-            withdraw_all(one)
-            left = remove_own(one.folder)
+        for used_store in (*(again for again in store.repeated if again.home.is_dir()), store):
+            withdraw_all(used_store)
+            left = remove_own(used_store.folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
         console.print(f"kept files that the program did not write: {', '.join(left)}")
@@ -225,7 +225,7 @@ def _count(number: int, what: str) -> str:
 
 
 def _shower(store: Store, point: Point) -> Callable[[], None]:
-    """Return what shows a product in the run folder soon after it was made, when it is called now and then."""
+    """Return a function that links new products into the run folder; it is called periodically."""
     there = [0]
 
     def show_new() -> None:
@@ -237,8 +237,8 @@ def _shower(store: Store, point: Point) -> Callable[[], None]:
     return show_new
 
 
-def _tell_damage(states: dict[str, StageState], what: str = "it is made again") -> bool:
-    """Tell which products are damaged; return whether any is."""
+def _tell_damage(states: dict[str, StageState], what: str = "it will be rebuilt") -> bool:
+    """Print the damaged products; return whether there are any."""
     damaged = {name: state for name, state in states.items() if state.damaged}
     for name, state in damaged.items():
         print_error(f"product {name} is damaged ({', '.join(state.damaged)}): {what}")
@@ -247,5 +247,5 @@ def _tell_damage(states: dict[str, StageState], what: str = "it is made again") 
 
 def _tell_failure(store: Store, point: Point, stage: str, message: str) -> None:
     traceback = store.work_folder(point, stage) / f".{stage}.partial" / TRACEBACK
-    place = f"\ntraceback: {traceback}" if traceback.is_file() else ""
-    print_error(f"stage {stage} failed: {message}{place}")
+    suffix = f"\ntraceback: {traceback}" if traceback.is_file() else ""
+    print_error(f"stage {stage} failed: {message}{suffix}")

@@ -1,12 +1,12 @@
-"""The data path of a run: which function makes the product of a stage.
+"""Stage functions of each kind of case.
 
 Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report (`board_drop/stages.py`,
-`reflow/stage.py`), the shock only where the case has one. Structure: geometry -> shock -> comparison -> report
-(`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`). A liquid that flows: particles -> report
+`reflow/stage.py`), the shock is optional. Structure: geometry -> shock -> comparison -> report
+(`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`). Flow: particles -> report
 (`flows/stage.py`).
 
-Each stage reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns what it
-found. Packages are imported inside the functions, so that a stage loads only what it uses.
+Each stage reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns findings.
+Packages are imported inside the functions, so that a stage loads only the packages that it needs.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a run folder holds, stage by stage."""
+"""Status of a run folder: state, time and key figures of each stage."""
 
 import time
 
@@ -16,7 +16,7 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine
 from reflowshock.workflow.store.store import Store
 
-LOOK = 0.5  # s between two looks at a run
+LOOK = 0.5  # interval between two updates [s]
 SHOWN_UNITS = {"m": "mm", "m^3": "mm^3", "Pa": "MPa", "J": "mJ", "J/m^3": "kJ/m^3", "kg": "mg", "s": "ns"}
 FIGURES = {
     "geometry": ("joint_count", "elements_board", "elements_board_patch", "elements"),
@@ -42,33 +42,33 @@ FIGURES = {
 
 
 def follow_run(store: Store, point: Point, console: Console) -> None:
-    """Show what a run does, stage by stage with the time left, until no process works in its folder any more."""
+    """Show the progress and the remaining time of the running stages until the run ends."""
     if not is_busy(store.folder):
-        console.print(f"no run is at work in {store.folder}")
+        console.print(f"no run is active in {store.folder}")
         return
-    told = ""
+    printed = ""
     with Live(console=console, transient=True, auto_refresh=False) as live:
         while is_busy(store.folder):
             lines = [line for stage in point.digests if (line := _progress(store, point, stage))]
             live.update(Text("\n".join(lines) or "waiting for the next stage …"), refresh=True)
             begun = ", ".join(line.partition(":")[0] for line in lines)
-            if not console.is_terminal and begun and begun != told:
-                told = begun
+            if not console.is_terminal and begun and begun != printed:
+                printed = begun
                 console.print("\n".join(lines))
             time.sleep(LOOK)
 
 
 def _progress(store: Store, point: Point, stage: str) -> str:
-    """Say how far a stage is; nothing where it is not at work."""
-    found = read_progress(store.work_folder(point, stage))
-    if found is None:
+    """Return the progress of a stage as text, or an empty string if it is not running."""
+    progress = read_progress(store.work_folder(point, stage))
+    if progress is None:
         return ""
-    left = f", about {duration(found.left)} left" if found.left is not None else ""
-    return f"{stage}: {found.what}, {100.0 * found.share:.0f} %{left}"
+    left = f", about {duration(progress.left)} left" if progress.left is not None else ""
+    return f"{stage}: {progress.what}, {100.0 * progress.share:.0f} %{left}"
 
 
 def show_status(store: Store, point: Point, console: Console) -> None:
-    """Print for each stage whether its product is there and intact, the time it took and its main figures."""
+    """Print state, wall time and main figures of each stage."""
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
     table.add_column("stage", no_wrap=True)
     table.add_column("state", no_wrap=True)
@@ -83,7 +83,7 @@ def show_status(store: Store, point: Point, console: Console) -> None:
 
 
 def metric_text(metric: dict) -> str:
-    """Write a metric in a unit that engineers read."""
+    """Format a metric in a customary unit."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str | bool | int) or value is None:
         return f"{value} {unit}".strip()
@@ -103,5 +103,5 @@ def _state(state: StageState, health: dict) -> Text:
 
 
 def _figures(stage: str, metrics: dict) -> str:
-    shown = [name for name in FIGURES[stage] if name in metrics]
-    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metrics[name])}" for name in shown)
+    names = [name for name in FIGURES[stage] if name in metrics]
+    return ", ".join(f"{name.replace('_', ' ')} {metric_text(metrics[name])}" for name in names)

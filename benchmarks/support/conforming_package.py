@@ -1,4 +1,4 @@
-"""A small package whose joints match board and package node for node: what programs without ties can compute, too."""
+"""Small package whose joints match board and package node for node, for programs without ties."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,30 +12,30 @@ from reflowshock.materials.library import COPPER, SAC405, SILICON
 from reflowshock.materials.parameters import Isotropic
 from reflowshock.materials.roles import Materials
 
-# Peers take isotropic materials in this comparison: a board of the in-plane stiffness of FR4.
+# Materials are isotropic for the peers: the board has the in-plane stiffness of FR4.
 BOARD = Isotropic(density=1910.0, young_modulus=27.9e9, poisson_ratio=0.11)
 MATERIALS = Materials(board=BOARD, substrate=BOARD, die=SILICON, copper=COPPER, solder=SAC405.elastic)
-LENGTH, WIDTH, THICKNESS, PACKAGE = 8e-3, 6e-3, 1e-3, 2e-3  # [m], of a quarter
+LENGTH, WIDTH, THICKNESS, PACKAGE = 8e-3, 6e-3, 1e-3, 2e-3  # [m] of a quarter
 JOINTS = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3), "A3": (1.5e-3, 1.5e-3)}
 RADIUS, COPPER_THICKNESS, GAP, LAYER = 0.2e-3, 2e-5, 0.3e-3, 0.4e-3
 
 
 def conforming_package(refinement: int = 1) -> MeshData:
-    """Return the mesh; each element of refinement 1 is cut into ``refinement`` in each direction."""
+    """Return the mesh; each element is divided into ``refinement`` elements in each direction."""
     top = GAP + 2 * COPPER_THICKNESS
     levels = [(-THICKNESS, 4), (0.0, 1), (COPPER_THICKNESS, 4), (COPPER_THICKNESS + GAP, 1), (top, 2), (top + LAYER, 2)]
     z = lines([level for level, _ in levels] + [top + 2 * LAYER], [count * refinement for _, count in levels])
     x, y = (in_plane(length, refinement) for length in (LENGTH, WIDTH))
     points, cells = grid(x, y, z)
     part = parts(points[cells].mean(axis=1), top)
-    kept = part != ""
+    is_filled = part != ""
     facets = {
         "symmetry_x": on(0, 0.0),
         "symmetry_y": on(1, 0.0),
         "mounting_holes": lambda c: (np.abs(c[:, 0] - LENGTH) < 1e-9) & (c[:, 2] < 0.0),
         "board_bottom": on(2, -THICKNESS),
     }
-    return without_unused_nodes(with_pads(mesh_of(points, cells[kept], part[kept], facets)))[0]
+    return without_unused_nodes(with_pads(mesh_of(points, cells[is_filled], part[is_filled], facets)))[0]
 
 
 def in_plane(length: float, refinement: int) -> np.ndarray:
@@ -53,7 +53,7 @@ def lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
 
 
 def parts(centre: np.ndarray, top: float) -> np.ndarray:
-    """Return the part of each cell from its centre, empty outside."""
+    """Return the part of each cell by its centre, an empty name outside."""
     x, y, z = centre.T
     part = np.full(len(centre), "", dtype=object)
     part[z < 0.0] = "board"

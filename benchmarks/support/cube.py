@@ -1,4 +1,4 @@
-"""The cube of 40 x 40 x 40 hexahedra on which all force benchmarks are run, as boxes or distorted."""
+"""Cube of 40 x 40 x 40 hexahedra of the force benchmarks, as boxes or distorted."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ SOLDER = Isotropic(
     poisson_ratio=0.36,
     plasticity=JohnsonCook(A=38e6, B=275e6, n=0.71, C=0.0713, reference_rate=1e-3),
 )
-SHAKE = 0.2  # of an edge: inner nodes of the distorted cube
+SHAKE = 0.2  # largest move of inner nodes of the distorted cube, over the edge
 
 
 def cube(distorted: bool = False, edge: int = EDGE) -> MeshData:
@@ -34,7 +34,7 @@ def cube(distorted: bool = False, edge: int = EDGE) -> MeshData:
 
 
 def elements_of(mesh: MeshData, kind: str = "incompatible_modes", material: Material = STEEL) -> Elements:
-    """Return the elements of a mesh of hexahedra, each cut into six tetrahedra where the kind asks for that."""
+    """Return the elements of a mesh of hexahedra, each cut into six tetrahedra for tetrahedral kinds."""
     points, cells = mesh.points, mesh.cells
     if KINDS[kind].nodes != 8:
         cells = cells[:, diagonal_tetrahedra()[1]].reshape(-1, 4)
@@ -44,5 +44,5 @@ def elements_of(mesh: MeshData, kind: str = "incompatible_modes", material: Mate
 
 
 def random_displacement(points: np.ndarray, strain: float = 1e-4) -> np.ndarray:
-    """Return displacements ``(n, 3)`` [m] of neighbours that differ by about a strain of an edge."""
+    """Return displacements [m], shape (n, 3), that differ between neighbours by about a strain times an edge."""
     return np.random.default_rng(1).uniform(-0.5, 0.5, points.shape) * strain * LENGTH / EDGE

@@ -1,4 +1,4 @@
-"""Packages on boards as mesh files, without a reflow: joints are barrels of the case's volume between its pads."""
+"""Packages on boards as mesh files without a reflow: joints are barrels of the solder volume between their pads."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.meshing.board.assembly import write_assembly
-from reflowshock.meshing.board.displaced_assembly import prescribed, write_displaced_assembly
+from reflowshock.meshing.board.displaced_assembly import prescribed_displacement, write_displaced_assembly
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.joint.column import columns_of
@@ -25,18 +25,18 @@ from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.fem_models import write_msh
 
 CASES = Path(__file__).parents[2] / "cases"
-HEIGHTS = np.linspace(0.0, 1.0, 25)  # of the sections between which a barrel is a cone
-SHIFT = 1e-6  # of an element's edge: enough that no element is a box, too little to matter otherwise
+HEIGHTS = np.linspace(0.0, 1.0, 25)  # heights of the sections of a barrel
+SHIFT = 1e-6  # over an element's edge: no element is a box, without a change of results
 Mesher = Callable[..., JointMesh]
 
 
 @dataclass(frozen=True, slots=True)
 class DropScene:
-    """The meshes of a case, and the inputs of runs on them.
+    """Meshes of a case, and inputs of runs on them.
 
     Attributes:
-        case: The case, with its copper at its true mass.
-        folder: Where the meshes are.
+        case: Case, with its copper at its true mass.
+        folder: Folder of the meshes.
     """
 
     case: BoardDropCase
@@ -44,22 +44,22 @@ class DropScene:
 
     @classmethod
     def write(cls, folder: Path, overrides: tuple[str, ...] = (), name: str = "bga_drop") -> "DropScene":
-        """Mesh a case with other values, ``key=value`` each."""
+        """Mesh a case with overrides ``key=value``."""
         case = read_case(CASES / name / "case.toml", ("shock.numerics.mass_scaled=[]", *overrides))
         assert isinstance(case, BoardDropCase)
         write_assembly(case.package, case.board, folder / "flat.msh")
-        displacement = prescribed(case.package, case.warpage)
+        displacement = prescribed_displacement(case.package, case.warpage)
         side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
         (folder / "flat.msh").unlink()
-        own = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
-        fine = [joint(case, site, partial(mesh_joint, columns=own[site.name]), side) for site in sites(case)]
+        columns = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
+        fine = [joint(case, site, partial(mesh_joint, columns=columns[site.name]), side) for site in sites(case)]
         write_joints(fine, folder / "joints.msh")
         coarse = [joint(case, site, mesh_coarse_joint, side) for site in sites(case)]
         write_joints(coarse, folder / "coarse_joints.msh")
         return cls(case, folder)
 
     def without_boxes(self, folder: Path) -> "DropScene":
-        """Write the meshes again, all elements a little distorted: each then has a matrix of its own."""
+        """Write the meshes again with slightly distorted elements, so that each element has its own matrix."""
         for path in self.folder.glob("*.msh"):
             mesh = read_mesh(path)
             length, phase = np.ptp(mesh.points[:, 0]), 1e4 * mesh.points[:, 1] + 3e4 * mesh.points[:, 2]
@@ -69,11 +69,11 @@ class DropScene:
         return replace(self, folder=folder)
 
     def request(self, mode: str, coupling: dict, shock: dict) -> RunInput:
-        """Return the input of a run on one rank; ``shock`` are values of its numerics or of the shock itself."""
+        """Return the input of a run on one rank; ``shock`` holds values of the shock or its numerics."""
         numerics = {key: shock[key] for key in shock if key in type(self.case.shock.numerics).model_fields}
         tables = self.case.shock.model_dump() | {key: value for key, value in shock.items() if key not in numerics}
         tables["numerics"] |= numerics
-        tables["coupling"] = coupling  # of the case nothing: every run here says its own
+        tables["coupling"] = coupling  # replaces the coupling of the case
         tables["ranks"] = Ranks(total=1, placement="shared").model_dump()
         return RunInput(
             mode=mode,
@@ -91,7 +91,7 @@ def sites(case: BoardDropCase) -> list[PadSite]:
 
 
 def joint(case: BoardDropCase, site: PadSite, mesher: Mesher, side: PackageSide) -> JointMesh:
-    """Return a joint's mesh."""
+    """Return the mesh of a joint."""
     return mesher(barrel_of(site, case.solder.volume), site, case.package, side)
 
 

@@ -1,4 +1,4 @@
-"""A body of revolution in OpenFOAM's interFoam (Debian package openfoam): a wedge of cells, one layer thick."""
+"""Axisymmetric bodies in OpenFOAM's interFoam (Debian package openfoam): a wedge of one layer of cells."""
 
 import os
 import re
@@ -20,7 +20,7 @@ CLOCK = re.compile(r"^Time = (\S+)$.*?^ExecutionTime = (\S+) s", re.DOTALL | re.
 
 @dataclass(frozen=True, slots=True)
 class Wedge:
-    """Square cells of a width [m], so many along the radius and along the axis."""
+    """Square cells of a width [m], with the numbers of columns (radius) and rows (axis)."""
 
     cell: float
     columns: int
@@ -28,30 +28,30 @@ class Wedge:
 
     @property
     def edges(self) -> np.ndarray:
-        """Radii of the circles whose sectors have the areas of the flat wedges `(columns + 1,)` [m]."""
+        """Radii [m] of circles whose sectors have the areas of the flat wedges, shape (columns + 1,)."""
         return self.cell * np.sqrt(np.sin(2.0 * HALF_WEDGE) / (2.0 * HALF_WEDGE)) * np.arange(self.columns + 1)
 
     @property
     def parameters(self) -> dict[str, float]:
-        """What `blockMeshDict` needs."""
+        """Parameters of ``blockMeshDict``."""
         across, aside = (self.columns * self.cell * turn(HALF_WEDGE) for turn in (np.cos, np.sin))
         sides = {"across": across, "aside": aside, "back": -aside, "height": self.rows * self.cell}
         return sides | {"columns": self.columns, "rows": self.rows}
 
     def radii(self, alpha: np.ndarray) -> np.ndarray:
-        """Radii `(rows,)` [m] of discs that have the volumes of the liquid; volume fractions `(rows, columns)`."""
+        """Return radii [m] of discs with the liquid volume of each row, shape (rows,), from its volume fractions."""
         return np.sqrt((alpha * np.diff(self.edges**2)).sum(axis=1))
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What was written at a time.
+    """Fields at one written time.
 
     Attributes:
-        time: [s].
-        seconds: of the run so far [s].
-        alpha: volume fractions of the liquid, `(rows, columns)`.
-        speed: `(rows, columns)` [m/s].
+        time: Time [s].
+        seconds: Run time so far [s].
+        alpha: Volume fractions of the liquid, shape (rows, columns).
+        speed: Speed [m/s], shape (rows, columns).
     """
 
     time: float
@@ -61,13 +61,13 @@ class State:
 
 
 def run(folder: Path, wedge: Wedge, parameters: Mapping[str, Any], start: str) -> str:
-    """Mesh, start and run the case in a folder; return the log of interFoam.
+    """Mesh, initialise and run the case in a folder; return the log of interFoam.
 
     Args:
-        folder: an empty one.
-        wedge: the cells.
-        parameters: others that the case includes.
-        start: regions of `setFieldsDict` with their values.
+        folder: Empty folder.
+        wedge: Cells.
+        parameters: Further parameters that the case includes.
+        start: Regions of ``setFieldsDict`` with their values.
     """
     shutil.copytree(CASE, folder, dirs_exist_ok=True)
     shutil.copytree(folder / "0.orig", folder / "0")
@@ -81,14 +81,14 @@ def run(folder: Path, wedge: Wedge, parameters: Mapping[str, Any], start: str) -
 
 
 def _openfoam(command: str, folder: Path) -> str:
-    """Run a command of OpenFOAM in a folder and return its log; its settings lie in the share folder beside it."""
+    """Run an OpenFOAM command in a folder with the settings of the share folder; return its log."""
     installed = Path(shutil.which(command)).parent.parent / "share" / "openfoam"
     surroundings = {"WM_PROJECT_DIR": str(installed)} | dict(os.environ)
     return subprocess.run([command], cwd=folder, env=surroundings, check=True, capture_output=True, text=True).stdout
 
 
 def states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
-    """What was written, in time."""
+    """Yield the fields of each written time in order."""
     clock = {float(time): float(seconds) for time, seconds in CLOCK.findall(log)}
     times, shape = np.array(sorted(clock)), (wedge.rows, wedge.columns)
     for path in sorted((path for path in folder.iterdir() if _is_time(path.name)), key=lambda path: float(path.name)):
@@ -100,10 +100,10 @@ def states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
 
 
 def version(log: str) -> str:
-    """The build that a log names."""
+    """Return the build named in a log."""
     return re.search(r"^Build\s*:\s*(.+)$", log, re.MULTILINE)[1]
 
 
 def _is_time(name: str) -> bool:
-    """Whether a folder is that of a written time after the start."""
+    """Return whether a folder holds a written time after the start."""
     return re.fullmatch(r"[0-9.e-]+", name) is not None and float(name) > 0.0

@@ -1,4 +1,4 @@
-"""A model of Kratos in explicit steps, for the processes of peers: hexahedra of a material each."""
+"""Explicit Kratos model of hexahedra with one material each, for the processes of peers."""
 
 from collections.abc import Callable
 
@@ -19,25 +19,25 @@ STEP_VARIABLES = (
     Structural.MIDDLE_VELOCITY,
     Structural.FRACTIONAL_ACCELERATION,
 )
-ELEMENTS = {True: "TotalLagrangianElement3D8N", False: "SmallDisplacementElement3D8N"}  # of finite and small strain
+ELEMENTS = {True: "TotalLagrangianElement3D8N", False: "SmallDisplacementElement3D8N"}  # by finite strain or not
 LAWS = {True: Laws.KirchhoffSaintVenant3DLaw, False: Structural.LinearElastic3DLaw}
-NO_HARDENING, NEVER = 3, 1e12  # of Kratos' curves; fracture energy [J/m^2]
+NO_HARDENING, NEVER = 3, 1e12  # number of the Kratos hardening curve; fracture energy [J/m^2]
 COLUMNS = (Kratos.DENSITY, Kratos.YOUNG_MODULUS, Kratos.POISSON_RATIO, Kratos.YIELD_STRESS)
 
 
-def explicit_model(given: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Callable[[], None]]:
-    """Return a body at rest in its first state, and what takes a step.
+def explicit_model(problem: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Callable[[], None]]:
+    """Return a body at rest in its initial state, and the function that advances it by one step.
 
     Args:
-        given: ``points``, ``cells`` (cyclic order), ``material`` of each, ``constants`` of materials (density, Young's
-            modulus, Poisson's ratio, yield stress or nan), whether strains are ``finite``, ``step`` [s].
+        problem: Arrays ``points``, ``cells`` (cyclic order), ``material`` of each cell, ``constants`` of the materials
+            (density, Young's modulus, Poisson's ratio, yield stress or nan), flag ``finite`` strain, ``step`` [s].
     """
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
-    finite, step = bool(given["finite"]), float(given["step"])
-    body = kept.CreateModelPart("body", 2)
+    finite, step = bool(problem["finite"]), float(problem["step"])
+    body = model.CreateModelPart("body", 2)
     for variable in STEP_VARIABLES:
         body.AddNodalSolutionStepVariable(variable)
-    fill(body, given, finite)
+    fill(body, problem, finite)
     information = body.ProcessInfo
     information[Kratos.DOMAIN_SIZE] = 3
     information[Kratos.COMPUTE_LUMPED_MASS_MATRIX] = True
@@ -59,15 +59,15 @@ def explicit_model(given: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Call
     return body, advance
 
 
-kept = Kratos.Model()  # owns the parts: without it they are gone
+model = Kratos.Model()  # owns the parts and must outlive them
 
 
-def fill(body: Kratos.ModelPart, given: dict[str, np.ndarray], finite: bool) -> None:
+def fill(body: Kratos.ModelPart, problem: dict[str, np.ndarray], finite: bool) -> None:
     """Add materials, nodes and elements."""
-    materials = [material_of(body, number, row, finite) for number, row in enumerate(given["constants"], start=1)]
-    for number, point in enumerate(given["points"].tolist(), start=1):
+    materials = [material_of(body, number, row, finite) for number, row in enumerate(problem["constants"], start=1)]
+    for number, point in enumerate(problem["points"].tolist(), start=1):
         body.CreateNewNode(number, *point)
-    cells, kinds = (given["cells"] + 1).tolist(), given["material"].tolist()
+    cells, kinds = (problem["cells"] + 1).tolist(), problem["material"].tolist()
     for number, (nodes, kind) in enumerate(zip(cells, kinds, strict=True), start=1):
         body.CreateNewElement(ELEMENTS[finite], number, nodes, materials[kind])
     for axis in "XYZ":
@@ -76,13 +76,13 @@ def fill(body: Kratos.ModelPart, given: dict[str, np.ndarray], finite: bool) -> 
 
 
 def material_of(body: Kratos.ModelPart, number: int, row: np.ndarray, finite: bool) -> Kratos.Properties:
-    """Return a material: J2 without hardening where it has a yield stress, else linear."""
-    found = body.CreateNewProperties(number)
+    """Return a material: J2 without hardening if it has a yield stress, otherwise linear elastic."""
+    properties = body.CreateNewProperties(number)
     for variable, value in zip(COLUMNS, row.tolist(), strict=True):
         if np.isfinite(value):
-            found[variable] = value
-    found[Kratos.CONSTITUTIVE_LAW] = LAWS[finite]()
+            properties[variable] = value
+    properties[Kratos.CONSTITUTIVE_LAW] = LAWS[finite]()
     if np.isfinite(row[-1]):
-        found[Kratos.CONSTITUTIVE_LAW] = Laws.FiniteStrainIsotropicPlasticity3DVonMisesVonMises()
-        found[Laws.HARDENING_CURVE], found[Kratos.FRACTURE_ENERGY] = NO_HARDENING, NEVER
-    return found
+        properties[Kratos.CONSTITUTIVE_LAW] = Laws.FiniteStrainIsotropicPlasticity3DVonMisesVonMises()
+        properties[Laws.HARDENING_CURVE], properties[Kratos.FRACTURE_ENERGY] = NO_HARDENING, NEVER
+    return properties

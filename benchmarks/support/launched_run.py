@@ -1,4 +1,4 @@
-"""Runs of the program on several ranks, launched as a user's are."""
+"""Runs of the program on several ranks, launched in the same way as user runs."""
 
 import json
 from pathlib import Path
@@ -27,5 +27,5 @@ def launch(request: RunInput, ranks: dict, output: Path) -> tuple[dict[str, np.n
 
 
 def largest_difference(values: dict[str, np.ndarray], reference: dict[str, np.ndarray]) -> float:
-    """Return the largest difference of two runs' histories, each relative to its largest value."""
+    """Return the largest difference of two histories, relative to the largest value of each array."""
     return max(float(np.abs(values[name] - reference[name]).max() / np.abs(reference[name]).max()) for name in COMPARED)

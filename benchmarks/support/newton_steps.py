@@ -1,7 +1,8 @@
-"""Implicit steps of what turns and yields: Newton's method by PETSc around the program's own force terms.
+"""Implicit steps with finite rotation and plasticity: Newton's method by PETSc around the program's own force terms.
 
-The tangent is only multiplied, by differences of forces, which cost a thousandth of a solution; GMRES solves, with the
-factor of the elastic body at rest as preconditioner, which is made once. What remains is the rank of what flows.
+Products with the tangent are finite differences of forces, which cost a thousandth of a solution. GMRES solves, with
+the factor of the elastic body at rest, computed once, as preconditioner. The remaining operator has the rank of the
+yielding region.
 """
 
 from collections.abc import Sequence
@@ -22,12 +23,12 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 
-ALPHA, ITERATIONS = -0.1, 60  # of the HHT method; of GMRES in a step of Newton's method
-CONVERGED, SMALL = 1e-4, 1e-5  # force out of balance: over that at the start of a step, over the body force so far
+ALPHA, ITERATIONS = -0.1, 60  # HHT parameter; GMRES iterations per Newton step
+CONVERGED, SMALL = 1e-4, 1e-5  # residual relative to the start of a step, and to the largest body force so far
 
 
 def with_step(term: ForceTerm, step: float) -> ForceTerm:
-    """Return a force term whose path goes on by another step [s]."""
+    """Return a force term whose path continues by another step [s]."""
     if not isinstance(term, NonlinearElements):
         return term
     path = Path(term.path.finite, step)
@@ -35,7 +36,7 @@ def with_step(term: ForceTerm, step: float) -> ForceTerm:
 
 
 def take_implicit_steps(run: ProgramRun, step: float) -> "NewtonMotion":
-    """Let a run of one model at rest go on in implicit steps of at most some seconds, with its samples as they were."""
+    """Switch a run of one model at rest to implicit steps of at most ``step`` [s], with unchanged samples."""
     [(role, participant)] = run.participants.items()
     run.plan = implicit_plan(run.plan, step)
     motion = NewtonMotion(participant.motion.body, participant.motion._loads, run.plan.step)
@@ -44,14 +45,14 @@ def take_implicit_steps(run: ProgramRun, step: float) -> "NewtonMotion":
 
 
 class NewtonMotion(ImplicitMotion):
-    """Implicit steps of a body on one rank whose elements turn and yield.
+    """Implicit motion of a body on one rank with finite rotation and plasticity.
 
     Attributes:
-        solutions: By the factor, so far.
+        solutions: Number of solutions with the factor so far.
     """
 
     def __init__(self, body: Body, loads: Sequence[Load], step: float) -> None:
-        """Start at rest; the path of the terms begins where it is."""
+        """Start at rest, from the current path of the terms."""
         self.solutions, self._largest = 0, 0.0
         body = replace(body, terms=[with_step(term, step) for term in body.terms])
         self._histories = [values for term in body.terms for values in term.history.values()]
@@ -73,17 +74,17 @@ class NewtonMotion(ImplicitMotion):
         """Do nothing: all terms can be balanced."""
 
     def _keep(self) -> None:
-        """Keep the path up to now: each evaluation of a step goes on from there."""
+        """Store the path at the start of a step, from which each evaluation continues."""
         self._kept = [values.copy() for values in self._histories]
 
     def _add_internal(self, field: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Evaluate as ``ImplicitMotion`` does, from the path at the start of the step."""
-        for values, kept in zip(self._histories, self._kept, strict=True):
-            values[...] = kept
+        """Evaluate the internal force from the path at the start of the step."""
+        for values, start_values in zip(self._histories, self._kept, strict=True):
+            values[...] = start_values
         return super()._add_internal(field, force)
 
     def _solve(self, before: np.ndarray) -> None:
-        """Balance the step, from the accelerations of the step before."""
+        """Balance the step, starting from the previous accelerations."""
         self._keep()
         self._start = self.displacement.copy(), self.velocity.copy(), before
         weight = float(np.linalg.norm(self.body.mass) * np.linalg.norm(self.gravity))
@@ -95,12 +96,12 @@ class NewtonMotion(ImplicitMotion):
             raise ArithmeticError(f"Newton's method stops at {self.time:g} s: {self._newton.reason}")
         self._unbalanced(self._newton, self._solution, self._right)
 
-    def _unbalanced(self, _newton: PETSc.SNES, given: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write the forces out of balance at given accelerations, for PETSc; move there."""
+    def _unbalanced(self, _newton: PETSc.SNES, accelerations: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Compute the residual force at trial accelerations for PETSc and move the body there."""
         h, scheme = self.step, self._scheme
-        place, speed, before = self._start
-        self._equations.spread(given, self._acceleration)
-        self.displacement[:] = place + h**2 * scheme.beta * self._acceleration
+        displacement, speed, before = self._start
+        self._equations.spread(accelerations, self._acceleration)
+        self.displacement[:] = displacement + h**2 * scheme.beta * self._acceleration
         self.velocity[:] = speed + h * scheme.gamma * self._acceleration
         self._update_force()
         forces = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before

@@ -1,7 +1,7 @@
-"""The loop of a peer's process: it makes a batch of a work when asked by name, and answers with its processor seconds.
+"""Loop of a peer process: run a batch of a named work on request and answer with its processor seconds.
 
-Peers run in their own environment and import nothing of this program but ``turns``. Lines of the protocol start with @,
-since peers print banners.
+Peers run in their own environment and import only ``turns`` of this program. Protocol lines start with @, since peers
+print banners.
 """
 
 import sys
@@ -12,13 +12,13 @@ from turns import batch
 
 
 def problem() -> dict[str, np.ndarray]:
-    """Return points, cells (cyclic order), displacement and constants from the file of the command line."""
+    """Return the arrays of the problem file named on the command line."""
     with np.load(sys.argv[1]) as arrays:
         return dict(arrays)
 
 
 def serve(force: np.ndarray, works: dict[str, Callable[[], object]]) -> None:
-    """Write the internal force ``(n, 3)`` [N] at the given displacement, then answer until the input ends."""
+    """Write the internal force [N], shape (n, 3), at the displacement of the problem; answer until the input ends."""
     np.save(sys.argv[2], force)
     batches = {name: batch(work) for name, work in works.items()}
     print("@ready", flush=True)

@@ -1,6 +1,6 @@
-"""PySPH's side of ``droplet_peers.py``: the dam break among its own examples, in its own environment.
+"""PySPH process of ``droplet_peers.py``: the dam break of the PySPH examples in its own environment.
 
-Takes the particles' spacing [m], the time to follow [s] and a folder; prints a line of JSON.
+Arguments: particle spacing [m], duration [s] and a folder. It prints one line of JSON.
 """
 
 import json
@@ -19,7 +19,7 @@ rows = [
     (state["t"], state["count"], fluid.x.max(), len(fluid.x))
     for state, fluid in iter_output(get_files(folder), "fluid")
 ]
-found = {
+figures = {
     "version": pysph.__version__,
     "particles": int(rows[-1][3]),
     "steps": int(rows[-1][1]),
@@ -27,4 +27,4 @@ found = {
     "time": [float(row[0]) for row in rows],
     "front": [float(row[2]) for row in rows],
 }
-print("@" + json.dumps(found))
+print("@" + json.dumps(figures))

@@ -1,4 +1,4 @@
-"""A run of the program on one rank, window by window, so that several can be measured in turns."""
+"""Program runs on one rank that advance window by window, so that several can be measured in turns."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,12 +18,12 @@ class ProgramRun:
     """Models, participants and history of an input, at rest.
 
     Attributes:
-        participants: The participants.
+        participants: Participants of the coupling.
         plan: Window and substeps.
-        elements: Elements of each model.
-        setup: Processor seconds until it could start.
-        history: Its samples.
-        others: Samples of what other inputs watch of the same motion.
+        elements: Number of elements of each model.
+        setup: Processor seconds of the set-up.
+        history: Samples of the run.
+        others: Samples of the same motion with the watch points of other inputs.
     """
 
     def __init__(self, request: RunInput, others: Sequence[RunInput] = ()) -> None:
@@ -48,14 +48,14 @@ class ProgramRun:
             history.sample(self.participants)
 
     def window(self) -> None:
-        """Go on by one window."""
+        """Advance by one window."""
         for participant in self.participants.values():
             participant.begin_window()
         for participant in self.participants.values():
             participant.finish_window()
 
     def step(self, seconds: float) -> float:
-        """Go on for some simulated time; return the processor seconds of a simulated one."""
+        """Advance by a simulated time [s]; return the processor seconds per simulated second."""
         windows = max(1, round(seconds / self.plan.window))
         begin = process_time()
         for _ in range(windows):
@@ -63,7 +63,7 @@ class ProgramRun:
         return (process_time() - begin) / (windows * self.plan.window)
 
     def to_end(self) -> tuple[dict[str, np.ndarray], float]:
-        """Go to the end with samples; return them and the processor seconds of all windows."""
+        """Complete the run with samples; return them and the processor seconds of all windows."""
         self.sample()
         seconds = 0.0
         for window in range(1, self.plan.windows + 1):

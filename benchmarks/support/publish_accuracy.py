@@ -1,7 +1,7 @@
-"""Store the convergence study of a case with the case: ``accuracy.json`` and its plot.
+"""Store the convergence study of a case in the folder of the case: ``accuracy.json`` and its plot.
 
 Run: PYTHONPATH=. .venv/bin/python benchmarks/support/publish_accuracy.py sessile_drop -- --tolerance 0.03%
-The site shows the stored tables; reports of cases of the same kind show them where they have none of their own.
+The site shows the stored tables, and reports of similar cases show them unless they have their own.
 """
 
 import argparse

@@ -39,7 +39,7 @@ def path_of(name: str) -> Path:
 
 
 def conditions() -> dict[str, Any]:
-    """Return date, processor, number of cores, and load (processes that want a core, mean of five minutes)."""
+    """Return date, processor, number of cores, and load averages over five minutes."""
     return {
         "date": datetime.date.today().isoformat(),
         "processor": _processor(),

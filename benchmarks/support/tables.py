@@ -1,4 +1,4 @@
-"""The command line of benchmarks with several tables: computes those that are named, keeps the others."""
+"""Command line of benchmarks with several tables: compute the selected tables and keep the others."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -7,9 +7,9 @@ from benchmarks.support import results
 
 
 def write_tables(description: str, tables: Mapping[str, Callable[[], object]], benchmark: str) -> None:
-    """Compute the tables that the command line names (all without a name), and store each when it is complete."""
+    """Compute the tables named on the command line (default: all) and store each when it is complete."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"of {', '.join(tables)}; all without")
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"tables among {', '.join(tables)} (default: all)")
     chosen = parser.parse_args().tables or list(tables)
     figures = results.read_figures(benchmark)
     for name in chosen:

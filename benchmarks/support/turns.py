@@ -1,4 +1,4 @@
-"""Processor seconds of several sides of a comparison, measured in turns: a loaded machine slows all of them alike."""
+"""Processor seconds of several sides of a comparison, measured in turns to spread the load of the machine evenly."""
 
 import time
 from collections.abc import Callable
@@ -9,11 +9,11 @@ import numpy as np
 ROUNDS = 9
 BATCH_SECONDS = 0.1
 
-Batch = Callable[[], float]  # makes some calls, returns the processor seconds of one
+Batch = Callable[[], float]  # makes some calls and returns the processor seconds of one
 
 
 def batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
-    """Return the batch of as many calls as take some seconds, compiled and warm."""
+    """Return a batch of calls that takes about ``seconds``, compiled and warm."""
     work()
     begin = time.process_time()
     work()
@@ -29,7 +29,7 @@ def batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
 
 
 def in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.ndarray]:
-    """Return the processor seconds of a call of each side, one value a round."""
+    """Return the processor seconds of a call of each side, one value per round."""
     rows = [[run() for run in batches.values()] for _ in range(rounds)]
     return dict(zip(batches, np.array(rows).T, strict=True))
 
@@ -40,12 +40,12 @@ def rates(seconds: dict[str, np.ndarray], elements: dict[str, int]) -> dict[str,
 
 
 def ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:
-    """Return how many times faster one side is than another: the median over rounds."""
+    """Return the speed of one side over another, the median over rounds."""
     return float(np.median(seconds[theirs] / seconds[ours]))
 
 
 def bar(value: float, limit: float, at_least: bool = True) -> dict[str, Any]:
-    """Return a figure with what is asked of it."""
+    """Return a figure with its limit and whether it is satisfied."""
     return {
         "value": value,
         "limit": limit,

@@ -1,4 +1,4 @@
-"""Wall times of whole cases, from what their runs have left in ``runs``."""
+"""Wall times of whole cases, read from their runs in ``runs``."""
 
 import json
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from benchmarks.support import turns
 
 RUNS = Path(__file__).parents[2] / "runs"
-FIGURES = {  # figure -> folder of its run, limit [s], elements of the board that it has at least
+FIGURES = {  # figure -> folder of its run, limit [s], least number of board elements
     "default case, answer complete [s]": ("jedec_bga", 180.0, 1),
     "hu_bga_drop, full size, finite + J2, two scales [s]": ("hu_bga_drop-physical", 1800.0, 100_000),
 }
@@ -17,7 +17,7 @@ COMMANDS = {
 
 
 def found_in_runs(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
-    """Return the figures of runs that are there, with their limits, and the commands that make the others."""
+    """Return the figures of existing runs with their limits, and the commands of the missing runs."""
     bars, missing = {}, {}
     for name, (case, limit, elements) in FIGURES.items():
         path = folder / case / "summary.json"

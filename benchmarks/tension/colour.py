@@ -1,14 +1,14 @@
-"""Surface tension as a force on a colour function (Brackbill et al. 1992, Morris 2000), of one liquid without a gas.
+"""Surface tension as a force on a colour function (Brackbill et al. 1992, Morris 2000), for a liquid without a gas.
 
-The colour is one in the liquid; smoothed by the kernel it falls towards the surface. Normals are the gradient of that,
-corrected by the inverse matrix of moments (Bonet & Lok 1999), and count where |grad c| h exceeds Morris's 0.01. The
-curvature is the divergence of the unit normals over those that count, scaled as by Adami et al. (2010), which is right
-beside a surface, too. The layer in which the force acts is as thick as the gradient of the colour itself, the sum of
-V grad W, whose integral over the liquid is a half: the other half would be the gas. The liquid bears both, as with the
-force weighted by density (Brackbill et al.).
+The colour is one in the liquid and decreases towards the surface when it is smoothed by the kernel. Normals are its
+gradient, corrected by the inverse matrix of moments (Bonet & Lok 1999), used where |grad c| h exceeds Morris's 0.01.
+The curvature is the divergence of the unit normals over these particles, scaled as by Adami et al. (2010), which is
+also correct near a surface. The force acts in a layer given by the gradient of the colour itself, the sum of V grad W,
+whose integral over the liquid is one half; the other half would be the gas. The liquid carries the whole force, as with
+the density-weighted force of Brackbill et al.
 
-On a wall the colour goes on in its images. Within the kernel's support of the wall normals turn into the one that the
-contact angle asks for (Breinlinger et al. 2013); then images, whose normals would have another angle, do not count.
+At a wall the colour continues in its mirror images. Within the kernel support of the wall, normals are turned towards
+the contact angle (Breinlinger et al. 2013); images, whose normals would have another angle, are excluded there.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ from reflowshock.particles.sph.fluid_state import Fields
 from reflowshock.particles.sph.particle_rates import compiled, solved
 from reflowshock.particles.sph.smoothing import SUPPORT, shape, slope
 
-# Over 1 / h: gradients of the colour that are less have no direction (Morris 2000).
+# Threshold of the colour gradient over 1 / h; smaller gradients have no reliable direction (Morris 2000).
 LEAST_SLOPE = 0.01
 
 
 @dataclass(slots=True)
 class ColourFunction(Untracked):
-    """The force of a colour function."""
+    """Surface tension by a colour function."""
 
     def accelerations(self, points: Floats, fields: Fields) -> Floats:
-        """As `Untracked.accelerations`."""
+        """Return the accelerations, as ``Untracked.accelerations``."""
         lists, count = self.lists.update(points, points), len(points)
         colour, curvature = np.empty(count), np.empty(count)
         layer, gradient, normal = np.empty((3, count)), np.empty((3, count)), np.zeros((3, count))
@@ -46,13 +46,13 @@ class ColourFunction(Untracked):
 
 @compiled
 def apart(fields, i, j, side):
-    """As `particle_rates.apart`, without periods: no scene here has any, and they would take a sixth of the force."""
+    """Return the distance vector of a pair without periodic images, which would cost a sixth more."""
     return fields.x[i] - fields.x[j], fields.y[i] - fields.y[j], fields.z[i] - side * fields.z[j]
 
 
 @looped
 def _smooth(lists, fields, law, colour, layer):
-    """The smoothed colour of each particle, the sum of V W, and that of V grad W `(3, n)` [1/m]; with the images."""
+    """Compute the smoothed colour, sum of V W, and the sum of V grad W [1/m], shape (3, n), images included."""
     offsets, indices = lists
     for i in prange(colour.shape[0]):
         total = gx = gy = gz = 0.0
@@ -69,9 +69,9 @@ def _smooth(lists, fields, law, colour, layer):
 
 
 @looped
-def _gradients(lists, fields, law, found, gradient):
-    """The corrected gradient of the smoothed colour `(3, n)`; that of the colour where neighbours do not resolve it."""
-    (offsets, indices), (colour, layer) = lists, found
+def _gradients(lists, fields, law, smoothed, gradient):
+    """Compute the corrected gradient of the smoothed colour, shape (3, n); uncorrected where neighbours are too few."""
+    (offsets, indices), (colour, layer) = lists, smoothed
     for i in prange(colour.shape[0]):
         bx = by = bz = xx = yy = zz = xy = yz = xz = 0.0
         for image in range(1 + (law.mirror if fields.z[i] < SUPPORT * law.length else 0)):
@@ -92,7 +92,7 @@ def _gradients(lists, fields, law, found, gradient):
 
 @looped
 def _normals(fields, law, cosine, gradient, normal):
-    """Outward unit normals `(3, n)`, zero where there is none; near a wall turned to the contact angle."""
+    """Compute outward unit normals, shape (3, n), zero without a direction, turned to the contact angle near a wall."""
     sine, reach = sqrt(1.0 - cosine * cosine), SUPPORT * law.length
     for i in prange(normal.shape[1]):
         nx, ny, nz = -gradient[0, i], -gradient[1, i], -gradient[2, i]
@@ -112,7 +112,7 @@ def _normals(fields, law, cosine, gradient, normal):
 
 @looped
 def _curvatures(lists, fields, law, normal, curvature):
-    """Divergence of the normals `(n,)` [1/m], over the particles that have one."""
+    """Compute the divergence [1/m] of the normals, shape (n,), over the particles with a normal."""
     offsets, indices = lists
     for i in prange(curvature.shape[0]):
         rise = scale = 0.0
@@ -120,7 +120,7 @@ def _curvatures(lists, fields, law, normal, curvature):
             j = indices[k]
             dx, dy, dz = apart(fields, i, j, 1.0)
             distance2 = dx * dx + dy * dy + dz * dz
-            counts = normal[0, j] ** 2 + normal[1, j] ** 2 + normal[2, j] ** 2  # one, or none
+            counts = normal[0, j] ** 2 + normal[1, j] ** 2 + normal[2, j] ** 2  # 1 with a normal, otherwise 0
             weight = (
                 counts * slope(law.kernel, False, sqrt(distance2) / law.length) * fields.mass[j] / fields.density[j]
             )

@@ -1,10 +1,10 @@
 """Surface tension as a pressure on the free surface: a_i = 2 p_i G_i / rho_i, p = gamma kappa, G the sum of V grad W.
 
-G is what the sums over pairs lack of a pressure at the surface: under a uniform p the liquid rests exactly, so that all
-error is that of the curvature. That is the curvature of the level c = 1/2 of a colour with a wide, smooth kernel
-(Wendland C4, support of four spacings) at the foot of each particle on the level, which a step of Newton's method a
-time step keeps there; then it is smoothed among the particles of the surface, which are those with |G| h above 0.03.
-Contact angles: the model has none; beside a mirror its angle would be 90 degrees.
+G is the defect of the pairwise pressure sums at the surface: under a uniform p the liquid rests exactly, so that the
+only error is in the curvature. The curvature is evaluated on the level c = 1/2 of a colour function with a wide, smooth
+kernel (Wendland C4, support of four spacings) at the foot point of each particle, which one Newton step per time step
+keeps on the level. It is then smoothed over the surface particles, which have |G| h above 0.03. The model has no
+contact angle; at a mirror the angle would be 90 degrees.
 """
 
 from dataclasses import dataclass, field
@@ -18,16 +18,20 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.sph.fluid_state import Fields
 from reflowshock.particles.sph.smoothing import shape, slope
 
-# Support of the colour over the spacing; passes that smooth the curvature; least |G| h at the surface.
+# Support of the colour over the spacing; smoothing passes of the curvature; threshold of |G| h at the surface.
 COLOUR_SUPPORT, PASSES, THRESHOLD = 4.0, 2, 0.03
-# Of the spacing: the longest step of Newton's method. Steps at the start.
+# Longest Newton step over the spacing; number of steps at the start.
 LONGEST, FIRST_STEPS = 0.5, 12
 WENDLAND_C4 = 495.0 / (32.0 * pi)
 
 
 @dataclass(slots=True)
 class FreeSurfacePressure(Untracked):
-    """The pressure of the free surface; `offsets`: `(n, 3)` from particles to their feet on the level [m]."""
+    """Surface tension by a pressure on the free surface.
+
+    Attributes:
+        offsets: Vectors [m] from particles to their foot points on the level, shape (n, 3).
+    """
 
     offsets: Floats = field(default_factory=lambda: np.empty((0, 3)))
     _around_feet: Lists = field(init=False)
@@ -37,7 +41,7 @@ class FreeSurfacePressure(Untracked):
         self._around_feet = Lists(COLOUR_SUPPORT * self.law.spacing, self.law.spacing)
 
     def accelerations(self, points: Floats, fields: Fields) -> Floats:
-        """As `Untracked.accelerations`."""
+        """Return the accelerations, as ``Untracked.accelerations``."""
         count = len(points)
         lists, lack = self.lists.update(points, points), np.empty((3, count))
         _lacks(lists, fields, self.law, lack)
@@ -59,7 +63,7 @@ class FreeSurfacePressure(Untracked):
 
 @looped
 def _lacks(lists, fields, law, lack):
-    """G of each particle `(3, n)` [1/m]."""
+    """Compute G [1/m] of each particle, shape (3, n)."""
     offsets, indices = lists
     for i in prange(lack.shape[1]):
         gx = gy = gz = 0.0
@@ -73,9 +77,9 @@ def _lacks(lists, fields, law, lack):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def level_at(place, row, fields, support):
-    """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a place."""
-    x, y, z = place
+def level_at(point, row, fields, support):
+    """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a point."""
+    x, y, z = point
     level = gx = gy = gz = xx = yy = zz = xy = yz = xz = 0.0
     for j in row:
         dx, dy, dz = x - fields.x[j], y - fields.y[j], z - fields.z[j]
@@ -92,18 +96,18 @@ def level_at(place, row, fields, support):
 
 
 @looped
-def _curvatures(lists, feet, at_surface, fields, found):
-    """Curvature [1/m] of the level at the feet of particles, and their offsets after a step of Newton's method [m]."""
-    spacing, curvature, offset = found
+def _curvatures(lists, feet, at_surface, fields, result):
+    """Compute the curvature [1/m] of the level at the foot points, and their offsets [m] after a Newton step."""
+    spacing, curvature, offset = result
     offsets, indices = lists
     for i in prange(feet.shape[0]):
         if not at_surface[i]:
             continue
         row = indices[offsets[i] : offsets[i + 1]]
-        place = (feet[i, 0], feet[i, 1], feet[i, 2])
-        level, gx, gy, gz, xx, yy, zz, xy, yz, xz = level_at(place, row, fields, COLOUR_SUPPORT * spacing)
+        foot = (feet[i, 0], feet[i, 1], feet[i, 2])
+        level, gx, gy, gz, xx, yy, zz, xy, yz, xz = level_at(foot, row, fields, COLOUR_SUPPORT * spacing)
         square = gx * gx + gy * gy + gz * gz
-        if square * spacing * spacing < 1e-8:  # a particle by itself has no surface
+        if square * spacing * spacing < 1e-8:  # an isolated particle has no surface
             curvature[i] = 0.0
             continue
         bend = (
@@ -121,10 +125,10 @@ def _curvatures(lists, feet, at_surface, fields, found):
 
 @looped
 def _smooth(lists, at_surface, fields, law, values):
-    """Mean of the values of the surface's particles over the kernel, the first of the pair into the second."""
-    given, found = values
+    """Average the first of two arrays over the surface particles with the kernel, into the second."""
+    values_in, values_out = values
     offsets, indices = lists
-    for i in prange(given.shape[0]):
+    for i in prange(values_in.shape[0]):
         total = weights = 0.0
         for k in range(offsets[i], offsets[i + 1]):
             j = indices[k]
@@ -133,5 +137,5 @@ def _smooth(lists, at_surface, fields, law, values):
             dx, dy, dz = fields.x[i] - fields.x[j], fields.y[i] - fields.y[j], fields.z[i] - fields.z[j]
             level = shape(law.kernel, False, sqrt(dx * dx + dy * dy + dz * dz) / law.length)
             weight = level * fields.mass[j] / fields.density[j]
-            total, weights = total + weight * given[j], weights + weight
-        found[i] = total / weights if weights > 0.0 else 0.0
+            total, weights = total + weight * values_in[j], weights + weight
+        values_out[i] = total / weights if weights > 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""The shape of particles without a surface: where a smoothed colour falls to one half, measured along rays.
+"""Shape of a particle cloud without a tracked surface: the level c = 1/2 of a smoothed colour function along rays.
 
-One yardstick for all models. The level stands off the surface by a share of the kernel's square over the radius of
-curvature; so a shape is compared with the same level of the exact body, filled with a lattice much finer.
+The same measure serves all models. The level deviates from the surface by an amount that grows with the curvature; a
+shape is therefore compared with the same level of the exact body, filled with a much finer lattice.
 """
 
 from math import pi, sqrt
@@ -13,38 +13,38 @@ from benchmarks.tension.free_pressure import WENDLAND_C4
 from reflowshock.arrays import Floats
 
 RAYS = 400
-# Over the spacing: the kernel's support, steps along a ray until it leaves the liquid; then halvings.
+# Kernel support and ray steps over the spacing; number of bisections.
 SUPPORT, STEP, HALVINGS = 4.0, 0.5, 30
-# Spacings of the lattice that fills an exact body, over those of the particles.
+# Spacing of the lattice in an exact body over the particle spacing.
 FINE = 1.0 / 3.0
 
 
 def rays(half: bool) -> Floats:
-    """Return directions `(400, 3)`, even over the sphere or over the upper half of it, the first straight up."""
+    """Return directions, shape (400, 3), uniform over the sphere or its upper half, the first straight up."""
     height = 1.0 - (np.arange(RAYS) / RAYS if half else 2.0 * np.arange(RAYS) / (RAYS - 1.0))
     turn, across = pi * (1.0 + sqrt(5.0)) * np.arange(RAYS), np.sqrt(np.maximum(1.0 - height**2, 0.0))
     return np.stack((across * np.cos(turn), across * np.sin(turn), height), axis=1)
 
 
 def level_points(points: Floats, volume: Floats, spacing: float, half: bool) -> Floats:
-    """Return points `(400, 3)` of the level around the centre of particles, which is that of its foot for a half.
+    """Return points of the level, shape (400, 3), around the centre of the particles or, for a half, its foot.
 
     Args:
-        points: `(n, 3)` of the particles [m].
-        volume: `(n,)` of each [m^3].
-        spacing: of the particles under test, also where others fill an exact body [m].
-        half: whether they stand on the mirror z = 0.
+        points: Particle positions [m], shape (n, 3).
+        volume: Particle volumes [m^3], shape (n,).
+        spacing: Spacing [m] of the tested particles, also for the lattice of an exact body.
+        half: Whether the particles stand on the mirror z = 0.
     """
     centre = volume @ points / volume.sum()
     if half:
         centre[2] = 0.0
-    found, directions = np.empty(RAYS), rays(half)
-    _cross(points, volume, (centre, SUPPORT * spacing, STEP * spacing, half), directions, found)
-    return centre + found[:, None] * directions
+    distances, directions = np.empty(RAYS), rays(half)
+    _cross(points, volume, (centre, SUPPORT * spacing, STEP * spacing, half), directions, distances)
+    return centre + distances[:, None] * directions
 
 
 def filled(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
-    """Return a fine lattice `(n, 3)` in a body within a reach [m] of the origin, and the volumes of its points."""
+    """Return a fine lattice, shape (n, 3), in a body within ``reach`` [m] of the origin, and its volumes."""
     fine = FINE * spacing
     places = fine * (np.arange(-int(reach / fine) - 1, int(reach / fine) + 1) + 0.5)
     points = np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1).T
@@ -53,16 +53,16 @@ def filled(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True)
-def _colour_at(place, points, volume, support, half):
-    """The colour at a place, with that of the images of particles that stand on the mirror."""
+def _colour_at(point, points, volume, support, half):
+    """Return the colour at a point, mirror images included."""
     total = 0.0
     for j in range(points.shape[0]):
-        dx, dy, dz = place[0] - points[j, 0], place[1] - points[j, 1], place[2] - points[j, 2]
+        dx, dy, dz = point[0] - points[j, 0], point[1] - points[j, 1], point[2] - points[j, 2]
         across2 = dx * dx + dy * dy
         if across2 >= support * support:
             continue
         for image in range(1 + half):
-            height = dz if image == 0 else place[2] + points[j, 2]
+            height = dz if image == 0 else point[2] + points[j, 2]
             q = sqrt(across2 + height * height) / support
             if q < 1.0:
                 total += volume[j] * (1.0 - q) ** 6 * (1.0 + 6.0 * q + 35.0 / 3.0 * q * q)
@@ -70,8 +70,8 @@ def _colour_at(place, points, volume, support, half):
 
 
 @njit(cache=True, parallel=True)
-def _cross(points, volume, how, directions, found):
-    """Distances from the centre at which rays meet the level; the outermost of the first liquid that they cross."""
+def _cross(points, volume, how, directions, distances):
+    """Compute the distances from the centre at which rays leave the first liquid that they cross."""
     centre, support, step, half = how
     for r in prange(directions.shape[0]):
         low, high = 0.0, step
@@ -83,4 +83,4 @@ def _cross(points, volume, how, directions, found):
                 low = middle
             else:
                 high = middle
-        found[r] = 0.5 * (low + high)
+        distances[r] = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""What models of surface tension share: lists of neighbours, and the surface that a simulation asks for."""
+"""Shared parts of the surface tension models: neighbour lists, and the surface interface of a simulation."""
 
 from dataclasses import dataclass, field
 
@@ -10,20 +10,20 @@ from reflowshock.particles.core.neighbours import find_near, have_moved
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 
-# Of the spacing: how much farther neighbours are listed than they are asked for.
+# Skin of the neighbour lists over the spacing.
 SKIN = 0.4
-# The program's own loops are compiled like that: sums in any order, several pairs at a time.
+# The same compiler options as the program's own loops, so that sums vectorise.
 looped = njit(cache=True, parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 @dataclass(slots=True)
 class Lists:
-    """Particles within a reach [m] of places, found again when one of either has moved by the skin.
+    """Neighbour lists of particles within a reach [m] of points, rebuilt when a point has moved by the skin.
 
     Attributes:
-        reach: [m].
-        spacing: of the particles [m].
-        rows: offsets `(m + 1,)` and indices.
+        reach: Search radius [m].
+        spacing: Particle spacing [m].
+        rows: Offsets, shape (m + 1,), and indices.
     """
 
     reach: float
@@ -32,7 +32,7 @@ class Lists:
     _built_at: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     def update(self, places: Floats, points: Floats) -> tuple[Indices, Indices]:
-        """Return the lists of places `(m, 3)` among points `(n, 3)` [m]."""
+        """Return the neighbour lists of ``places`` [m], shape (m, 3), among ``points`` [m], shape (n, 3)."""
         together, skin = np.concatenate((places, points)), SKIN * self.spacing
         if len(together) != len(self._built_at) or have_moved(together.T, self._built_at.T, skin):
             self.rows, self._built_at = find_near(places, points, self.reach + skin), together
@@ -41,15 +41,15 @@ class Lists:
 
 @dataclass(slots=True)
 class Untracked:
-    """Stands where `Simulation` has its tracked surface: tension as a force on the particles alone.
+    """Surface tension as a force on the particles, in place of the tracked surface of ``Simulation``.
 
     Attributes:
-        law: of the particles.
-        tension: gamma [N/m].
-        cosine: of the contact angle.
-        pressure: that of a tracked surface [Pa]: there is none.
-        needs_volume: whether a step asks for the volume that a tracked surface encloses.
-        lists: neighbours within the support of the kernel.
+        law: Constants of the particles.
+        tension: Surface tension gamma [N/m].
+        cosine: Cosine of the contact angle.
+        pressure: Pressure of a tracked surface [Pa], always zero.
+        needs_volume: Whether a step needs the volume enclosed by a tracked surface.
+        lists: Neighbours within the kernel support.
     """
 
     law: Law
@@ -63,17 +63,17 @@ class Untracked:
         self.lists = Lists(SUPPORT * self.law.length, self.law.spacing)
 
     def move(self, velocity: Floats, time_step: float, volume: float) -> None:
-        """Nothing is carried along."""
+        """Do nothing, since no surface is advected."""
 
     def add_to(self, rates: Floats, fields: Fields, carriers: int) -> None:
-        """Add the accelerations of the model to rows 1 to 3 of the rates `(10, n)`."""
+        """Add the accelerations of the model to rows 1 to 3 of the rates, shape (10, n)."""
         points = np.stack(fields[:3], axis=1)[:carriers]
         rates[1:4] += self.accelerations(points, fields)
 
     def accelerations(self, points: Floats, fields: Fields) -> Floats:
-        """Accelerations `(3, n)` [m/s^2] of particles at `(n, 3)` [m]."""
+        """Return accelerations [m/s^2], shape (3, n), of particles at points [m], shape (n, 3)."""
         raise NotImplementedError
 
     def bulk_pressure(self, points: Floats, fields: Fields) -> Floats | float:
-        """What the model's own forces add to the pressure of each particle inside `(n,)` [Pa]."""
+        """Return the contribution [Pa] of the model's forces to the pressure of inner particles, shape (n,)."""
         return 0.0

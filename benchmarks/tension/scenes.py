@@ -1,7 +1,8 @@
-"""Drops of one delta-SPH with four models of surface tension: at rest, on a wall, swinging, merging; and their errors.
+"""Delta-SPH drops with four models of surface tension: at rest, on a wall, swinging and merging, with their errors.
 
-Units of density, tension and diameter; time in sqrt(rho D^3 / gamma). Only a tracked surface keeps particles from being
-shifted out of the liquid: the other models run without shifting, as they do at their authors'.
+Density, tension and diameter are one; the unit of time is sqrt(rho D^3 / gamma). Only a tracked surface prevents
+shifting from moving particles out of the liquid; the other models therefore run without shifting, as in their
+publications.
 """
 
 from collections.abc import Callable
@@ -26,24 +27,25 @@ from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT
-from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.sph_flows.droplet import droplet
+from reflowshock.particles.surface.remeshing import EDGE
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 TRACKED = "tracked surface"
 MODELS = ("colour function", "pairwise", "free-surface pressure", TRACKED)
 UNIT = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "duration": 1.0, "gravity": 0.0}
-# Lengths of a stretched drop over those of the sphere; speeds of two drops that meet.
+# Stretch of a drop over the sphere; speed of two approaching drops.
 STRETCH, APPROACH = 1.05, 0.3
-# Share of the particles that may have left the liquid; with more it is torn apart. How often that is looked at.
+# Largest share of detached particles before a run counts as torn apart; number of checks.
 LOST, LOOKS = 0.02, 40
-# How much longer than wide a drop is that is nearly round.
+# Length over width of a nearly round drop.
 ROUND = 1.05
-# The height of a cap is the mean of this part of the rays, the steepest: one alone tells where particles stand.
+# The height of a cap is the mean over the steepest rays: a single ray depends on particle positions.
 TOP = 10
 
 
 def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
-    """Set up the drop of a scene, at the pressure of a sphere, with one of the models."""
+    """Set up the drop of a scene with one of the models, at the pressure of a sphere."""
     tracked = droplet(scene)
     if model == TRACKED:
         return tracked
@@ -52,30 +54,30 @@ def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
 
 
 def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
-    """Particles at rest at points `(3, n)` [m], at the pressure of a sphere."""
+    """Return particles at rest at points [m], shape (3, n), at the pressure of a sphere."""
     return flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
 
 
 def untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
-    """Particles without a tracked surface."""
-    given = (law, scene.surface_tension, cos(scene.angle))
+    """Return a simulation without a tracked surface."""
+    parameters = (law, scene.surface_tension, cos(scene.angle))
     if model == "pairwise":
-        surface = Pairwise(*given, factor=strength)
+        surface = Pairwise(*parameters, factor=strength)
         rest = law.rest_density + strength * cohesion(law, scene.surface_tension) / law.sound**2
         law = law._replace(rest_density=rest)
     else:
-        surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*given)
+        surface = {"colour function": ColourFunction, "free-surface pressure": FreeSurfacePressure}[model](*parameters)
     return Simulation(fields, len(fields.x), law, surface)
 
 
 def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
-    """A drop of density, tension and diameter one."""
+    """Return a drop with unit density, tension and diameter."""
     return Droplet(**UNIT | more, viscosity=ohnesorge, numerics=DropletNumerics(particles_per_diameter=across))
 
 
 def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
-    """Run to a time; what was sampled every step, the cost, and when and whether the liquid came apart."""
-    simulation.step(1e-9)  # compiled
+    """Run to a time; return the samples of every step, the cost, and when and why the liquid came apart."""
+    simulation.step(1e-9)  # compiles the kernels
     rows, seconds, looked, torn = [], 0.0, 0, {}
     try:
         while simulation.time < until and not torn:
@@ -88,12 +90,12 @@ def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], 
     except (SurfaceLost, FloatingPointError) as error:
         torn = {"torn_apart_at": simulation.time, "why": str(error)}
     count = simulation.fluids
-    found = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
-    return found | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
+    figures = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
+    return figures | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
 
 
 def stray(simulation: Simulation) -> int:
-    """Particles that no longer touch the largest part of the liquid."""
+    """Return the number of particles detached from the largest part of the liquid."""
     points = np.stack(simulation.fields[:3], axis=1)
     pairs = cKDTree(points).query_pairs(SUPPORT * simulation.law.length, output_type="ndarray")
     touch = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
@@ -101,7 +103,7 @@ def stray(simulation: Simulation) -> int:
 
 
 def came_apart(simulation: Simulation) -> dict:
-    """When the liquid came apart, if it did."""
+    """Return when and why the liquid came apart; empty if it did not."""
     fields = simulation.fields
     if not np.isfinite(np.array(fields[:3])).all():
         return {"torn_apart_at": simulation.time, "why": "positions are not finite"}
@@ -112,44 +114,48 @@ def came_apart(simulation: Simulation) -> dict:
 
 
 def volumes(fields: Fields) -> Floats:
-    """Of each particle [m^3]."""
+    """Return particle volumes [m^3]."""
     return fields.mass / fields.density
 
 
 def core_pressure(simulation: Simulation, radius: float) -> float:
-    """Mean pressure within half a radius of the centre, with that of the model's own forces [Pa]."""
+    """Return the mean pressure [Pa] within half a radius of the centre, including the model's own forces."""
     points = np.stack(simulation.fields[:3], axis=1)
-    own = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
+    model_pressure = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
     core = np.linalg.norm(points - points.mean(axis=0), axis=1) < 0.5 * radius
-    return float((simulation.pressures + own)[core].mean())
+    return float((simulation.pressures + model_pressure)[core].mean())
 
 
 def radii(simulation: Simulation) -> Floats:
-    """Distances of the level from the centre [m]."""
+    """Return the distances [m] of the level from the centre."""
     points, volume = np.stack(simulation.fields[:3], axis=1), volumes(simulation.fields)
     level = level_points(points, volume, simulation.law.spacing, half=False)
     return np.linalg.norm(level - volume @ points / volume.sum(), axis=1)
 
 
 def late(rows: Floats) -> Floats:
-    """The last tenth of what was sampled, time in the first column."""
+    """Return the last tenth of the samples, with time in the first column."""
     return rows[rows[:, 0] >= 0.9 * rows[-1, 0]]
 
 
 def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> dict:
-    """A cube becomes a sphere: pressure, roundness, capillary number at rest."""
+    """Let a cube become a sphere; return pressure, roundness and capillary number at rest."""
     scene = unit_drop(across, 0.2, start=shape)
 
-    def sample(one):
-        return one.time, core_pressure(one, 0.5) if one.steps % 10 == 0 else np.nan, one.fastest
+    def sample(flow_state):
+        return (
+            flow_state.time,
+            core_pressure(flow_state, 0.5) if flow_state.steps % 10 == 0 else np.nan,
+            flow_state.fastest,
+        )
 
     simulation = start(scene, model, strength)
-    found = follow(simulation, 2.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 2.0, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     radius = radii(simulation)
-    return found | {
+    return figures | {
         "pressure_error": float(np.nanmean(late(rows)[:, 1])) / scene.laplace_pressure - 1.0,
         "pressure_drift": float(np.nanstd(late(rows)[:, 1])) / scene.laplace_pressure,
         "roundness": float(radius.max() / radius.min()),
@@ -159,15 +165,15 @@ def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> di
 
 
 def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dict:
-    """A half sphere becomes a cap: height and base."""
+    """Let a half sphere become a cap; return the errors of height and base."""
     if model == "free-surface pressure":
-        return {"why": "the model has no contact angle; beside a mirror its angle is 90 degrees"}
+        return {"why": "the model has no contact angle; at a mirror the angle is 90 degrees"}
     scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
     simulation = start(scene, model, strength)
-    found = follow(simulation, 2.5, lambda one: (one.time, one.fastest))
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 2.5, lambda flow_state: (flow_state.time, flow_state.fastest))
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     spacing, angle = simulation.law.spacing, scene.angle
     radius = 0.5 * (4.0 / ((2.0 + cos(angle)) * (1.0 - cos(angle)) ** 2)) ** (1.0 / 3.0)
 
@@ -178,9 +184,9 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
     points = np.stack(simulation.fields[:3], axis=1)
     level = level_points(points, volumes(simulation.fields), spacing, half=True)
     exact = level_points(*filled(inside, 2.0 * radius, spacing), spacing, half=True)
-    bases = [base_width(one, spacing) for one in (level, exact)]
-    tops = [one[: RAYS // TOP, 2].mean() for one in (level, exact)]
-    return found | {
+    bases = [base_width(shape, spacing) for shape in (level, exact)]
+    tops = [shape[: RAYS // TOP, 2].mean() for shape in (level, exact)]
+    return figures | {
         "height_error": float(tops[0] / tops[1] - 1.0),
         "base_error": bases[0] / bases[1] - 1.0,
         "capillary_number": float(late(rows)[:, 1].max()) * scene.viscosity / scene.surface_tension,
@@ -189,7 +195,7 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
 
 
 def stretched(simulation: Simulation) -> Simulation:
-    """The same drop stretched along z, its surface too."""
+    """Return the drop stretched along z, with its surface."""
     fields, factors = simulation.fields, np.array([STRETCH**-0.5, STRETCH**-0.5, STRETCH])
     for axis in range(3):
         fields[axis][:] *= factors[axis]
@@ -199,19 +205,19 @@ def stretched(simulation: Simulation) -> Simulation:
 
 
 def swing(model: str, across: int, strength: float) -> dict:
-    """A stretched drop swings: period and decay over the exact ones, of a damped cosine fitted to second moments."""
+    """Let a stretched drop swing; return errors of period and decay of a damped cosine fitted to second moments."""
     scene = unit_drop(across, 0.05)
     frequency = rayleigh_frequency(2, 0.5, 1.0, 1.0)
     decay, exact = viscous_oscillation(2, frequency, scene.viscosity / 0.25)
 
-    def sample(one):
-        x, y, z = one.fields[:3]
-        return one.time * frequency, float(one.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
+    def sample(flow_state):
+        x, y, z = flow_state.fields[:3]
+        return flow_state.time * frequency, float(flow_state.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
 
-    found = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     time, moment = rows[rows[:, 0] > 0.5].T
 
     def damped(t, rate, turn, *parts):
@@ -221,53 +227,53 @@ def swing(model: str, across: int, strength: float) -> dict:
     try:
         fit, _ = curve_fit(damped, time, moment / rows[0, 1], first)
     except RuntimeError:
-        return found | {"why": "what it does is no damped swing"}
+        return figures | {"why": "the motion does not fit a damped oscillation"}
     left = np.std(moment / rows[0, 1] - damped(time, *fit)) / np.std(moment / rows[0, 1])
-    return found | {
+    return figures | {
         "period_error": float(exact / frequency / fit[1] - 1.0),
         "decay_error": float(fit[0] * frequency / decay - 1.0),
-        "not_a_swing": float(left),
+        "fit_residual": float(left),
     }
 
 
 def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
-    """Two drops beside each other along x, a gap [spacings] between them, that fly at each other at a speed [m/s]."""
-    one = droplet(scene)
-    aside = np.array([0.5 * scene.diameter + 0.5 * gap * one.law.spacing, 0.0, 0.0])
-    points, surface = np.array(one.fields[:3]), one.surface
+    """Return two drops along x that approach each other at a speed [m/s], a gap [spacings] between them."""
+    drop = droplet(scene)
+    aside = np.array([0.5 * scene.diameter + 0.5 * gap * drop.law.spacing, 0.0, 0.0])
+    points, surface = np.array(drop.fields[:3]), drop.surface
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
     if model != TRACKED:
-        law = one.law._replace(tracked=0, shifting=0.0)
+        law = drop.law._replace(tracked=0, shifting=0.0)
         fields = fields_at(scene, law, both)
         fields.u[:] = -speed * np.sign(both[0])
         return untracked(law, fields, scene, model, strength)
     corners, triangles = surface.points.copy(), surface.triangles.copy()
-    surface.points = corners - aside
+    surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = -speed * np.sign(both[0])
-    return Simulation(fields, both.shape[1], one.law, surface)
+    return Simulation(fields, both.shape[1], drop.law, surface)
 
 
 def merging(model: str, across: int, strength: float) -> dict:
-    """Two drops become one sphere: its radius, roundness and volume, and when it is nearly round."""
+    """Let two drops merge; return radius, roundness and volume of the sphere, and the time until it is nearly round."""
     scene = unit_drop(across, 0.2)
     simulation = pair(scene, model, strength)
 
-    def sample(one):
-        x, y, z = (axis - axis.mean() for axis in one.fields[:3])
-        return one.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), one.fastest
+    def sample(flow_state):
+        x, y, z = (axis - axis.mean() for axis in flow_state.fields[:3])
+        return flow_state.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), flow_state.fastest
 
-    found = follow(simulation, 3.0, sample)
-    rows = found.pop("rows")
-    if "torn_apart_at" in found:
-        return found
+    figures = follow(simulation, 3.0, sample)
+    rows = figures.pop("rows")
+    if "torn_apart_at" in figures:
+        return figures
     radius, spacing = np.cbrt(0.25), simulation.law.spacing
     exact = filled(lambda points: np.linalg.norm(points, axis=1) < radius, radius, spacing)
     distance = radii(simulation)
     level = np.linalg.norm(level_points(*exact, spacing, half=False), axis=1).mean()
     longer = np.flatnonzero(rows[:, 1] > ROUND)
-    return found | {
+    return figures | {
         "radius_error": float(distance.mean() / level - 1.0),
         "roundness": float(distance.max() / distance.min()),
         "pressure_error": core_pressure(simulation, radius) * radius / 2.0 - 1.0,

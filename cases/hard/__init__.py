@@ -1,1 +1,1 @@
-"""Hard cases: what breaks solvers like these, as files of data that pytest collects and tries within bounds."""
+"""Hard cases: data files of scenes that break comparable solvers, collected and checked by pytest."""

@@ -1,4 +1,4 @@
-"""A bound on a measure: a text such as "0.1 %" or "> 0.2 mm", and by what factor a value keeps it."""
+"""Bounds on measures: parse texts such as "0.1 %" or "> 0.2 mm" and compute the margin of a value."""
 
 import math
 import re
@@ -13,14 +13,14 @@ PURE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A limit that a measure stays below, or above.
+    """An upper bound on the absolute value of a measure, or a lower bound on its value.
 
     Attributes:
-        measure: its name.
-        text: the quantity as it was given, e.g. "0.1 %".
-        unit: of the text: "%", "" or any other.
-        limit: in SI base units, positive.
-        is_lower: whether the measure must stay above; an upper bound is one of the absolute value.
+        measure: Name of the measure.
+        text: Quantity as the file has it, such as "0.1 %".
+        unit: Unit of the text; "%" or "" for pure numbers.
+        limit: Positive limit in SI base units.
+        is_lower: Whether the bound is a lower one.
     """
 
     measure: str
@@ -31,67 +31,67 @@ class Bound:
 
     @property
     def sign(self) -> str:
-        """How it reads."""
+        """Comparison sign of the bound as text."""
         return ">=" if self.is_lower else "<="
 
-    def margin(self, found: Measured) -> float:
-        """Return by what factor a value keeps the bound: 1 at the bound, less beyond it, nan for nan.
+    def margin(self, measured: Measured) -> float:
+        """Return the safety factor of a value against the bound: 1 at the bound, less beyond it, nan for nan.
 
         Raises:
-            UnitError: the value has another dimension than the bound.
+            UnitError: If value and bound have different dimensions.
         """
-        if kind(found.unit) != kind(self.unit):
-            raise UnitError(f"{self.measure} is in {found.unit or 'pure numbers'}, its bound is {self.text}")
-        value = si_value(found)
+        if kind(measured.unit) != kind(self.unit):
+            raise UnitError(f"{self.measure} is in {measured.unit or 'pure numbers'}, its bound is {self.text}")
+        value = si_value(measured)
         if not math.isfinite(value):
             return math.nan
         if self.is_lower:
             return max(0.0, value) / self.limit
         return self.limit / abs(value) if value else math.inf
 
-    def shown(self, found: Measured) -> str:
+    def shown(self, measured: Measured) -> str:
         """Write a value in the unit of the bound."""
-        value = si_value(found)
+        value = si_value(measured)
         if self.unit == "%":
             return f"{100.0 * value:.3g} %"
         return f"{in_unit(value, self.unit):.3g} {self.unit}".rstrip() if self.unit else f"{value:.3g}"
 
 
-def read_bound(measure: str, given: object, unit: str | None) -> Bound:
-    """Read one bound.
+def read_bound(measure: str, value: object, unit: str | None) -> Bound:
+    """Parse one bound.
 
     Args:
-        measure: what it bounds.
-        given: a number, or a text: a sign or none (for <=) and a quantity.
-        unit: of the measure; None where it is not known yet.
+        measure: Name of the measure.
+        value: Number, or text with an optional sign (default ``<=``) and a quantity.
+        unit: Unit of the measure; None if it is unknown before the trial has run.
 
     Raises:
-        UnitError: no number, another dimension, not positive, or infinite.
+        UnitError: If the value is not a positive finite number or has the wrong dimension.
     """
-    match = TEXT.fullmatch(str(given))
+    match = TEXT.fullmatch(str(value))
     text, sign = (match["quantity"], match["sign"]) if match else ("", "")
-    own, limit = _quantity(text, unit)
+    bound_unit, limit = _quantity(text, unit)
     if not limit > 0.0:
         raise UnitError("must be positive")
     if math.isinf(limit):
         raise UnitError("must be finite")
-    return Bound(measure, text, own, limit, sign.startswith(">"))
+    return Bound(measure, text, bound_unit, limit, sign.startswith(">"))
 
 
-def si_value(found: Measured) -> float:
+def si_value(measured: Measured) -> float:
     """Return a measured value in SI base units."""
-    if found.unit in ("", "%"):
-        return found.value / (100.0 if found.unit else 1.0)
-    return quantity_in_si(found.value, found.unit)
+    if measured.unit in ("", "%"):
+        return measured.value / (100.0 if measured.unit else 1.0)
+    return quantity_in_si(measured.value, measured.unit)
 
 
 def kind(unit: str) -> str:
-    """Name the dimension of a unit, "%" and "" included."""
+    """Return the dimension of a unit; "%" and "" are dimensionless."""
     return dimension("" if unit == "%" else unit)
 
 
 def _quantity(text: str, unit: str | None) -> tuple[str, float]:
-    """Return unit and SI value of a quantity, which must be of the dimension of a unit if one is given."""
+    """Return unit and SI value of a quantity; check its dimension if ``unit`` is not None."""
     pure = PURE.fullmatch(text)
     if pure:
         if unit is not None and kind(unit) != kind(""):
@@ -99,5 +99,5 @@ def _quantity(text: str, unit: str | None) -> tuple[str, float]:
         return pure["percent"], float(pure["number"]) / (100.0 if pure["percent"] else 1.0)
     if unit in ("", "%"):
         raise UnitError('is not a pure number, such as "1e-3" or "0.1 %"')
-    own = text.partition(" ")[2].strip()
-    return own, to_si(text, unit or own)
+    text_unit = text.partition(" ")[2].strip()
+    return text_unit, to_si(text, unit or text_unit)

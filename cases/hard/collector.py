@@ -1,6 +1,6 @@
-"""Collector of hard cases for pytest: each combination of the values of a file is a test, its bounds are the asserts.
+"""Pytest collector of hard cases: each combination of varied values is a test, its bounds are the assertions.
 
-Without options the first combination of each file is tried, and no random case; where the file is long, by -m long.
+Without options the first combination of each file runs, and no random case; files marked long run with -m long.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> "HardFile | None":
-    """Collect the files of the program, and those that are named."""
+    """Collect the files of the program and explicitly named files."""
     is_hard = file_path.resolve().parent == HARD or parent.session.isinitpath(file_path)
     return HardFile.from_parent(parent, path=file_path) if is_hard and file_path.suffix == ".toml" else None
 
@@ -35,7 +35,7 @@ class HardFile(pytest.File):
     """A file of hard cases."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Yield its cases, or the search for a simpler one."""
+        """Yield the cases, or the search for a simpler one."""
         try:
             random = read_random_file(self.path)
             if random is None:
@@ -57,19 +57,19 @@ class HardFile(pytest.File):
         return HardItem.from_parent(self, name=case.tried or case.name, case=case)
 
     def _number(self, option: str) -> int | None:
-        given = dict(text.split("=") for text in self.config.getoption(option, []))
-        return int(given[self.path.stem]) if self.path.stem in given else None
+        numbers = dict(text.split("=") for text in self.config.getoption(option, []))
+        return int(numbers[self.path.stem]) if self.path.stem in numbers else None
 
 
 class MissError(Exception):
-    """A hard case did not keep its bounds."""
+    """A hard case that missed its bounds."""
 
 
 class HardItem(pytest.Item):
-    """A hard case; its report has the verdict as property "verdict"."""
+    """Hard case as a test; its report has the verdict as property "verdict"."""
 
     def __init__(self, *, case: HardCase, **others) -> None:
-        """Limit its time."""
+        """Set the time limit of the case."""
         super().__init__(**others)
         self.case = case
         self.add_marker(pytest.mark.timeout(case.deadline, method="thread"))
@@ -77,32 +77,32 @@ class HardItem(pytest.Item):
             self.add_marker(pytest.mark.long)
 
     def runtest(self) -> None:
-        """Try it."""
+        """Run the case."""
         verdict = attempt(self.case)
         self.user_properties.append(("verdict", verdict.record()))
         if not verdict.ok:
             raise MissError(verdict)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style=None):
-        """Tell a miss in its own words."""
+        """Return the verdict of a miss."""
         return str(excinfo.value) if isinstance(excinfo.value, MissError) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Name it."""
+        """Return file and name of the case."""
         return self.path, None, f"{self.path.stem} ({self.name})"
 
 
 class Search(pytest.Item):
-    """The search for the simplest random case that misses; its report has the table as property "simplest"."""
+    """Search for the simplest random case that misses; its report has the table as property "simplest"."""
 
     def __init__(self, *, file: RandomFile, drawn: tuple[int, int], **others) -> None:
-        """Keep how many were drawn and which one missed."""
+        """Store the number of drawn cases and the number of the missed one."""
         super().__init__(**others)
         self.file, self.drawn = file, drawn
         self.add_marker(pytest.mark.timeout(3.0 * LONGEST_SEARCH, method="thread"))
 
     def runtest(self) -> None:
-        """Search."""
+        """Run the search."""
         count, number = self.drawn
-        found = self.file.simplest(count, self.config.getoption("random_seed"), number)
-        self.user_properties.append(("simplest", found))
+        table = self.file.simplest(count, self.config.getoption("random_seed"), number)
+        self.user_properties.append(("simplest", table))

@@ -1,4 +1,4 @@
-"""What random cases draw: tables of parameters as a file has them, within what their trials allow."""
+"""Hypothesis strategies of random cases: tables of parameters as in a file, within the ranges of their trials."""
 
 from typing import Any
 
@@ -8,26 +8,26 @@ Table = st.SearchStrategy[dict[str, Any]]
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Draw plain numbers, to four digits and to a millionth of the range: smaller ones are zero."""
+    """Draw numbers with four digits; numbers below a millionth of the range become zero."""
     least = 1e-6 * (high - low)
     return st.floats(low, high).map(lambda value: float(f"{value:.4g}") if abs(value) > least or low > 0.0 else 0.0)
 
 
 def powers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Draw positive numbers of any size between two powers of ten, to four digits."""
+    """Draw positive numbers between two powers of ten with four digits."""
     return numbers(low, high).map(lambda exponent: float(f"{10.0**exponent:.4g}"))
 
 
 def quantities(low: float, high: float, unit: str) -> st.SearchStrategy[str]:
-    """Draw quantities as a file has them, to four digits."""
+    """Draw quantities as texts with four digits."""
     return numbers(low, high).map(lambda value: f"{value:.4g} {unit}".strip())
 
 
 def tables(*parts: Table, **values: Any) -> Table:
-    """Draw a table of all parts and of values, each a strategy or what it always is."""
-    drawn = {name: one if isinstance(one, st.SearchStrategy) else st.just(one) for name, one in values.items()}
+    """Draw a table that merges all parts with values, each a strategy or a constant."""
+    drawn = {name: value if isinstance(value, st.SearchStrategy) else st.just(value) for name, value in values.items()}
     return st.tuples(*parts, st.fixed_dictionaries(drawn)).map(
-        lambda found: {name: value for part in found for name, value in part.items()}
+        lambda tables_of_parts: {name: value for part in tables_of_parts for name, value in part.items()}
     )
 
 
@@ -93,7 +93,7 @@ DROPS = tables(
 
 @st.composite
 def joints(draw: st.DrawFn) -> dict[str, Any]:
-    """A joint between pads of some sizes, filled by 0.8 to 2 times the cylinder between them, offset and tilted."""
+    """Draw a joint between pads, filled by 0.8 to 2 times the cylinder between them, offset and tilted."""
     bottom, top, gap = draw(numbers(0.15, 0.3)), draw(numbers(0.15, 0.3)), draw(numbers(0.2, 0.45))
     mean = 0.5 * (bottom + top)
     volume = draw(numbers(0.8, 2.0)) * 3.1416 * mean**2 * gap
@@ -113,7 +113,7 @@ def joints(draw: st.DrawFn) -> dict[str, Any]:
 
 @st.composite
 def revolved_bodies(draw: st.DrawFn) -> dict[str, Any]:
-    """A barrel or hourglass between discs of two radii, shifted by up to half a radius and tilted."""
+    """Draw a barrel or hourglass between discs of two radii, shifted by up to half a radius and tilted."""
     lower, upper = draw(numbers(0.16, 0.3)), draw(numbers(0.16, 0.3))
     least = min(lower, upper)
     return {
@@ -149,9 +149,9 @@ OVERFLOWS = tables(
 
 @st.composite
 def struck_walls(draw: st.DrawFn) -> dict[str, Any]:
-    """A drop or two side by side that strike a wall, Weber number 1 to 100, Reynolds number 5 to 500; noisy or not.
+    """Draw one or two drops side by side that strike a wall, Weber number 1 to 100, Reynolds number 5 to 500.
 
-    The wall holds contact lines at rest or not.
+    The wall has contact angle hysteresis or not, and the particles are noisy or not.
     """
     diameter, density, tension, weber = 50e-6, 1000.0, 0.07, draw(powers(0.0, 2.0))
     angle, held = draw(numbers(30.0, 150.0)), draw(st.sampled_from([0.0, 0.0, 30.0]))

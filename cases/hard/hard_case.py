@@ -1,4 +1,4 @@
-"""A hard case: a TOML file, or each combination of the values that it varies, read and checked before any is run."""
+"""Hard cases: TOML files, with one case for each combination of varied values, validated before any runs."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -27,11 +27,11 @@ FREE_TABLES = ("parameters", "vary", "bounds")
 
 
 class HardCaseFile(BaseModel):
-    """A hard case as its file has it.
+    """Content of a hard case file.
 
-    ``parameters`` are those of the trial; ``vary`` gives lists of values for some of them; ``bounds`` are upper ones of
-    absolute values, or lower ones with a sign: "> 0.2". ``expect`` is a part of the error with which the case must be
-    refused. After the deadline a case is taken to hang. What is ``long`` is left out of `make test`.
+    ``parameters`` belong to the trial; ``vary`` lists values of some of them; ``bounds`` are upper bounds on absolute
+    values or, with a sign such as "> 0.2", lower bounds. ``expect`` is a part of the error with which the case must be
+    refused. After the deadline a case counts as hanging. ``long`` cases run in ``make test-long`` only.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -50,22 +50,22 @@ class HardCaseFile(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class HardCase:
-    """One case to try.
+    """One hard case.
 
     Attributes:
-        name: of its file, without suffix.
-        tried: the varied values in words, "" where none is.
-        family: one of `FAMILIES`.
-        title: what is tried.
-        why: what breaks others here.
-        trial: what is done.
-        given: parameters of the trial as a file has them.
-        parameters: the same in SI values.
-        bounds: that its measures must keep.
-        expect: part of the error with which it must be refused, or "".
-        deadline: after which it is taken to hang [s].
-        long: whether `make test` leaves it to `make test-long`.
-        may_be_refused: whether it is no miss if the trial refuses it in words.
+        name: Name of the file without suffix.
+        tried: Varied values as text; empty without variation.
+        family: One of ``FAMILIES``.
+        title: Title of the case.
+        why: Weakness of other solvers that the case tests.
+        trial: Trial to run.
+        table: Parameters of the trial as in the file.
+        parameters: Parameters in SI values.
+        bounds: Bounds on the measures.
+        expect: Part of the error with which the case must be refused; empty if it must run.
+        deadline: Time limit [s].
+        long: Whether only ``make test-long`` runs the case.
+        may_be_refused: Whether a refusal is not a miss.
     """
 
     name: str
@@ -74,7 +74,7 @@ class HardCase:
     title: str
     why: str
     trial: Trial
-    given: dict[str, Any]
+    table: dict[str, Any]
     parameters: BaseModel
     bounds: tuple[Bound, ...]
     expect: str
@@ -87,21 +87,21 @@ def read_hard_cases(path: Path) -> list[HardCase]:
     """Read the cases of a file.
 
     Raises:
-        CaseError: with all problems found: syntax, unknown names, units, ranges.
+        CaseError: With all problems of the file: syntax, unknown names, units, ranges.
     """
     return hard_cases(path.stem, read_toml(path), str(path), path.parent)
 
 
 def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -> list[HardCase]:
-    """Make the cases of a table as a file has it.
+    """Return the cases of the table of a file.
 
     Args:
-        name: of the case.
-        table: of the file.
-        source: where it is from, for errors.
-        folder: that names of files in it are relative to.
+        name: Name of the case.
+        table: Content of the file.
+        source: Source named in errors.
+        folder: Base folder of file names in the table.
 
-    Raises: as `read_hard_cases`.
+    Raises: as ``read_hard_cases``.
     """
     problems: list[Problem] = []
     head = _read_head(dict(table), source)
@@ -112,7 +112,7 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
             name=name,
             tried=tried,
             trial=trial,
-            given=values,
+            table=values,
             parameters=parameters,
             bounds=bounds,
             **head.model_dump(include={"family", "title", "why", "expect", "deadline", "long"}),
@@ -126,10 +126,12 @@ def hard_cases(name: str, table: Mapping[str, Any], source: str, folder: Path) -
 
 
 def _read_head(table: dict, source: str) -> HardCaseFile:
-    """Read all but what is in the tables of the trial."""
+    """Validate the file except the tables of the trial."""
     problems: list[Problem] = []
-    own = {name: value for name, value in table.items() if name not in FREE_TABLES}
-    values = fields.to_si_table(HardCaseFile, own, "", problems) | {n: table[n] for n in FREE_TABLES if n in table}
+    head_values = {name: value for name, value in table.items() if name not in FREE_TABLES}
+    values = fields.to_si_table(HardCaseFile, head_values, "", problems) | {
+        n: table[n] for n in FREE_TABLES if n in table
+    }
     head = None
     try:
         head = HardCaseFile.model_validate(values, strict=True)
@@ -144,28 +146,28 @@ def _read_head(table: dict, source: str) -> HardCaseFile:
 
 
 def _trial_of(head: HardCaseFile, source: str) -> Trial:
-    known = trials()
-    if head.trial not in known:
-        choice, hint = "one of " + ", ".join(known), nearest(head.trial, known)
+    all_trials = trials()
+    if head.trial not in all_trials:
+        choice, hint = "one of " + ", ".join(all_trials), nearest(head.trial, all_trials)
         raise CaseError(source, [Problem("trial", "unknown trial", head.trial, choice, hint)])
-    return known[head.trial]
+    return all_trials[head.trial]
 
 
 def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterator[Bound]:
-    """Yield the bounds; a measure may have several, as a list."""
+    """Yield the bounds; a measure may have a list of bounds."""
     if not head.bounds and not head.expect:
         problems.append(Problem("bounds", "nothing is judged: give bounds, or expect", None))
     if head.bounds and head.expect:
         problems.append(Problem("bounds", "nothing is measured of a case that must be refused", None, "expect alone"))
-    for measure, given in head.bounds.items():
+    for measure, values in head.bounds.items():
         key, names = f"bounds.{measure}", trial.measures
         if names is not None and measure not in names:
             choice, hint = "one of " + ", ".join(names), nearest(measure, names)
-            problems.append(Problem(key, f"the trial {head.trial} measures no such thing", given, choice, hint))
+            problems.append(Problem(key, f"the trial {head.trial} measures no such thing", values, choice, hint))
             continue
-        texts = given if isinstance(given, list) else [given]
+        texts = values if isinstance(values, list) else [values]
         if not texts:
-            problems.append(Problem(key, "nothing is judged: give a bound, or a list of some", given))
+            problems.append(Problem(key, "nothing is judged: give a bound, or a list of some", values))
         for text in texts:
             try:
                 yield read_bound(measure, text, None if names is None else names[measure])
@@ -174,14 +176,14 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
 
 
 def hard_case_text(table: Mapping[str, Any], prefix: str = "") -> str:
-    """Write the table of a hard case as TOML: its values, then its tables."""
+    """Return the TOML text of a hard case: its values, then its tables."""
     values = [f"{name} = {as_toml(value)}\n" for name, value in table.items() if not isinstance(value, Mapping)]
     tables = [(f"{prefix}{name}", value) for name, value in table.items() if isinstance(value, Mapping)]
     return "".join(values) + "".join(f"\n[{name}]\n{hard_case_text(value, f'{name}.')}" for name, value in tables)
 
 
 def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple[str, dict]]:
-    """Yield each combination of the varied values: in words, and the parameters with them."""
+    """Yield text and parameters of each combination of varied values."""
     varied: dict[str, list] = {}
     for key, values in dotted(head.vary):
         if not isinstance(values, list) or not values:
@@ -201,13 +203,13 @@ def _combinations(head: HardCaseFile, problems: list[Problem]) -> Iterator[tuple
 
 
 def _parameters(trial: Trial, table: dict, folder: Path, problems: list[Problem]) -> BaseModel | None:
-    """Convert and check the parameters of a trial; None, and problems added, where that cannot be."""
-    found: list[Problem] = []
-    values = trial.located(fields.to_si_table(trial.parameters, table, "", found), folder)
+    """Validate and convert the parameters of a trial; add problems and return None if they are invalid."""
+    found_problems: list[Problem] = []
+    values = trial.located(fields.to_si_table(trial.parameters, table, "", found_problems), folder)
     parameters = None
     try:
         parameters = trial.parameters.model_validate(values, strict=True)
     except ValidationError as error:
-        found += translate(trial.parameters, error, table, {problem.key for problem in found})
-    problems += [replace(problem, key=f"parameters.{problem.key}".rstrip(".")) for problem in found]
-    return None if found else parameters
+        found_problems += translate(trial.parameters, error, table, {problem.key for problem in found_problems})
+    problems += [replace(problem, key=f"parameters.{problem.key}".rstrip(".")) for problem in found_problems]
+    return None if found_problems else parameters

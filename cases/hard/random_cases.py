@@ -1,4 +1,4 @@
-"""Random cases: a file whose parameters hypothesis draws from a seed; one that misses is made simple."""
+"""Random cases: hypothesis draws parameters from a seed, and simplifies a case that misses."""
 
 import contextlib
 import time
@@ -18,22 +18,22 @@ from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import read_toml
 
-LONGEST_SEARCH = 120.0  # for a simpler case that misses, too [s]
+LONGEST_SEARCH = 120.0  # time limit of the search for a simpler miss [s]
 
 
 class _Miss(Exception):
-    """Tells hypothesis that a case misses."""
+    """Signal to hypothesis that a case misses."""
 
 
 @dataclass(frozen=True, slots=True)
 class RandomFile:
-    """A hard case without parameters, and what draws them.
+    """Hard case whose parameters are drawn.
 
     Attributes:
-        path: of the file.
-        draws: name of one of `DRAWS`.
-        share: how many of these for one of another file of the family.
-        table: all else as the file has it.
+        path: File of the case.
+        draws: Name of a strategy in ``DRAWS``.
+        share: Relative number of cases within the family.
+        table: Remaining content of the file.
     """
 
     path: Path
@@ -43,31 +43,31 @@ class RandomFile:
 
     @property
     def name(self) -> str:
-        """Name of its cases."""
+        """Name of the cases."""
         return self.path.stem
 
     def file_table(self, parameters: dict[str, Any]) -> dict[str, Any]:
-        """Return a case as a file of its own would have it."""
+        """Return a drawn case as the table of a separate file."""
         return self.table | {"parameters": parameters}
 
     def case(self, parameters: dict[str, Any], number: int) -> HardCase:
-        """Return a case as it is tried.
+        """Return a drawn case.
 
         Raises:
-            CaseError: what was drawn is out of the range of the parameters.
+            CaseError: If the drawn values are out of range.
         """
         (case,) = hard_cases(self.name, self.file_table(parameters), str(self.path), self.path.parent)
         return replace(case, tried=f"number {number}", may_be_refused=True)
 
     def cases(self, count: int, seed: int) -> list[HardCase]:
-        """Draw cases; the same for the same seed."""
+        """Draw cases, reproducibly for a seed."""
         tables: list[dict[str, Any]] = []
         self._visit(count, seed, tables.append)
         return [self.case(table, number) for number, table in enumerate(tables)]
 
     def simplest(self, count: int, seed: int, number: int) -> dict[str, Any]:
-        """Draw again, and let hypothesis simplify the parameters of a case that missed for as long as it misses."""
-        first, end = self.cases(count, seed)[number].given, time.monotonic() + LONGEST_SEARCH
+        """Draw again and let hypothesis simplify the parameters of a missed case while it still misses."""
+        first, end = self.cases(count, seed)[number].table, time.monotonic() + LONGEST_SEARCH
         missed: list[dict[str, Any]] = []
         survived: dict[str, bool] = {str(first): False}
 
@@ -85,7 +85,7 @@ class RandomFile:
         return missed[-1]
 
     def _visit(self, count: int, seed: int, visit: Callable[[dict[str, Any]], None]) -> None:
-        """Draw tables and visit each; where a visit raises, hypothesis looks for a simpler table that does, too."""
+        """Draw tables and visit each; if a visit raises, hypothesis searches for a simpler table that also raises."""
 
         @hypothesis.settings(
             max_examples=count,
@@ -105,10 +105,10 @@ class RandomFile:
 
 
 def read_random_file(path: Path) -> RandomFile | None:
-    """Read a file of random cases; None where it has fixed ones.
+    """Read a file of random cases; return None if its cases are fixed.
 
     Raises:
-        CaseError: it is not TOML, or what it draws is not known.
+        CaseError: If it is not TOML or names an unknown strategy.
     """
     table = read_toml(path)
     draws, share = table.pop("draws", None), table.pop("share", 1)
@@ -121,11 +121,11 @@ def read_random_file(path: Path) -> RandomFile | None:
 
 
 def shares(files: Sequence[RandomFile], count: int) -> Iterator[tuple[RandomFile, int]]:
-    """Divide a number of cases among the random files of a family by their shares."""
-    whole, given, weight = sum(file.share for file in files), 0, 0
+    """Divide a number of cases among the random files of a family in proportion to their shares."""
+    whole, assigned, weight = sum(file.share for file in files), 0, 0
     for file in files:
         weight += file.share
-        own = round(count * weight / whole) - given
-        given += own
-        if own:
-            yield file, own
+        cases_of_file = round(count * weight / whole) - assigned
+        assigned += cases_of_file
+        if cases_of_file:
+            yield file, cases_of_file

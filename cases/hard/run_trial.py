@@ -1,4 +1,4 @@
-"""The trial of all families that runs an ordinary case file with settings, judged by the metrics of its summary."""
+"""Trial of all families that runs an ordinary case file with settings and returns the metrics of its summary."""
 
 import json
 import os
@@ -22,14 +22,14 @@ LAST_LINES = 3
 
 
 class RunParameters(Parameters):
-    """A case file, its name relative to the hard case's own, and settings: dotted keys with values as for --set."""
+    """Case file, relative to the hard case, and settings: dotted keys with values as for ``--set``."""
 
     case: str = Field(min_length=1)
     settings: dict = Field(default_factory=dict)
 
     @property
     def overrides(self) -> list[str]:
-        """The settings as ``--set`` takes them."""
+        """Settings in the form of ``--set``."""
         return [f"{key}={as_toml(value)}" for key, value in dotted(self.settings)]
 
     @model_validator(mode="after")
@@ -42,10 +42,10 @@ class RunParameters(Parameters):
 
 
 def run_case(parameters: RunParameters) -> dict[str, Measured]:
-    """Run a case to its report; all its metrics.
+    """Run a case to its report and return all its metrics.
 
     Raises:
-        RuntimeError: the run failed or a check did not hold; with its last words.
+        RuntimeError: If the run or a health check failed, with the last lines of its output.
     """
     settings = [part for override in parameters.overrides for part in ("--set", override)]
     with tempfile.TemporaryDirectory() as folder:

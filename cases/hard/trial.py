@@ -1,4 +1,4 @@
-"""A trial: what is done with the parameters of a hard case, and the measures that it returns."""
+"""Trials: functions that take the parameters of a hard case and return its measures."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,36 +10,36 @@ from typing import Any
 from pydantic import BaseModel
 
 FAMILIES = ("reflow", "droplets", "elements", "coupling", "remesh")
-# Each has a table TRIALS: name -> Trial; names are unique among all.
+# Each module has a table TRIALS: name -> Trial. Names are unique over all modules.
 TABLES = (*(f"trials.{family}" for family in FAMILIES), "run_trial")
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A number with its unit: any that pint knows, "%" or "" for a pure number."""
+    """A number with its unit: any unit of pint, or "%" or "" for pure numbers."""
 
     value: float
     unit: str = ""
 
 
 class Refused(ValueError):
-    """What the program refuses in words, before or instead of a result: no miss of a random case, else of any."""
+    """Refusal of the program to compute a case; a miss, except for random cases."""
 
 
 def as_given(table: dict, folder: Path) -> dict:
-    """Leave a table of SI values as it is: it names no files."""
+    """Return a table of SI values unchanged, since it names no files."""
     return table
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Something that is computed in this process, in about a second.
+    """A computation of about one second in this process.
 
     Attributes:
-        parameters: model of the table ``[parameters]``; units as in all parameter models.
-        run: computes, pure numbers or others; one that is missing, nan or infinite is a miss, and so is an exception.
-        measures: all that `run` may return, name -> unit of which a bound must be; None where only `run` knows.
-        located: takes names of files in a table of SI values as relative to the folder of the hard case.
+        parameters: Model of the table ``[parameters]``.
+        run: Function from parameters to measures. Exceptions and missing, nan or infinite measures are misses.
+        measures: Names of all measures -> unit of their bounds; None if they are unknown before the run.
+        located: Function that resolves file names in a table of SI values against the folder of the hard case.
     """
 
     parameters: type[BaseModel]
@@ -48,29 +48,31 @@ class Trial:
     located: Callable[[dict, Path], dict] = as_given
 
     def measure(self, parameters: BaseModel) -> dict[str, Measured]:
-        """Compute; return all measures with their units."""
-        found = self.run(parameters)
-        return {name: value if isinstance(value, Measured) else Measured(float(value)) for name, value in found.items()}
+        """Run the trial and return all measures with their units."""
+        results = self.run(parameters)
+        return {
+            name: value if isinstance(value, Measured) else Measured(float(value)) for name, value in results.items()
+        }
 
 
-def pure_trial(parameters: type[BaseModel], place: str, measures: str) -> Trial:
-    """Return the trial of a function that returns pure numbers, whose solver is loaded when it is first run.
+def pure_trial(parameters: type[BaseModel], function_path: str, measures: str) -> Trial:
+    """Return the trial of a function that returns pure numbers; its module is imported on the first run.
 
     Args:
-        parameters: its only argument.
-        place: module of `trials` and function, with a colon between.
-        measures: names of what it returns, with spaces between.
+        parameters: Model of the only argument.
+        function_path: ``"module:function"`` in the folder ``trials``.
+        measures: Names of the returned measures, separated by spaces.
     """
-    module, function = place.split(":")
+    module, function = function_path.split(":")
 
-    def run(given: BaseModel) -> Mapping[str, float]:
-        return getattr(import_module(f"{__package__}.trials.{module}"), function)(given)
+    def run(values: BaseModel) -> Mapping[str, float]:
+        return getattr(import_module(f"{__package__}.trials.{module}"), function)(values)
 
     return Trial(parameters, run, dict.fromkeys(measures.split(), ""))
 
 
 @cache
 def trials() -> dict[str, Trial]:
-    """Return the trials of all families by name; loads no solver."""
+    """Return the trials of all families by name, without loading a solver."""
     tables = [import_module(f"{__package__}.{name}").TRIALS for name in TABLES]
     return {name: trial for table in tables for name, trial in table.items()}

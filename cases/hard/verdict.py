@@ -1,4 +1,4 @@
-"""Trying a hard case and judging it: what was measured against each bound, or why there is no measure."""
+"""Verdicts on hard cases: each measure against its bound, or the error that ended the trial."""
 
 import math
 import time
@@ -16,42 +16,42 @@ LARGEST_SHOWN = 1000.0  # margin
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A measure against its bound: both in words, and the factor by which it keeps it (1: at the bound)."""
+    """A measure and its bound as texts, with the safety factor between them (1: at the bound)."""
 
     measure: str
-    found: str
+    value: str
     bound: str
     margin: float
 
     @property
     def holds(self) -> bool:
-        """Whether the bound is kept; nan keeps none."""
+        """Whether the bound is satisfied; false for nan."""
         return self.margin >= 1.0
 
     @property
     def rank(self) -> float:
-        """The margin, but -1 where it is no number: the worst of all."""
+        """Margin for sorting; -1 (the worst) if the margin is nan."""
         return -1.0 if math.isnan(self.margin) else self.margin
 
     @property
     def margin_text(self) -> str:
-        """The margin in words."""
+        """Margin as text."""
         return f"> {LARGEST_SHOWN:g}" if self.margin > LARGEST_SHOWN else f"{self.margin:.3g}"
 
     def __str__(self) -> str:
-        return f"{self.measure.replace('_', ' ')} {self.found} {self.bound}"
+        return f"{self.measure.replace('_', ' ')} {self.value} {self.bound}"
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How a case ended.
+    """Result of one hard case.
 
     Attributes:
-        case: what was tried.
-        checks: one a bound; none where it was refused or broke.
-        message: an error, in words; "" where all was measured.
-        is_refused: whether the message is a refusal that the case expects or may have.
-        seconds: wall time of the trial [s].
+        case: The case.
+        checks: One check for each bound; empty if the trial was refused or failed.
+        message: Error message; empty if the trial returned its measures.
+        is_refused: Whether the message is a refusal that the case expects or allows.
+        seconds: Wall time of the trial [s].
     """
 
     case: HardCase
@@ -62,23 +62,23 @@ class Verdict:
 
     @property
     def ok(self) -> bool:
-        """Whether the case survived within all its bounds, or was refused as it must be."""
+        """Whether all bounds are satisfied, or the case was refused as expected."""
         return self.is_refused or (not self.message and all(check.holds for check in self.checks))
 
     @property
     def closest(self) -> Check | None:
-        """The check that was kept by the smallest factor, or missed by the largest."""
+        """The check with the smallest margin."""
         return min(self.checks, key=lambda check: check.rank, default=None)
 
     def __str__(self) -> str:
-        """Say how it ended: the closest of its checks, or why there is none; where it missed, all that it missed."""
+        """Return the closest check or the error message; all failed checks if the case missed."""
         if self.message:
             return ("refused: " if self.is_refused else "") + self.message
-        shown: list[Check | None] = [check for check in self.checks if not check.holds] or [self.closest]
-        return "; ".join(f"{check}, margin {check.margin_text}" for check in shown if check is not None)
+        reported: list[Check | None] = [check for check in self.checks if not check.holds] or [self.closest]
+        return "; ".join(f"{check}, margin {check.margin_text}" for check in reported if check is not None)
 
     def record(self) -> dict[str, Any]:
-        """Return all but the case, to be sent from one process to another."""
+        """Return a JSON record of everything except the case."""
         checks = [asdict(check) for check in self.checks]
         return {"checks": checks, "message": self.message, "is_refused": self.is_refused, "seconds": self.seconds}
 
@@ -89,12 +89,12 @@ class Verdict:
 
 
 def attempt(case: HardCase) -> Verdict:
-    """Try a case in this process; any error of it becomes part of the verdict."""
+    """Run a case in this process; an exception becomes part of the verdict."""
     start, is_refused = time.perf_counter(), False
     try:
-        found = case.trial.measure(case.parameters)
-        checks, message = tuple(_check(bound, found) for bound in case.bounds), ""
-    except Exception as error:  # whatever breaks a solver is what is looked for
+        measures = case.trial.measure(case.parameters)
+        checks, message = tuple(_check(bound, measures) for bound in case.bounds), ""
+    except Exception as error:  # any failure of a solver is a result
         checks, message = (), f"{type(error).__name__}: {error}"
         is_refused = case.may_be_refused and isinstance(error, Refused)
     seconds = time.perf_counter() - start
@@ -104,10 +104,10 @@ def attempt(case: HardCase) -> Verdict:
     return Verdict(case, checks, message, is_refused, seconds)
 
 
-def _check(bound: Bound, found: Mapping[str, Measured]) -> Check:
-    measured = found.get(bound.measure)
+def _check(bound: Bound, measures: Mapping[str, Measured]) -> Check:
+    measured = measures.get(bound.measure)
     if measured is None:
-        known = ", ".join(found)
-        raise UnitError(f"bounds.{bound.measure}: nothing of that name was measured; measured: {known}")
+        names = ", ".join(measures)
+        raise UnitError(f"bounds.{bound.measure}: nothing of that name was measured; measured: {names}")
     margin = float(bound.margin(measured))
     return Check(bound.measure, bound.shown(measured), f"{bound.sign} {bound.text}", margin)

@@ -1,8 +1,8 @@
-"""A user's own material in a drop: a part on a board strip, in soft potting that is viscoelastic at finite strain.
+"""User material in a drop: a part on a board strip in viscoelastic potting at finite strain.
 
     python -m reflowshock.cases.own_material.own_material            (a few seconds; also under mpirun -n 2)
 
-The potting is a law in UFL (`potting` below); board and part are the program's own elements. See README.md.
+The potting is a UFL law (``potting`` below); board and part are the program's own elements. See README.md.
 """
 
 import sys
@@ -24,15 +24,15 @@ from reflowshock.materials.library import FR4
 from reflowshock.materials.parameters import Isotropic
 
 MM, MS, G = 1e-3, 1e-3, 9.81
-SHEAR, BULK = 2e6, 40e6  # of the potting, slow [Pa]
-STIFFER, RELAXATION = 3.0, 0.2 * MS  # sudden over slow shear modulus less one; relaxation time
+SHEAR, BULK = 2e6, 40e6  # long-term shear and bulk modulus of the potting [Pa]
+STIFFER, RELAXATION = 3.0, 0.2 * MS  # instantaneous over long-term shear modulus minus one; relaxation time
 STEEL = Isotropic(density=7850.0, young_modulus=200e9, poisson_ratio=0.3)
-POTTING = Isotropic(density=1100.0, young_modulus=6e6, poisson_ratio=0.48)  # its density counts, the law does the rest
+POTTING = Isotropic(density=1100.0, young_modulus=6e6, poisson_ratio=0.48)  # only the density is used besides the law
 PEAK, PULSE = 1500.0 * G, 0.2 * MS
 
 
 def potting(step: float, stiffer: float = STIFFER) -> Law:
-    """Neo-Hookean rubber with one Maxwell branch on its deviator (Simo, CMAME 60, 1987).
+    """Return the law of a neo-Hookean rubber with one Maxwell branch on its deviator (Simo, CMAME 60, 1987).
 
     S = S_vol + S_iso + Q, dQ/dt + Q / tau = g dS_iso/dt, integrated over a step exactly for a constant rate of S_iso.
     """
@@ -65,7 +65,7 @@ def potting(step: float, stiffer: float = STIFFER) -> Law:
 
 
 def mesh() -> MeshData:
-    """Board strip of 40 x 8 x 1.6 mm that is clamped at its ends, potting and part of 8 x 8 mm on its middle."""
+    """Mesh a board strip of 40 x 8 x 1.6 mm clamped at its ends, with potting and a part of 8 x 8 mm on its middle."""
     x, y, z = np.arange(-20, 21, 2) * MM, np.arange(-4, 5, 2) * MM, np.array([-1.6, 0, 0.7, 1.4, 3.4]) * MM
     number = np.arange(len(x) * len(y) * len(z)).reshape(len(z), len(y), len(x))
     ends = slice(None, -1), slice(1, None)
@@ -73,16 +73,16 @@ def mesh() -> MeshData:
     points = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
     centre = points[cells].mean(axis=1)
     part = np.select([centre[:, 2] < 0, centre[:, 2] < 1.4 * MM], [0, 1], 2).astype(np.int32)
-    kept = (part == 0) | (np.abs(centre[:, 0]) < 4 * MM)
-    used, cells = np.unique(cells[kept], return_inverse=True)
+    is_filled = (part == 0) | (np.abs(centre[:, 0]) < 4 * MM)
+    used, cells = np.unique(cells[is_filled], return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 8).astype(np.int32)
     faces = boundary_facets(cells)
     clamped = faces[np.isclose(np.abs(points[faces, 0].mean(axis=1)), 20 * MM)]
-    return MeshData(points, cells, part[kept], ("board", "potting", "part"), {"mounting_holes": clamped})
+    return MeshData(points, cells, part[is_filled], ("board", "potting", "part"), {"mounting_holes": clamped})
 
 
 def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -> dict[str, np.ndarray]:
-    """Drop the board: displacement of the part against the clamps [m] and energies [J] over time [s]; collective."""
+    """Drop the board; return the displacement of the part over the clamps [m] and energies [J] by time; collective."""
     model = prepare(mesh(), "dns")["dns"] if comm.rank == 0 else None
     tables = comm.bcast(model.tables if model else None)
     local = distribute(comm, model.mesh if model else None)
@@ -103,15 +103,15 @@ def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -
 
 
 def sample(comm: MPI.Comm, motion: ExplicitMotion, top: np.ndarray) -> tuple[float, ...]:
-    """Return time, mean displacement of the part's top along z, and energies of all ranks; collective."""
+    """Return time, mean z displacement of the part's top, and energies of all ranks; collective."""
     internal = motion.internal_energy()
-    own = [motion.displacement[top, 2].sum(), top.sum(), motion.kinetic_energy(), internal.strain, internal.plastic]
-    way, count, *energies = comm.allreduce(np.array([*own, motion.external_work]))
+    row = [motion.displacement[top, 2].sum(), top.sum(), motion.kinetic_energy(), internal.strain, internal.plastic]
+    way, count, *energies = comm.allreduce(np.array([*row, motion.external_work]))
     return motion.time, way / count, *energies
 
 
 def main(output: str = "", milliseconds: str = "0.5") -> None:
-    """Compare the potting with one that does not relax; with a file name keep the histories of the first."""
+    """Compare the potting with one without relaxation; write the first history if a file name is given."""
     comm, duration = MPI.COMM_WORLD, float(milliseconds) * MS
     results = {"viscoelastic": drop(comm, duration=duration), "elastic": drop(comm, 0.0, duration)}
     if comm.rank:

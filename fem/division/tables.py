@@ -12,7 +12,7 @@ from reflowshock.fem.division.fitted import FittedTable, fitted
 from reflowshock.fem.division.split import Part, interface_between, part_of
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.estimates.placement import Role
-from reflowshock.fem.mesh.column import with_columns
+from reflowshock.fem.mesh.column import insert_columns
 from reflowshock.fem.mesh.coupling_interface import find_interface
 from reflowshock.fem.mesh.joint_interface import JointInterfaceTable, whole_joint_interface
 from reflowshock.fem.mesh.mesh import MeshData, merge_nodes
@@ -160,7 +160,7 @@ def joined(data: MeshData) -> Whole:
         CouplingError, MeshError, TieError: The parts of the mesh do not fit together.
     """
     macro_nodes, meso_nodes = find_interface(data)
-    return Whole(*tie_joints(with_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
+    return Whole(*tie_joints(insert_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
 
 
 def prepare(

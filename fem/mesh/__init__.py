@@ -1,1 +1,1 @@
-"""Meshes before they are distributed: parts, facets, ties, the coupling interface, watch tables."""
+"""Serial meshes before partitioning: parts, facets, ties, coupling interface, watch tables; start with ``mesh.py``."""

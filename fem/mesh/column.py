@@ -1,10 +1,10 @@
-"""Columns of board and substrate in which fine joints stand: boxes make room for them, and hold their sides.
+"""Columns of board and substrate under and over fine joints: they replace boxes and are tied to the remaining ones.
 
-The joints' file has the columns (``board_column@..``, ``substrate_column@..``) and those of their faces that may touch
-a box (``column_board@..``, ``column_package@..``). The boxes in their place go. Columns side by side share nodes; what
-is left of their faces is tied to the boxes that are left. Where lines and planes of the boxes are among those of the
-column, whose face is the finer one, constant stress passes exactly. Joints with another mesh than their column's are
-tied to it (``slave@foot@..``, ``slave@head@..``).
+The file of the joints contains the columns (``board_column@..``, ``substrate_column@..``) and the faces that may touch
+a box (``column_board@..``, ``column_package@..``). The boxes inside the columns are removed. Neighbouring columns share
+nodes; their other faces are tied to the remaining boxes. Constant stress passes exactly if the lines and planes of the
+boxes are a subset of those of the column, whose face is the finer one. Joints whose mesh differs from that of their
+column are tied to it (``slave@foot@..``, ``slave@head@..``).
 """
 
 from collections.abc import Mapping
@@ -20,40 +20,40 @@ from reflowshock.fem.mesh.mesh import MeshData, boundary_facets, cells_of_facets
 from reflowshock.fem.mesh.tie import TOLERANCE, closest_facets
 from reflowshock.materials.roles import role_of_part
 
-COLUMN, COPY = "_column@", "_coarse@"  # ends of the names of parts: what is fine, what a driving model has in its place
+COLUMN, COPY = "_column@", "_coarse@"  # in names of parts: fine columns, and the boxes of a driving model there
 FACES = ("column_board@", "column_package@")
 SYMMETRY = ("symmetry_x", "symmetry_y")
 SLAVES, MASTERS = "slave@columns", "master@columns"
 CYCLIC = [0, 1, 3, 2]
-FITS = 1e-2  # of its volume: by what the boxes in a column's place may differ from it, whose faces are as flat as they
+FITS = 1e-2  # of the column's volume: largest difference of the volume of the boxes that it replaces
 SAME = 1e-6  # of a column's size: distance of nodes that neighbouring columns share
 
 
-def with_columns(mesh: MeshData) -> MeshData:
-    """Give the columns of fine joints their place among the boxes, and name what is to be tied as ``tie_joints`` asks.
+def insert_columns(mesh: MeshData) -> MeshData:
+    """Replace boxes by the columns of fine joints, and name the facets that ``tie_joints`` ties.
 
     Raises:
-        MeshError: The boxes do not make exactly the room that a column needs, or columns side by side do not fit.
+        MeshError: The boxes in place of a column do not have its volume, or neighbouring columns do not match.
     """
     columns = [mesh.part_names[part] for part in np.unique(mesh.part) if COLUMN in mesh.part_names[part]]
     if not columns:
         return mesh
     places = {name: boxes_in_place(mesh, name) for name in columns}
     walls = shared_facets(mesh.cells, np.any(list(places.values()), axis=0))
-    mesh, gone = copies_named(mesh, places)
+    mesh, gone = name_coarse_copies(mesh, places)
     mesh, number = selected_cells(mesh, ~gone)
-    mesh, merged = neighbours_joined(without_stale_facets(mesh))
-    return faces_named(mesh, merged[number[walls]])
+    mesh, merged = merge_neighbours(drop_stale_facets(mesh))
+    return name_faces(mesh, merged[number[walls]])
 
 
 def boxes_in_place(mesh: MeshData, column: str) -> NDArray[np.bool_]:
-    """Return the cells ``(ne,)`` of board or substrate that a column stands for; errors as ``with_columns``."""
-    role, own = role_of_part(column), mesh.in_parts(column.__eq__)
+    """Return whether a column replaces each cell of the mesh, shape (ne,); errors as in ``insert_columns``."""
+    role, in_column = role_of_part(column), mesh.in_parts(column.__eq__)
     box = mesh.in_parts(lambda name: "@" not in name and role_of_part(name) == role)
-    points = mesh.points[np.unique(mesh.cells[own])]
+    points = mesh.points[np.unique(mesh.cells[in_column])]
     centre = mesh.points[mesh.cells].mean(axis=1)
     inside = box & ((centre > points.min(axis=0)) & (centre < points.max(axis=0))).all(axis=1)
-    volume, room = (float(element_geometry(mesh.points, mesh.cells[some]).volume.sum()) for some in (own, inside))
+    volume, room = (float(element_geometry(mesh.points, mesh.cells[some]).volume.sum()) for some in (in_column, inside))
     if abs(room / volume - 1.0) > FITS:
         raise MeshError(
             f"{column} fills {volume:.4g} m^3, the boxes in its place {room:.4g} m^3: the lines of board and package do"
@@ -62,12 +62,15 @@ def boxes_in_place(mesh: MeshData, column: str) -> NDArray[np.bool_]:
     return inside
 
 
-def copies_named(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) -> tuple[MeshData, NDArray[np.bool_]]:
-    """Name the boxes of a driving model, which has a joint's coarse copy; return also the boxes ``(ne,)`` of no model.
+def name_coarse_copies(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) -> tuple[MeshData, NDArray[np.bool_]]:
+    """Rename the boxes in place of columns that a driving model keeps under coarse copies of joints.
 
     Args:
         mesh: The mesh.
-        places: Part name of a column -> cells ``(ne,)`` in its place.
+        places: Part name of a column -> whether it replaces each cell, shape (ne,).
+
+    Returns:
+        The mesh with renamed parts, and whether each cell belongs to no model, shape (ne,).
     """
     driving = {name.partition(COPY)[2] for name in mesh.part_names if COPY in name}
     part, names, gone = mesh.part.copy(), list(mesh.part_names), np.zeros(len(mesh.part), dtype=bool)
@@ -81,21 +84,21 @@ def copies_named(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) -> tup
 
 
 def shared_facets(cells: NDArray[np.int32], gone: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return the facets ``(nf, 4)``, cyclic, that cells which stay share with cells ``(ne,)`` that go."""
+    """Return the facets between removed cells (mask of shape (ne,)) and the others, in cyclic order, shape (nf, 4)."""
     facets = boundary_facets(cells[gone])
     return facets[cells_of_facets(cells[~gone], facets) >= 0][:, CYCLIC]
 
 
-def without_stale_facets(mesh: MeshData) -> MeshData:
-    """Drop the facets that no cell has any more."""
-    found = cells_of_facets(mesh.cells, np.concatenate(list(mesh.facets.values()))) >= 0  # one search: it sorts all
+def drop_stale_facets(mesh: MeshData) -> MeshData:
+    """Drop the facets that belong to no cell any more."""
+    has_cell = cells_of_facets(mesh.cells, np.concatenate(list(mesh.facets.values()))) >= 0  # one search sorts all
     ends = np.cumsum([len(some) for some in mesh.facets.values()])[:-1]
-    kept = zip(mesh.facets.items(), np.split(found, ends), strict=True)
-    return replace(mesh, facets={name: some[here] for (name, some), here in kept})
+    sets = zip(mesh.facets.items(), np.split(has_cell, ends), strict=True)
+    return replace(mesh, facets={name: facets[valid] for (name, facets), valid in sets})
 
 
-def neighbours_joined(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
-    """Let columns side by side share the nodes of their common faces; returns as ``merge_nodes``."""
+def merge_neighbours(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
+    """Merge the nodes on common faces of neighbouring columns; returns as ``merge_nodes``."""
     faces = [np.unique(some) for name, some in mesh.facets.items() if name.startswith(FACES) and len(some)]
     nodes = np.unique(np.concatenate(faces))
     size = max(float(np.ptp(mesh.points[some], axis=0).max()) for some in faces)
@@ -106,58 +109,67 @@ def neighbours_joined(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
     return merge_nodes(mesh, nodes[twice], nodes[first[twice]])
 
 
-def faces_named(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
-    """Make columns' faces slaves of the walls ``(nf, 4)`` that they touch, or parts of planes of symmetry, or free."""
+def name_faces(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
+    """Assign the faces of columns to ties, planes of symmetry or the free surface.
+
+    Args:
+        mesh: Mesh with columns.
+        walls: Facets of the remaining boxes towards columns, shape (nf, 4).
+    """
     facets = {name: some for name, some in mesh.facets.items() if not name.startswith((*FACES, "board_bottom@"))}
     bottom = [some for name, some in mesh.facets.items() if name.startswith("board_bottom@")]
     facets["board_bottom"] = np.concatenate([mesh.facets_of("board_bottom"), *bottom])
     outer = np.sort(boundary_facets(mesh.cells), axis=1)
-    own = {name: some for name, some in mesh.facets.items() if name.startswith(FACES)}
-    faces, column = np.concatenate(list(own.values())), np.repeat(list(own), [len(some) for some in own.values()])
-    outside = in_rows(np.sort(faces, axis=1), outer)
+    sets = {name: some for name, some in mesh.facets.items() if name.startswith(FACES)}
+    faces, column = np.concatenate(list(sets.values())), np.repeat(list(sets), [len(some) for some in sets.values()])
+    outside = are_among(np.sort(faces, axis=1), outer)
     faces, column = faces[outside], column[outside]
     corners = mesh.points[faces]
     for axis, plane in enumerate(SYMMETRY):
         if len(mesh.facets_of(plane)):
             flat = (np.abs(corners[:, :, axis]) < SAME * np.ptp(corners)).all(axis=1)
             facets[plane] = np.concatenate([facets[plane], faces[flat]])
-    held = touch(corners, mesh.points[walls])
-    check_neighbours(corners[~held], column[~held])
-    return replace(mesh, facets=facets | {SLAVES: faces[held], MASTERS: walls})
+    tied = lie_on_walls(corners, mesh.points[walls])
+    check_neighbours(corners[~tied], column[~tied])
+    return replace(mesh, facets=facets | {SLAVES: faces[tied], MASTERS: walls})
 
 
 def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> None:
-    """Check that no free facets ``(nf, 4, 3)`` of columns ``(nf,)`` lie on each other, where nothing would hold them.
+    """Check that neighbouring columns share the nodes of their common face.
+
+    Args:
+        corners: Corners of the free facets of columns, shape (nf, 4, 3) [m].
+        column: Name of the column of each facet, shape (nf,).
 
     Raises:
-        MeshError: Columns side by side do not share the nodes of their common face.
+        MeshError: Free facets of different columns coincide.
     """
     centre = corners.mean(axis=1)
     for name in np.unique(column):
-        own = column == name
-        low, high = corners[own].min(axis=(0, 1)), corners[own].max(axis=(0, 1))
+        in_column = column == name
+        low, high = corners[in_column].min(axis=(0, 1)), corners[in_column].max(axis=(0, 1))
         slack = TOLERANCE * (high - low).max()
-        near = ~own & ((centre > low - slack) & (centre < high + slack)).all(axis=1)
-        if not near.any() or not (met := touch(corners[own], corners[near])).any():
+        near = ~in_column & ((centre > low - slack) & (centre < high + slack)).all(axis=1)
+        if not near.any() or not (met := lie_on_walls(corners[in_column], corners[near])).any():
             continue
-        middle = centre[own][met][:1]
+        middle = centre[in_column][met][:1]
         other = column[near][closest_facets(middle, corners[near])[0][0]]
         first, second = (some.partition("@")[2] for some in (name, other))
         raise MeshError(
-            f"the columns of {first} and {second} touch with {np.sum(met)} faces that do not fit together, near"
+            f"the columns of {first} and {second} touch with {np.sum(met)} faces that do not match, near"
             f" ({', '.join(f'{value:.6g}' for value in middle[0])}) m: mesh both joints with the same"
             " package.joint_numerics and package.imprint"
         )
 
 
-def in_rows(facets: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Return which of some facets ``(nf, 4)`` are among others; the nodes of all are sorted."""
-    _, first, place = np.unique(np.concatenate([outer, facets]), axis=0, return_index=True, return_inverse=True)
-    return first[place.reshape(-1)[len(outer) :]] < len(outer)
+def are_among(facets: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Return whether each facet (nf, 4) is among other facets, shape (nf,); the nodes of each must be sorted."""
+    _, first, index = np.unique(np.concatenate([outer, facets]), axis=0, return_index=True, return_inverse=True)
+    return first[index.reshape(-1)[len(outer) :]] < len(outer)
 
 
-def touch(corners: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which facets ``(nf, 4, 3)`` lie on walls ``(nw, 4, 3)`` with all their corners."""
+def lie_on_walls(corners: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether all corners of each facet (nf, 4, 3) lie on walls (nw, 4, 3), shape (nf,)."""
     facet, _, distance = closest_facets(corners.reshape(-1, 3), walls)
     size = np.linalg.norm(np.ptp(walls[facet], axis=1), axis=1)
     return (distance <= TOLERANCE * size).reshape(-1, 4).all(axis=1)

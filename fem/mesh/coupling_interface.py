@@ -1,4 +1,4 @@
-"""The interface between the macro model (``board``) and the meso model: node-matching, inside the board."""
+"""Coupling interface between the macro model (``board``) and the meso model: matching nodes inside the board."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +40,10 @@ def find_interface(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]
 
 
 def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the boundary facets of the patch that are not on a plane that bounds board and patch together.
+    """Return the boundary facets of the patch that do not lie on the bounding box of board and patch, shape (nf, 4).
 
     Raises:
-        CouplingError: There is none: board and patch do not touch.
+        CouplingError: No such facet exists, because board and patch do not touch.
     """
     both = points[np.unique(np.concatenate([board.ravel(), patch.ravel()]))]
     low, high = both.min(axis=0), both.max(axis=0)
@@ -53,5 +53,5 @@ def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: N
     outer = (np.abs(corners - low) < off).all(axis=1) | (np.abs(corners - high) < off).all(axis=1)
     inner = facets[~outer.any(axis=1)]
     if not len(inner):
-        raise CouplingError(f"no face of {PATCH} lies inside the board: there is no coupling interface")
+        raise CouplingError(f"no face of {PATCH} lies inside the board: the coupling interface is empty")
     return inner

@@ -1,4 +1,4 @@
-"""Integrals over facets: how a pressure on them becomes nodal forces."""
+"""Quadrature over facets: nodal area vectors for pressures, matrices for elastic beddings."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,13 @@ BARYCENTRIC = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # derivatives of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FacetRule:
-    """Shape functions ``values (q, m)`` and ``derivatives (q, m, 2)`` at points with ``weights (q,)``."""
+    """Quadrature rule of a facet.
+
+    Attributes:
+        values: Shape functions at the points, shape (q, m).
+        derivatives: Their derivatives in reference coordinates, shape (q, m, 2).
+        weights: Weights of the points, shape (q,).
+    """
 
     values: NDArray[np.float64]
     derivatives: NDArray[np.float64]
@@ -20,18 +26,18 @@ class FacetRule:
 
 
 def quadrilateral() -> FacetRule:
-    """Return 2 x 2 Gauss points."""
+    """Return the 2 x 2 Gauss rule of a bilinear quadrilateral."""
     factors = 1.0 + GAUSS[:, None, :] * CYCLIC
     return FacetRule(0.25 * factors.prod(axis=2), 0.25 * CYCLIC * factors[:, :, ::-1], np.ones(4))
 
 
 def triangle() -> FacetRule:
-    """Return the centroid."""
+    """Return the centroid rule of a linear triangle."""
     return FacetRule(np.full((1, 3), 1.0 / 3.0), BARYCENTRIC[None], np.full(1, 0.5))
 
 
 def quadratic_triangle() -> FacetRule:
-    """Return the middles of the edges: exact for quadratic integrands, and the vertices carry nothing there."""
+    """Return the midpoint-of-edges rule of a quadratic triangle, exact for quadratic integrands."""
     at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))  # on ab, bc, ca
     vertices = (4.0 * at - 1.0)[:, :, None] * BARYCENTRIC
     turned = np.roll(BARYCENTRIC, -1, axis=0)
@@ -41,7 +47,7 @@ def quadratic_triangle() -> FacetRule:
 
 
 def middles_of_edges() -> FacetRule:
-    """Return the middles of a triangle's edges: exact for products of its shape functions."""
+    """Return the midpoint-of-edges rule of a linear triangle, exact for products of its shape functions."""
     at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))
     return FacetRule(at, np.tile(BARYCENTRIC, (3, 1, 1)), np.full(3, 1.0 / 6.0))
 
@@ -51,20 +57,26 @@ PRODUCTS = RULES | {3: middles_of_edges()}
 
 
 def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the integral of shape function times normal: ``(nf, m, 3)`` [m^2].
+    """Return the integrals of shape function times normal over facets, shape (nf, m, 3) [m^2].
 
-    A pressure p on facets gives the nodal forces p times these; their sum over nodes is the area vector.
+    A pressure p gives the nodal forces p times these vectors; their sum over the nodes is the area vector of the facet.
 
     Args:
-        corners: ``(nf, m, 3)`` [m], nodes in the order of ``MeshData.facets``; the normal follows from the right-hand
-            rule.
+        corners: Node coordinates in the order of ``MeshData.facets``, shape (nf, m, 3) [m]; the normal follows from
+            the right-hand rule.
     """
     rule = RULES[corners.shape[1]]
     return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normals(corners, rule))
 
 
 def bedding_matrices(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the integral of products of two shape functions: ``(nf, m, m)`` [m^2], that of springs of one N/m^3."""
+    """Return the integrals of products of two shape functions over facets, shape (nf, m, m) [m^2].
+
+    They are the stiffness matrices of an elastic bedding of 1 N/m^3.
+
+    Args:
+        corners: Node coordinates of the facets, shape (nf, m, 3) [m].
+    """
     rule = PRODUCTS[corners.shape[1]]
     area = np.linalg.norm(normals(corners, rule), axis=2)
     return np.einsum("q,qa,qb,fq->fab", rule.weights, rule.values, rule.values, area)
@@ -77,17 +89,18 @@ def spring_rates(
     corners: NDArray[np.float64],
     stiffness: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return by how much springs raise the largest omega^2 of their elements at most: ``(nf,)`` [1/s^2].
+    """Return upper bounds for the increase of the largest omega^2 of elements by a bedding, shape (nf,) [1/s^2].
 
-    A facet's springs count in its element alone, as stiff as their row sums: no mode is then faster than the fastest
-    element, whose omega^2 = 4 / dt^2 grows by at most the largest ratio of spring and mass at its nodes.
+    The bedding of a facet is assigned to its element, with its row sums as stiffness. The frequency of the fastest
+    element, omega^2 = 4 / dt^2, bounds that of the mesh and grows by at most the largest ratio of bedding stiffness and
+    mass at its nodes.
 
     Args:
-        cells: ``(nf, k)`` nodes of the element of each facet.
-        facets: ``(nf, m)`` nodes of the facets.
-        mass: ``(nf, k)`` [kg] of the element at each of its nodes.
-        corners: ``(nf, m, 3)`` [m] of the facets.
-        stiffness: ``(3,)`` [N/m^3].
+        cells: Nodes of the element of each facet, shape (nf, k).
+        facets: Nodes of the facets, shape (nf, m).
+        mass: Nodal masses of these elements, shape (nf, k) [kg].
+        corners: Node coordinates of the facets, shape (nf, m, 3) [m].
+        stiffness: Bedding stiffness along each axis, shape (3,) [N/m^3].
     """
     at_facet = (cells[:, None, :] == facets[:, :, None]).argmax(axis=2)
     largest = bedding_matrices(corners).sum(axis=2)
@@ -95,6 +108,6 @@ def spring_rates(
 
 
 def normals(corners: NDArray[np.float64], rule: FacetRule) -> NDArray[np.float64]:
-    """Return the normals ``(nf, q, 3)`` [m^2] at the points of a rule, as long as the area of its reference facet."""
+    """Return the normals of facets at the points of a rule, scaled by the Jacobian, shape (nf, q, 3) [m^2]."""
     tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)
     return np.cross(tangent[..., 0], tangent[..., 1])

@@ -1,4 +1,4 @@
-"""Facet sets as areas: what a pressure of one pascal does to their nodes."""
+"""Nodal area vectors of facet sets: the nodal forces under a unit pressure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 
 
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
-    """Return the facets of a set.
+    """Return the facets of a set, shape (nf, m).
 
     Raises:
         LoadError: The mesh has no such set, or it is empty.
@@ -23,22 +23,26 @@ def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
 
 
 def check_facet_set(facets: Mapping[str, Sequence] | Mapping[str, NDArray], name: str) -> None:
-    """Refuse the name of a facet set that does not exist or is empty; errors as ``facet_set``."""
+    """Check that a facet set exists and is not empty.
+
+    Raises:
+        LoadError: It does not exist or is empty; the message names the nearest existing one.
+    """
     if not len(facets.get(name, ())):
-        known = [key for key, members in facets.items() if len(members)]
-        near = get_close_matches(name, known, n=1)
+        names = [key for key, members in facets.items() if len(members)]
+        near = get_close_matches(name, names, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise LoadError(f"no facet belongs to {name!r}; the mesh has {', '.join(known) or 'no facet sets'}{hint}")
+        raise LoadError(f"no facet belongs to {name!r}; the mesh has {', '.join(names) or 'no facet sets'}{hint}")
 
 
 @dataclass(frozen=True, slots=True)
 class OutwardFacets:
-    """A facet set that knows its outside, in input numbers.
+    """Facet set with its outward direction, in input numbers.
 
     Attributes:
-        facets: ``(nf, m)`` nodes.
-        cells: ``(nf,)`` the cell that each belongs to.
-        sign: ``(nf,)`` +1 where the normal by the right-hand rule points outwards, else -1.
+        facets: Nodes of the facets, shape (nf, m).
+        cells: Cell of each facet, shape (nf,).
+        sign: +1 if the normal by the right-hand rule points outwards, else -1, shape (nf,).
     """
 
     facets: NDArray[np.int32]
@@ -47,10 +51,10 @@ class OutwardFacets:
 
 
 def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
-    """Return a facet set with its outside.
+    """Return a facet set with its outward direction.
 
     Raises:
-        LoadError: There is no such set, or one of its facets belongs to no cell.
+        LoadError: The set does not exist, or one of its facets belongs to no cell.
     """
     facets = facet_set(mesh, name)
     cells = cells_of_facets(mesh.cells, facets)
@@ -63,14 +67,15 @@ def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
 
 
 def outward_areas(mesh: MeshData, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Integrate the outward normal of a facet set with the shape functions of its nodes; errors as ``outward_facets``.
+    """Integrate shape function times outward normal over a facet set; errors as in ``outward_facets``.
 
     Returns:
-        Nodes ``(k,)`` and vectors ``(k, 3)`` [m^2]; a pressure p pushes node i with -p times its vector.
+        Nodes, shape (k,), and their area vectors, shape (k, 3) [m^2]; a pressure p gives the nodal forces -p times
+        these vectors.
     """
-    found = outward_facets(mesh, name)
-    areas = area_vectors(mesh.points[found.facets]) * found.sign[:, None, None]
-    nodes, place = np.unique(found.facets, return_inverse=True)
+    outward = outward_facets(mesh, name)
+    areas = area_vectors(mesh.points[outward.facets]) * outward.sign[:, None, None]
+    nodes, index = np.unique(outward.facets, return_inverse=True)
     total = np.zeros((len(nodes), 3))
-    np.add.at(total, place.reshape(-1), areas.reshape(-1, 3))
+    np.add.at(total, index.reshape(-1), areas.reshape(-1, 3))
     return nodes.astype(np.int64), total

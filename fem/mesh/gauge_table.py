@@ -1,7 +1,7 @@
-"""Strain gauges in input numbers: the distance of two points of a face, which displacements give without a derivative.
+"""Strain gauges in input numbers: strain from the distance of two points on a face, without derivatives.
 
-The strain is the mean over a gauge's length, as a foil gauge measures it. Between nodes displacements are as the shape
-functions have them; the errors of both ends cancel where the length is a whole number of elements.
+The strain is the mean over the length of a gauge, as a foil gauge measures it. Displacements are interpolated by the
+shape functions; the errors of both ends cancel if the length is a whole number of elements.
 """
 
 from dataclasses import dataclass, replace
@@ -15,12 +15,12 @@ class GaugeTable:
     """Strain gauges in input numbers.
 
     Attributes:
-        names: Of the gauges.
-        direction: ``(g, 3)`` unit vectors.
-        length: ``(g,)`` [m] between the ends.
-        nodes: ``(k,)`` nodes around the ends.
-        gauge: ``(k,)`` the gauge that each belongs to.
-        weight: ``(k, 3)`` [1/m] of its displacement's components in how much longer the gauge is, over its length.
+        names: Names of the gauges.
+        direction: Unit vectors along the gauges, shape (g, 3).
+        length: Distances between the ends, shape (g,) [m].
+        nodes: Nodes around the ends, shape (k,).
+        gauge: Gauge of each node, shape (k,).
+        weight: Weights of the node's displacement in the relative elongation of its gauge, shape (k, 3) [1/m].
     """
 
     names: tuple[str, ...]
@@ -37,16 +37,20 @@ class GaugeTable:
         return cls((), vectors, np.empty(0), numbers, numbers, vectors)
 
     def within(self, node: NDArray[np.integer]) -> "GaugeTable":
-        """Return the part of a model with its numbers ``node (n,)`` of nodes, -1 for those that count in another."""
+        """Return the part of one model in its own numbers.
+
+        Args:
+            node: Node number in the model of each input node, -1 if it counts in another model, shape (n,).
+        """
         here = node[self.nodes] >= 0
         return replace(self, nodes=node[self.nodes][here], gauge=self.gauge[here], weight=self.weight[here])
 
     def strains(self, stretches: NDArray[np.float64], turning: bool) -> NDArray[np.float64]:
-        """Return the strains ``(g,)``.
+        """Return the strains of the gauges, shape (g,).
 
         Args:
-            stretches: ``(g, 3)`` displacement of one end relative to the other, over the length.
-            turning: Whether rotations are finite; small ones change no distance.
+            stretches: Relative displacement of the ends over the length, shape (g, 3).
+            turning: Whether rotations are finite; small rotations do not change distances.
         """
         if turning:
             return np.asarray(np.linalg.norm(self.direction + stretches, axis=1) - 1.0)

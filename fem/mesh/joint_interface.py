@@ -1,4 +1,4 @@
-"""The upper interface of joints as a table in input numbers: the facets between their solder and the package's pads."""
+"""Upper interface of joints in input numbers: the facets between solder and the package's pads."""
 
 from dataclasses import dataclass, replace
 
@@ -13,14 +13,14 @@ SIDE = "pad_package@"
 
 @dataclass(frozen=True, slots=True)
 class JointInterfaceTable:
-    """The facets of all joints, alike in all models of a run but for the cells.
+    """Interface facets of all joints; only ``cells`` differs between the models of a run.
 
     Attributes:
         joints: Names of the joints.
-        joint: ``(q,)`` joint of each facet.
-        nodes: ``(q, 4)`` its nodes in the whole mesh, in cyclic order.
-        corners: ``(q, 4, 3)`` [m].
-        cells: ``(q,)`` its solder element, -1 where another model has that.
+        joint: Joint of each facet, shape (q,).
+        nodes: Nodes of the facets in the whole mesh, in cyclic order, shape (q, 4).
+        corners: Coordinates of these nodes, shape (q, 4, 3) [m].
+        cells: Solder element of each facet, -1 if it belongs to another model, shape (q,).
     """
 
     joints: tuple[str, ...]
@@ -30,22 +30,26 @@ class JointInterfaceTable:
     cells: NDArray[np.integer]
 
     def within(self, cell_number: NDArray[np.int32]) -> "JointInterfaceTable":
-        """Return the table of a model, in its numbers of cells ``(ne,)``: -1 for what it has not."""
+        """Return the table of one model.
+
+        Args:
+            cell_number: Cell number in the model of each input cell, -1 if it belongs to another, shape (ne,).
+        """
         return replace(self, cells=cell_number[self.cells])
 
     def surfaces(self) -> dict[str, NDArray]:
-        """Return ``points@<joint> (n, 3)`` [m] and ``quads@<joint> (m, 4)`` of each joint."""
-        found: dict[str, NDArray] = {}
+        """Return ``points@<joint>``, shape (n, 3) [m], and ``quads@<joint>``, shape (m, 4), of each joint."""
+        arrays: dict[str, NDArray] = {}
         for number, name in enumerate(self.joints):
             here = self.joint == number
             _, first, quads = np.unique(self.nodes[here], return_index=True, return_inverse=True)
-            found[f"points@{name}"] = self.corners[here].reshape(-1, 3)[first]
-            found[f"quads@{name}"] = quads.reshape(-1, 4).astype(np.int32)
-        return found
+            arrays[f"points@{name}"] = self.corners[here].reshape(-1, 3)[first]
+            arrays[f"quads@{name}"] = quads.reshape(-1, 4).astype(np.int32)
+        return arrays
 
 
 def whole_joint_interface(mesh: MeshData) -> JointInterfaceTable:
-    """Return the table of a mesh before it is divided; ``watch_table`` refuses facets that belong to no solder."""
+    """Return the table of a whole mesh; ``watch_table`` raises an error for facets without a solder element."""
     joints = joint_names(mesh)
     facets = [mesh.facets_of(f"{SIDE}{name}") for name in joints]
     cells = []

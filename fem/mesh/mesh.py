@@ -1,4 +1,4 @@
-"""A mesh before it is distributed: points, cells of one shape, part names, named facets. Plain NumPy, one process."""
+"""Mesh before partitioning: points, cells of one shape, part names, named facets. Plain NumPy, one process."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,15 @@ from reflowshock.fem.errors import MeshError
 
 @dataclass(frozen=True, slots=True)
 class MeshData:
-    """Cells of one shape with named parts and named facets.
+    """Mesh of cells of one shape with named parts and facet sets.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        cells: ``(ne, k)`` int32, node order of DOLFINx (``elements.cell_shape``).
-        part: ``(ne,)`` int32, index into ``part_names``.
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the cells in the order of DOLFINx (``elements.cell_shape``), shape (ne, k), int32.
+        part: Index of each cell's part in ``part_names``, shape (ne,), int32.
         part_names: Names of the parts.
-        facets: Name -> ``(nf, m)`` int32: quadrilaterals in cyclic order, or triangles with their edges' nodes.
+        facets: Facet set name -> nodes of quadrilaterals in cyclic order, or of triangles with mid-edge nodes, shape
+            (nf, m), int32.
     """
 
     points: NDArray[np.float64]
@@ -30,24 +31,24 @@ class MeshData:
 
     @property
     def shape(self) -> CellShape:
-        """Return the shape of the cells."""
+        """Shape of the cells."""
         return shape_of(self.cells)
 
     def facets_of(self, name: str) -> NDArray[np.int32]:
-        """Return a facet set ``(nf, m)``, empty where the mesh has no such set."""
+        """Return the nodes of a facet set, shape (nf, m), empty if the mesh has no such set."""
         return self.facets.get(name, np.empty((0, self.shape.faces.shape[1]), np.int32))
 
     def facet_nodes(self, name: str) -> NDArray[np.int32]:
-        """Return the sorted nodes of a facet set, empty where the mesh has no such set."""
+        """Return the sorted nodes of a facet set, each once, empty if the mesh has no such set."""
         return np.unique(self.facets_of(name))
 
     def in_parts(self, accept: Callable[[str], bool]) -> NDArray[np.bool_]:
-        """Return ``(ne,)``: whether the name of a cell's part is accepted."""
+        """Return whether the part name of each cell is accepted, shape (ne,)."""
         return np.array([accept(name) for name in self.part_names], dtype=bool)[self.part]
 
 
 def append(pieces: Sequence[MeshData]) -> MeshData:
-    """Append meshes into one; parts and facet sets of equal name become one.
+    """Concatenate meshes without merging nodes; parts and facet sets of equal name are joined.
 
     Raises:
         MeshError: The meshes have cells of different shapes.
@@ -78,10 +79,10 @@ def append(pieces: Sequence[MeshData]) -> MeshData:
 
 
 def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
-    """Drop the nodes that no cell has, and the facets with such a node.
+    """Drop the nodes that belong to no cell, and the facets with such a node.
 
     Returns:
-        The mesh, and the new number of each old node, -1 for those that went.
+        The mesh, and the new number of each old node, -1 for dropped nodes, shape (n,).
     """
     used = np.zeros(len(data.points), dtype=bool)
     used[data.cells] = True
@@ -91,15 +92,15 @@ def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
 
 
 def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Make the parts whose names are accepted a mesh of their own; returns and errors as ``selected_cells``."""
+    """Extract the parts whose names are accepted as a mesh; returns and errors as in ``selected_cells``."""
     return selected_cells(data, data.in_parts(accept))
 
 
 def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Make the chosen cells ``(ne,)`` a mesh of their own; returns as ``without_unused_nodes``.
+    """Extract the chosen cells, a mask of shape (ne,), as a mesh; returns as in ``without_unused_nodes``.
 
     Raises:
-        MeshError: No cell is left.
+        MeshError: No cell is chosen.
     """
     if not chosen.any():
         raise MeshError(f"no cell belongs to the chosen parts; the mesh has {', '.join(data.part_names)}")
@@ -111,16 +112,16 @@ def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData,
 def merge_nodes(
     data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
 ) -> tuple[MeshData, NDArray[np.int32]]:
-    """Replace each node of ``duplicates`` by the one of ``originals``; returns as ``without_unused_nodes``."""
+    """Replace each node of ``duplicates`` by that of ``originals``; returns as in ``without_unused_nodes``."""
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}
-    merged, kept = without_unused_nodes(MeshData(data.points, number[data.cells], data.part, data.part_names, facets))
-    return merged, kept[number]
+    merged, new = without_unused_nodes(MeshData(data.points, number[data.cells], data.part, data.part_names, facets))
+    return merged, new[number]
 
 
 def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces that belong to one cell only: ``(nf, m)``, nodes as in ``CellShape.faces``."""
+    """Return the faces that belong to one cell only, shape (nf, m), nodes in the order of ``CellShape.faces``."""
     local = shape_of(cells).faces
     faces = cells[:, local].reshape(-1, local.shape[1])
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
@@ -128,7 +129,7 @@ def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def cells_of_facets(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the first cell (among ``cells``) that has each facet: ``(nf,)``, -1 where none has it."""
+    """Return the first cell that contains each facet (nf, m), -1 if no cell does, shape (nf,)."""
     local = shape_of(cells).faces
     faces = np.sort(cells[:, local].reshape(-1, local.shape[1]), axis=1)
     _, label = np.unique(np.concatenate([faces, np.sort(facets, axis=1)]), axis=0, return_inverse=True)

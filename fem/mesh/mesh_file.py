@@ -1,4 +1,4 @@
-"""Meshes from Gmsh files; cells that no element can be made of are refused."""
+"""Meshes read from Gmsh files, with a check of the cells by their scaled Jacobian."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ MIDDLE[EDGES[:, 0], EDGES[:, 1]] = MIDDLE[EDGES[:, 1], EDGES[:, 0]] = 4 + np.ara
 
 
 def read_meshes(paths: Sequence[Path]) -> MeshData:
-    """Read Gmsh files and append them into one mesh; the pieces share no node."""
+    """Read Gmsh files and concatenate them into one mesh without merging nodes."""
     return append([read_mesh(path) for path in paths])
 
 
@@ -33,8 +33,8 @@ def read_mesh(path: Path) -> MeshData:
     """Read one Gmsh 4.1 file.
 
     Raises:
-        MeshError: The file has no cells of a known shape, several shapes, a cell in no or several volumes, or one
-            that no element can be made of (``mesh_quality``).
+        MeshError: The file has no cells of a supported shape, several shapes, a cell in no or several volumes, or a
+            cell that is too distorted (``check_quality``).
     """
     import meshio
 
@@ -58,28 +58,31 @@ def read_mesh(path: Path) -> MeshData:
 
 def shape_in_file(mesh: "meshio.Mesh", path: Path) -> CellShape:
     """Return the one shape of the cells in a file; see ``read_mesh`` for the errors."""
-    found = {block.type for block in mesh.cells if block.dim == 3}
-    known = {shape.name: shape for shape in SHAPES.values()}
-    if len(found) != 1 or not found <= set(known):
-        kinds = ", ".join(sorted(found)) or "no volume cells"
-        raise MeshError(f"{path}: cells of one shape are needed ({', '.join(known)}), found {kinds}")
-    return known[found.pop()]
+    types = {block.type for block in mesh.cells if block.dim == 3}
+    supported = {shape.name: shape for shape in SHAPES.values()}
+    if len(types) != 1 or not types <= set(supported):
+        kinds = ", ".join(sorted(types)) or "no volume cells"
+        raise MeshError(f"{path}: cells of one shape are needed ({', '.join(supported)}), found {kinds}")
+    return supported[types.pop()]
 
 
 def part_of_block(mesh: "meshio.Mesh", index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
     """Return the part of each cell of one block; see ``read_mesh`` for the errors."""
     owners = [k for k, name in enumerate(names) if len(mesh.cell_sets[name][index])]
     if len(owners) != 1:
-        found = [names[k] for k in owners] or "no physical volume"
-        raise MeshError(f"{path}: cells must belong to exactly one physical volume, block {index} is in {found}")
+        volumes = [names[k] for k in owners] or "no physical volume"
+        raise MeshError(f"{path}: cells must belong to exactly one physical volume, block {index} is in {volumes}")
     return np.full(len(mesh.cells[index].data), owners[0])
 
 
 def scaled_jacobians(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least scaled Jacobian of cells ``(ne, k, 3)``: ``(ne,)``, 1 for cubes and regular tetrahedra.
+    """Return the smallest scaled Jacobian of cells, shape (ne,): 1 for cubes and regular tetrahedra.
 
-    At each vertex the volume that the three edges' tangents span, over the product of their lengths (Knupp, Verdict);
-    0 where an edge has no length.
+    It is the triple product of the unit tangents of the three edges at a vertex (Knupp, Verdict); 0 if an edge has no
+    length.
+
+    Args:
+        corners: Node coordinates of the cells, shape (ne, k, 3) [m].
     """
     nodes = corners.shape[1]
     neighbours = OF_HEXAHEDRON if nodes == HEXAHEDRON.nodes else OF_TETRAHEDRON
@@ -95,10 +98,10 @@ def scaled_jacobians(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def check_quality(mesh: MeshData) -> None:
-    """Check that every cell can carry an element.
+    """Check that the scaled Jacobian of every cell is large enough for an element.
 
     Raises:
-        MeshError: With number, part and position of the worst cell, and what is wrong with it.
+        MeshError: A cell is distorted or inverted; the message gives number, part and position of the worst one.
     """
     quality, limit = scaled_jacobians(mesh.points[mesh.cells]), mesh.shape.lowest_quality
     worst = int(np.argmin(quality))
@@ -107,8 +110,8 @@ def check_quality(mesh: MeshData) -> None:
     fault = "too distorted"
     if quality[worst] < 1e-12:
         fault = "without volume" if quality[worst] > -1e-12 else "turned inside out"
-    place = ", ".join(f"{value:.6g}" for value in mesh.points[mesh.cells[worst]].mean(axis=0))
+    position = ", ".join(f"{value:.6g}" for value in mesh.points[mesh.cells[worst]].mean(axis=0))
     raise MeshError(
-        f"element {worst} of part {mesh.part_names[mesh.part[worst]]} at ({place}) m is {fault}: scaled Jacobian"
+        f"element {worst} of part {mesh.part_names[mesh.part[worst]]} at ({position}) m is {fault}: scaled Jacobian"
         f" {quality[worst]:.3g}, allowed {limit:g} to 1; {np.sum(quality < limit)} of {len(quality)} elements are below"
     )

@@ -1,4 +1,4 @@
-"""The faces at which pads hold the solder of a joint, in input numbers: nodes, area, frame of the section."""
+"""Faces between pads and solder of joints in input numbers: nodes, area, frame and section modulus."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,21 +14,21 @@ ENDS = ("board", "package")
 
 @dataclass(frozen=True, slots=True)
 class PadFaces:
-    """The faces of all joints; a slot is end times joints plus joint, end 0 is at the board, 1 at the package.
+    """Pad faces of all joints; slot = end * joints + joint, where end 0 is the board and end 1 the package.
 
     Attributes:
-        nodes: ``(p,)`` nodes of the faces.
-        node_slot: ``(p,)``.
-        cells: ``(c,)`` solder elements with such a node: all that bear on them.
-        facets: ``(f, 4)`` nodes of the facets, in cyclic order.
-        facet_cell: ``(f,)`` the solder element of each.
-        facet_slot: ``(f,)``.
-        facet_sign: ``(f,)`` 1 where their order turns about the joint's axis, else -1.
-        centre: ``(2 joints, 3)`` [m] centroids.
-        frame: ``(2 joints, 3, 3)`` rows: the x axis along the face, the third direction, the axis: the normal from the
-            board's pad towards the package's.
-        area: ``(2 joints,)`` [m^2].
-        modulus: ``(2 joints,)`` [m^3] section modulus: mean second moment of area over the largest radius.
+        nodes: Nodes of the faces, shape (p,).
+        node_slot: Slot of each node, shape (p,).
+        cells: Solder elements with a node on a face, shape (c,).
+        facets: Nodes of the facets in cyclic order, shape (f, 4).
+        facet_cell: Solder element of each facet, shape (f,).
+        facet_slot: Slot of each facet, shape (f,).
+        facet_sign: 1 if the nodes of a facet are ordered by the right-hand rule about the joint's axis, else -1, (f,).
+        centre: Centroids of the faces, shape (2 joints, 3) [m].
+        frame: Orthonormal frames of the faces, shape (2 joints, 3, 3); rows are two directions in the face and the
+            axis of the joint, the normal from the board's pad towards the package's.
+        area: Areas of the faces, shape (2 joints,) [m^2].
+        modulus: Section moduli, mean second moment of area over the largest radius, shape (2 joints,) [m^3].
     """
 
     nodes: NDArray[np.integer]
@@ -44,7 +44,12 @@ class PadFaces:
     modulus: NDArray[np.float64]
 
     def within(self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32]) -> "PadFaces":
-        """Return what a model has, in its numbers of nodes ``(n,)`` and cells ``(ne,)``, -1 for those of another."""
+        """Return the part of one model in its own numbers.
+
+        Args:
+            node_number: Node number in the model of each input node, -1 if it belongs to another, shape (n,).
+            cell_number: Cell number in the model of each input cell, -1 if it belongs to another, shape (ne,).
+        """
         nodes, cells, owners = node_number[self.nodes], cell_number[self.cells], cell_number[self.facet_cell]
         return replace(
             self,
@@ -59,7 +64,12 @@ class PadFaces:
 
 
 def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.intp]]) -> PadFaces:
-    """Return the faces of joints whose solder elements are given.
+    """Return the pad faces of joints.
+
+    Args:
+        mesh: Whole mesh.
+        joints: Names of the joints.
+        solder: Solder elements of each joint.
 
     Raises:
         MeshError: A facet of a pad belongs to no solder element of its joint, or a pad has no facet.
@@ -87,7 +97,7 @@ def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.i
 
 
 def pad_face(mesh: MeshData, name: str, solder: NDArray[np.intp], inward: float) -> tuple[Any, ...]:
-    """Return nodes, bearing cells, facets, their cells and signs, and centre, frame, area, modulus of one face."""
+    """Return nodes, adjacent cells, facets, their cells and signs, and (centre, frame, area, modulus) of one face."""
     facets = mesh.facets_of(name)
     owner = cells_of_facets(mesh.cells[solder], facets)
     if not len(facets) or (owner < 0).any():
@@ -98,19 +108,19 @@ def pad_face(mesh: MeshData, name: str, solder: NDArray[np.intp], inward: float)
     normal, centre, _ = facet_sums(corners)
     towards = mesh.points[mesh.cells[owner]].mean(axis=1) - corners.mean(axis=1)
     sign = inward * np.sign(np.einsum("fi,fi->f", normal, towards))
-    bearing = solder[np.isin(mesh.cells[solder], nodes).any(axis=1)]
+    adjacent = solder[np.isin(mesh.cells[solder], nodes).any(axis=1)]
     area = np.linalg.norm(normal, axis=1)
     middle = centre.sum(axis=0) / area.sum()
     frame = section_frame(sign @ normal)
     radius = np.linalg.norm((mesh.points[nodes] - middle) @ frame[:2].T, axis=1).max()
     modulus = 0.5 * polar_moment((corners - middle) @ frame[:2].T) / radius
-    return nodes, bearing, facets, owner, sign, (middle, frame, area.sum(), modulus)
+    return nodes, adjacent, facets, owner, sign, (middle, frame, area.sum(), modulus)
 
 
 def facet_sums(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return area vector ``(f, 3)`` [m^2], area times centre ``(f, 3)`` [m^3] and area ``(f,)`` of facets."""
+    """Return area vectors (f, 3) [m^2], areas times centroids (f, 3) [m^3] and areas (f,) [m^2] of facets (f, 4, 3)."""
     normal = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     area = np.linalg.norm(normal, axis=1)
     first = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -121,7 +131,7 @@ def facet_sums(
 
 
 def polar_moment(corners: NDArray[np.float64]) -> float:
-    """Return the polar second moment of area [m^4] of plane facets ``(f, 4, 2)`` [m] about the origin."""
+    """Return the polar second moment of area [m^4] of plane facets (f, 4, 2) [m] about the origin."""
     total = 0.0
     for triangle in (corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]):
         first, second = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
@@ -132,7 +142,7 @@ def polar_moment(corners: NDArray[np.float64]) -> float:
 
 
 def section_frame(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the frames ``(..., 3, 3)`` of faces with normals ``(..., 3)`` of any length; rows as in ``PadFaces``."""
+    """Return orthonormal frames (..., 3, 3) of faces with normals (..., 3) of any length; rows as in ``PadFaces``."""
     axis = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     along = np.where(np.abs(axis[..., :1]) < 0.9, np.eye(3)[0], np.eye(3)[1])
     first = along - np.sum(along * axis, axis=-1, keepdims=True) * axis

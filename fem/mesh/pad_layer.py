@@ -1,4 +1,4 @@
-"""The layers of solder at the pads, of a thickness that no mesh changes, as weights of integration points."""
+"""Layers of solder at the pads with a mesh-independent thickness, as weights of integration points."""
 
 from dataclasses import dataclass
 from itertools import permutations
@@ -17,13 +17,13 @@ TETRAHEDRA = np.array([(0, 1 << first, 7 - (1 << last), 7) for first, _, last in
 
 @dataclass(frozen=True, slots=True)
 class PadLayer:
-    """Solder elements in the layers, in input numbers.
+    """Solder elements in the pad layers, in input numbers.
 
     Attributes:
-        cells: ``(k,)``.
-        slot: ``(k,)`` end times joints plus joint; end 0 is at the board, 1 at the package.
-        weight: ``(k, 8)`` [m^3] the part of each octant inside the layer; octants in the order of the Gauss points.
-        volume: ``(2 joints,)`` [m^3] of whole layers, of all models.
+        cells: Elements that intersect a layer, shape (k,).
+        slot: Layer of each, end * joints + joint, where end 0 is the board and end 1 the package, shape (k,).
+        weight: Volume of each octant inside the layer, octants in the order of the Gauss points, shape (k, 8) [m^3].
+        volume: Volumes of the whole layers over all models, shape (2 joints,) [m^3].
     """
 
     cells: NDArray[np.integer]
@@ -32,7 +32,11 @@ class PadLayer:
     volume: NDArray[np.float64]
 
     def within(self, cell_number: NDArray[np.int32]) -> "PadLayer":
-        """Return what a model has, in its numbers of cells ``(ne,)``, -1 for those of another one."""
+        """Return the part of one model in its own numbers.
+
+        Args:
+            cell_number: Cell number in the model of each input cell, -1 if it belongs to another, shape (ne,).
+        """
         cells = cell_number[self.cells]
         here = cells >= 0
         return PadLayer(cells[here], self.slot[here], self.weight[here], self.volume)
@@ -41,16 +45,16 @@ class PadLayer:
 def octant_volumes(
     corners: NDArray[np.float64], centre: NDArray[np.float64], inward: NDArray[np.float64], thickness: float
 ) -> NDArray[np.float64]:
-    """Return the volume of each octant of hexahedra between a plane and its parallel, exact for plane faces.
+    """Return the volume of each octant of hexahedra between two parallel planes, exact for plane faces.
 
     Args:
-        corners: ``(m, 8, 3)`` [m], tensor order.
-        centre: ``(3,)`` [m] a point of the plane.
-        inward: ``(3,)`` unit normal towards the parallel.
-        thickness: Distance of both [m].
+        corners: Node coordinates in tensor order, shape (m, 8, 3) [m].
+        centre: Point of the first plane, shape (3,) [m].
+        inward: Unit normal towards the second plane, shape (3,).
+        thickness: Distance between both planes [m].
 
     Returns:
-        ``(m, 8)`` [m^3].
+        Volumes of the octants, shape (m, 8) [m^3].
     """
     octants = np.einsum("la,mai->mli", shape_functions(LATTICE), corners)[:, OCTANT]
     tetrahedra = octants[:, :, TETRAHEDRA]
@@ -61,17 +65,17 @@ def octant_volumes(
 
 
 def fraction_below(height: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Return the fraction ``(...)`` of tetrahedra with vertices at heights ``(..., 4)`` below a level."""
+    """Return the volume fraction of tetrahedra with vertices at heights (..., 4) below a level, shape (...)."""
     low = np.sort(height, axis=-1) - level
     count = (low <= 0.0).sum(axis=-1)
 
     def cut(i: int, j: int) -> NDArray[np.float64]:
-        """Return where the level cuts the edge from vertex i, as a fraction."""
+        """Return the fraction of the edge from vertex i to j at which the level cuts it."""
         length = low[..., j] - low[..., i]
         return -low[..., i] / np.where(length > 0.0, length, 1.0)
 
-    one = cut(0, 1) * cut(0, 2) * cut(0, 3)
+    below_one = cut(0, 1) * cut(0, 2) * cut(0, 3)
     s, t, u, v = cut(0, 2), cut(0, 3), cut(1, 2), cut(1, 3)
     two = s * t * (1.0 - v) + s * v * (1.0 - u) + u * v
     three = 1.0 - (1.0 - cut(0, 3)) * (1.0 - cut(1, 3)) * (1.0 - cut(2, 3))
-    return np.choose(count, [np.zeros_like(one), one, two, three, np.ones_like(one)])
+    return np.choose(count, [np.zeros_like(below_one), below_one, two, three, np.ones_like(below_one)])

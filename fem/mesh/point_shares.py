@@ -1,4 +1,4 @@
-"""Shares of an element's nodes in what acts at a point inside it."""
+"""Distribution of a force or mass at a point to the nodes of the element around it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,27 +10,29 @@ from reflowshock.fem.mesh.mesh import MeshData
 
 ROUNDING = 1e-6  # of an element: a point on its face is inside
 NEWTON_STEPS = 15
-FARTHEST = 1.5  # in reference coordinates: beyond it an element needs no answer, only a finite one
+FARTHEST = 1.5  # in reference coordinates: iterates are clipped there, because points outside only need finite values
 
 
 def point_shares(
-    mesh: MeshData, key: str, place: tuple[float, float, float]
+    mesh: MeshData, key: str, position: tuple[float, float, float]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the nodes ``(k,)`` that share what acts at a place [m], and their shares ``(k,)``.
+    """Distribute a unit force at a point to the vertices of the element around it.
 
-    They are the shape functions of the vertices of the element there: they add up to one, and the mean of the vertices
-    with them as weights is the place itself. Nodal forces in these shares thus have the resultant and the moment of the
-    force that they share.
+    The shares are the shape functions of the vertices. They add up to one and reproduce the position, so that the nodal
+    forces have the resultant and the moment of the force.
 
     Args:
         mesh: The whole mesh.
-        key: Of the place, for errors.
-        place: [m].
+        key: Key of the position in the case file, for errors.
+        position: Coordinates of the point [m].
+
+    Returns:
+        Nodes, shape (k,), and their shares, shape (k,).
 
     Raises:
-        LoadError: No element is there.
+        LoadError: The point lies outside the mesh.
     """
-    at = np.array(place)
+    at = np.array(position)
     corners = mesh.points[mesh.cells[:, : vertices(mesh)]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     margin = ROUNDING * (high - low)
@@ -54,14 +56,14 @@ def vertices(mesh: MeshData) -> int:
 
 
 def barycentric(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the barycentric coordinates ``(m, 4)`` of a place ``(3,)`` [m] in tetrahedra ``(m, 4, 3)``."""
+    """Return the barycentric coordinates of a point (3,) [m] in tetrahedra (m, 4, 3) [m], shape (m, 4)."""
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
     others = np.linalg.solve(edges, (at - corners[:, 0])[:, :, None])[:, :, 0]
     return np.column_stack([1.0 - others.sum(axis=1), others])
 
 
 def trilinear(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the eight shape functions ``(m, 8)`` of hexahedra ``(m, 8, 3)`` at a place ``(3,)`` [m], by Newton."""
+    """Return the shape functions of hexahedra (m, 8, 3) [m] at a point (3,) [m] by Newton iteration, shape (m, 8)."""
     xi = np.zeros((len(corners), 3))
     for _ in range(NEWTON_STEPS):
         residual = at - np.einsum("ma,mai->mi", shape_functions(xi), corners)
@@ -71,5 +73,5 @@ def trilinear(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[
 
 
 def shape_functions(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return N_a at points ``xi (m, 3)`` of the reference cube [-1, 1]^3: ``(m, 8)``."""
+    """Return the trilinear shape functions at points xi (m, 3) of the reference cube [-1, 1]^3, shape (m, 8)."""
     return 0.125 * np.prod(1.0 + xi[:, None, :] * SIDES, axis=2)

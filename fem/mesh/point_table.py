@@ -1,9 +1,9 @@
 """Watch points, strain gauges and supports of a structure or a board in input numbers.
 
-Strain and stress at a point follow from a linear field fitted to the means of the elements around it, which are their
-best known values (superconvergent patch recovery: Zienkiewicz & Zhu, IJNME 33, 1992). Two rings of elements carry it to
-a surface, which bending needs. Where one layer of elements is all there is, no gradient across it can be known, and the
-value is that of the layer's middle.
+Strain and stress at a point follow from a linear field fitted to the means of the elements around it, which are
+superconvergent (superconvergent patch recovery: Zienkiewicz & Zhu, IJNME 33, 1992). Two rings of elements extrapolate
+to a surface, which bending needs. With a single layer of elements the gradient across it is undetermined, and the value
+at mid-thickness is returned.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ NEARNESS = 2.0  # in the weight exp(-2 d^2) of an element, d its distance in siz
 SMALLEST = 1e-6  # of the largest singular value: below it a direction is not covered
 
 
-ROUNDING = 1e-9  # of the mesh: closer than that is the same place
+ROUNDING = 1e-9  # of the mesh: points at a smaller distance coincide
 Support = tuple[NDArray[np.integer], NDArray[np.bool_]]
 COMPONENTS = {"displacement": 3, "velocity": 3, "strain": 6, "stress": 6, "plastic_strain": 1}
 
@@ -30,16 +30,16 @@ class PointTable:
     """Watch points, gauges and supports in input numbers.
 
     Attributes:
-        names: Of the points.
-        nodes: ``(p,)`` the node nearest to each point.
-        points: ``(p, 3)`` [m] where these nodes are.
-        strain_points: ``(p, 3)`` [m] where strain and stress are taken.
-        cells: ``(k,)`` elements whose means give strain and stress.
-        owner: ``(k,)`` the point that each belongs to.
-        weight: ``(k,)`` of each in its point's value.
-        supports: Name -> nodes of a support, and ``(3,)`` which components it holds.
-        quantities: What is watched, of ``COMPONENTS``.
-        extent: Of the mesh [m].
+        names: Names of the points.
+        nodes: Node nearest to each point, shape (p,).
+        points: Coordinates of these nodes, shape (p, 3) [m].
+        strain_points: Positions at which strain and stress are evaluated, shape (p, 3) [m].
+        cells: Elements whose means give strain and stress, shape (k,).
+        owner: Point of each element, shape (k,).
+        weight: Weight of each element in the value of its point, shape (k,).
+        supports: Name -> nodes of a support, and whether it holds each component, shape (3,).
+        quantities: Recorded quantities, keys of ``COMPONENTS``.
+        extent: Largest extent of the mesh [m].
         gauges: Strain gauges.
     """
 
@@ -56,7 +56,12 @@ class PointTable:
     gauges: GaugeTable = field(default_factory=GaugeTable.none)
 
     def within(self, node: NDArray[np.integer], cell: NDArray[np.integer]) -> "PointTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 where another has it."""
+        """Return the part of one model in its own numbers.
+
+        Args:
+            node: Node number in the model of each input node, -1 if it belongs to another, shape (n,).
+            cell: Cell number in the model of each input cell, -1 if it belongs to another, shape (ne,).
+        """
         supports: dict[str, Support] = {
             name: (node[nodes][node[nodes] >= 0], held) for name, (nodes, held) in self.supports.items()
         }
@@ -65,7 +70,7 @@ class PointTable:
 
     @property
     def displaced(self) -> list[str]:
-        """Return the names of the points whose strain and stress are those of another place than their node."""
+        """Names of the points whose strain and stress are evaluated at a distance from their node."""
         away = np.linalg.norm(self.strain_points - self.points, axis=1)
         names = zip(self.names, away.tolist(), strict=True)
         return [name for name, distance in names if distance > ROUNDING * self.extent]
@@ -73,7 +78,7 @@ class PointTable:
 
 def point_table(
     mesh: MeshData,
-    wanted: Mapping[str, tuple[float, float, float]],
+    positions: Mapping[str, tuple[float, float, float]],
     supports: dict[str, Support],
     yields: bool = False,
 ) -> PointTable:
@@ -81,14 +86,14 @@ def point_table(
 
     Args:
         mesh: The whole mesh.
-        wanted: Name -> place [m].
+        positions: Name -> coordinates of a watch point [m].
         supports: Name -> nodes and held components.
-        yields: Whether plastic strain is watched, too.
+        yields: Whether plastic strain is also recorded.
 
     Raises:
         MeshError: A point lies outside the mesh.
     """
-    nodes = np.array([nearest_node(mesh, name, np.array(place)) for name, place in wanted.items()], np.int64)
+    nodes = np.array([nearest_node(mesh, name, np.array(position)) for name, position in positions.items()], np.int64)
     patches = [patch(mesh, int(node)) for node in nodes]
     centres = [mesh.points[mesh.cells[cells]].mean(axis=1) for cells in patches]
     touching = [int((mesh.cells[cells] == node).any(axis=1).sum()) for cells, node in zip(patches, nodes, strict=True)]
@@ -97,7 +102,7 @@ def point_table(
     ]
     places = [weight @ around for weight, around in zip(weights, centres, strict=True)]
     return PointTable(
-        names=tuple(wanted),
+        names=tuple(positions),
         nodes=nodes,
         points=mesh.points[nodes],
         strain_points=np.array(places).reshape(-1, 3),
@@ -110,14 +115,14 @@ def point_table(
     )
 
 
-def nearest_node(mesh: MeshData, name: str, place: NDArray[np.float64]) -> int:
-    """Return the node nearest to a place [m]; errors as ``point_table``."""
-    distance = np.linalg.norm(mesh.points - place, axis=1)
+def nearest_node(mesh: MeshData, name: str, position: NDArray[np.float64]) -> int:
+    """Return the node nearest to a position (3,) [m]; errors as in ``point_table``."""
+    distance = np.linalg.norm(mesh.points - position, axis=1)
     node = int(np.argmin(distance))
     around = mesh.points[mesh.cells[(mesh.cells == node).any(axis=1)]]
     size = float(np.linalg.norm(np.ptp(around, axis=1), axis=1).max())
     if distance[node] > size:
-        at, there = (", ".join(f"{value:.6g}" for value in point) for point in (place, mesh.points[node]))
+        at, there = (", ".join(f"{value:.6g}" for value in point) for point in (position, mesh.points[node]))
         raise MeshError(
             f"watch.{name}.at = ({at}) m lies outside the mesh: the nearest node is ({there}) m, {distance[node]:.3g} m"
             f" away, more than the size {size:.3g} m of its elements"
@@ -126,9 +131,9 @@ def nearest_node(mesh: MeshData, name: str, place: NDArray[np.float64]) -> int:
 
 
 def patch(mesh: MeshData, node: int) -> NDArray[np.int64]:
-    """Return the elements of one part that have a node, nearest ones first, and those that touch them.
+    """Return the elements of one part around a node, followed by their neighbours in this part.
 
-    Of several parts that meet at the node it is the lowest.
+    If several parts meet at the node, the lowest one is used.
     """
     first = np.flatnonzero((mesh.cells == node).any(axis=1))
     heights = {part: mesh.points[mesh.cells[first[mesh.part[first] == part]], 2].mean() for part in mesh.part[first]}
@@ -140,16 +145,16 @@ def patch(mesh: MeshData, node: int) -> NDArray[np.int64]:
 
 
 def fit(centres: NDArray[np.float64], nearest: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights ``(m,)`` of element means in the value at a point.
+    """Return the weights of element means in the value at a point, by a weighted linear least-squares fit.
 
     Args:
-        centres: ``(m, 3)`` [m] of the elements.
-        nearest: How many of them, the first ones, touch the point.
-        point: ``(3,)`` [m].
+        centres: Centres of the elements, shape (m, 3) [m].
+        nearest: Number of elements that touch the point; they come first.
+        point: Position of the point, shape (3,) [m].
 
     Returns:
-        They add up to one; together with ``centres`` they give the place that the value belongs to, ``point`` itself
-        where the elements lie in more than one layer across each direction.
+        Weights that add up to one, shape (m,). The weighted mean of ``centres`` is the position at which the value
+        applies: ``point`` itself if there are several layers of elements along each direction.
     """
     size = 2.0 * np.abs(centres[:nearest] - point).max(axis=0)
     scaled = (centres - point) / np.where(size > 0.0, size, 1.0)

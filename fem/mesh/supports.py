@@ -1,4 +1,4 @@
-"""Supports in the frame of the drop table: which displacement components are held at zero."""
+"""Supports in the frame of the drop table: displacement components that are fixed at zero."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +15,7 @@ SYMMETRY = {name: components for name, components in HELD.items() if name != "mo
 
 
 def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -> NDArray[np.bool_]:
-    """Return ``(n, 3)``: whether a node's displacement component is held; ``rules`` are as ``HELD``."""
+    """Return whether each displacement component of each node is fixed, shape (n, 3); ``rules`` is like ``HELD``."""
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules.items():
         held[np.ix_(mesh.facet_nodes(name), np.array(components))] = True

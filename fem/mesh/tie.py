@@ -1,4 +1,4 @@
-"""Tie of joints to facets that do not match them: u_slave = N u_master, f_master += N^T f_slave.
+"""Ties between joints and facets of non-matching meshes: u_slave = N u_master, f_master += N^T f_slave.
 
 N holds the bilinear shape functions of the closest facet at the slave's projection. Slaves are moved onto their facet
 first (a joint's end is flat, a warped substrate is not), so that rigid rotations and moments carry over exactly.
@@ -25,7 +25,13 @@ EXACT = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Tie:
-    """Rows of N: node numbers of slaves ``(ns,)`` and masters ``(ns, 4)`` int32, weights ``(ns, 4)``."""
+    """Rows of the interpolation matrix N.
+
+    Attributes:
+        slave: Slave nodes, shape (ns,), int32.
+        master: Four master nodes of each slave, shape (ns, 4), int32.
+        weight: Weights of the masters, shape (ns, 4).
+    """
 
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
@@ -37,19 +43,19 @@ class Tie:
         return cls(np.empty(0, np.int32), np.empty((0, 4), np.int32), np.empty((0, 4)))
 
     def spread(self, values: NDArray[np.float64]) -> None:
-        """Overwrite the slaves' rows of ``values (n, 3)`` with N times the masters' rows."""
+        """Overwrite the slaves' rows of nodal values (n, 3) with N times the masters' rows."""
         from reflowshock.fem.kernels.motion import spread_to_slaves  # a plan loads no compiled kernels
 
         spread_to_slaves(self.slave, self.master, self.weight, values)
 
     def gather(self, values: NDArray[np.float64]) -> None:
-        """Move the slaves' rows of ``values (n, 3)`` to the masters: add N^T of them, then zero them."""
+        """Add N^T times the slaves' rows of nodal values (n, 3) to the masters' rows, then zero the slaves' rows."""
         from reflowshock.fem.kernels.motion import gather_from_slaves
 
         gather_from_slaves(self.slave, self.master, self.weight, values)
 
     def matrix(self, count: int) -> scipy.sparse.csr_matrix:
-        """Return T ``(count, count)``: the values of all nodes from those of all but slaves."""
+        """Return the matrix that maps the values of independent nodes to all nodes, shape (count, count)."""
         rest = np.setdiff1d(np.arange(count), self.slave)
         row = np.concatenate([rest, np.repeat(self.slave, self.master.shape[1])])
         column = np.concatenate([rest, self.master.ravel()])
@@ -60,7 +66,7 @@ class Tie:
 def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     """Tie the ends of all joints: ``foot@..`` to ``board_side``, ``head@..`` to ``package_side``.
 
-    Layers that differ are tied alike: ``slave@..`` to ``master@..`` of the same name.
+    Likewise, non-matching layers are tied: ``slave@..`` to ``master@..`` of the same name.
 
     Returns:
         The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
@@ -109,22 +115,22 @@ def tie_end(mesh: MeshData, end: str, side: str) -> Tie:
 
 
 def bilinear(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the four shape functions of a quadrilateral at ``xi (m, 2)``: ``(m, 4)``."""
+    """Return the shape functions of a quadrilateral at reference points xi (m, 2), shape (m, 4)."""
     return 0.25 * np.prod(1.0 + xi[:, None, :] * CORNERS, axis=2)
 
 
 def bilinear_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivatives of the shape functions of a quadrilateral at ``xi (m, 2)``: ``(m, 4, 2)``."""
+    """Return the derivatives of the shape functions of a quadrilateral at xi (m, 2), shape (m, 4, 2)."""
     return 0.25 * CORNERS * (1.0 + xi[:, None, ::-1] * CORNERS[:, ::-1])
 
 
 def closest_facets(
     points: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Find the closest of some quadrilaterals ``(nf, 4, 3)`` to each point ``(m, 3)``.
+    """Find the quadrilateral (nf, 4, 3) that is closest to each point (m, 3).
 
     Returns:
-        Facet ``(m,)``, reference coordinates of the closest point inside it ``(m, 2)``, distance ``(m,)`` [m].
+        Facet of each point (m,), reference coordinates of its closest point (m, 2), and distance (m,) [m].
     """
     count = min(CANDIDATES, len(corners))
     _, near = cKDTree(corners.mean(axis=1)).query(points, k=count)
@@ -139,10 +145,10 @@ def closest_facets(
 def project(
     points: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Project points ``(m, 3)`` on quadrilaterals ``(m, 4, 3)``, one each: Gauss-Newton, then clipped to the inside.
+    """Project each point (m, 3) onto its quadrilateral (m, 4, 3) by Gauss-Newton, clipped to the inside.
 
     Returns:
-        Reference coordinates ``(m, 2)`` and distances ``(m,)`` [m].
+        Reference coordinates (m, 2) and distances (m,) [m].
     """
     xi = np.zeros((len(points), 2))
     for _ in range(NEWTON_STEPS):
@@ -151,7 +157,7 @@ def project(
         normal = np.einsum("mid,mie->mde", tangent, tangent)
         normal += SINGULAR * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(2)
         step = np.linalg.solve(normal, np.einsum("mid,mi->md", tangent, residual)[:, :, None])[:, :, 0]
-        xi = np.clip(xi + step, -3.0, 3.0)  # far candidates need no answer, only a finite one
+        xi = np.clip(xi + step, -3.0, 3.0)  # distant candidates only need finite values
     xi = np.clip(xi, -1.0, 1.0)
     return xi, np.linalg.norm(points - np.einsum("ma,mai->mi", bilinear(xi), corners), axis=1)
 
@@ -182,5 +188,5 @@ def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
 
 
 def net_load(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the net force [N] and its moment about the origin [N m]: ``(6,)``."""
+    """Return the net force [N] and moment about the origin [N m] of forces (n, 3) at points (n, 3), shape (6,)."""
     return np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])

@@ -1,4 +1,4 @@
-"""Watch points as tables in input numbers: centres, joints, board strain."""
+"""Watch points of a drop test in input numbers: centres of board and die, joints, board strain."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 from reflowshock.fem.mesh.pad_faces import PadFaces, pad_faces
 from reflowshock.fem.mesh.pad_layer import PadLayer, octant_volumes
 
-SLIVER = 1e-9  # of a layer's volume: less of an element inside it is rounding
+SLIVER = 1e-9  # of a layer's volume: a smaller intersection with an element is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,14 +19,14 @@ class WatchTable:
 
     Attributes:
         joints: Names of the joints, the same for all models of a run.
-        centres: ``(2,)`` node of the board's and of the die's centre, -1 where another model has it.
-        faces: Where pads hold the solder.
-        layer: Solder near the pads.
-        thickness: Of that layer [m].
-        solder_cells: ``(s,)`` all solder elements.
-        solder_joint: ``(s,)`` joint of each.
-        strain_facets: ``(f, 4)`` nodes of the board's lower face around the package.
-        strain_cells: ``(f,)`` the element of each.
+        centres: Nodes at the centres of board and die, -1 if in another model, shape (2,).
+        faces: Faces between pads and solder.
+        layer: Layers of solder at the pads.
+        thickness: Thickness of these layers [m].
+        solder_cells: All solder elements, shape (s,).
+        solder_joint: Joint of each solder element, shape (s,).
+        strain_facets: Facets of the board's lower face around the package, shape (f, 4).
+        strain_cells: Element of each of these facets, shape (f,).
     """
 
     joints: tuple[str, ...]
@@ -42,9 +42,13 @@ class WatchTable:
     def within(
         self, node_number: NDArray[np.int32], cell_number: NDArray[np.int32], every_node: NDArray[np.int32]
     ) -> "WatchTable":
-        """Return the part of a model, in its numbers of nodes ``(n,)`` and cells ``(ne,)``: -1 for what it has not.
+        """Return the part of one model in its own numbers.
 
-        A node at the interface counts in one model; ``every_node (n,)`` has it in both, for the facets of their cells.
+        Args:
+            node_number: Node number in the model of each input node, -1 if it counts in another, shape (n,); an
+                interface node counts in one model.
+            cell_number: Cell number in the model of each input cell, -1 if it belongs to another, shape (ne,).
+            every_node: As ``node_number``, with interface nodes in both models, for the facets of their cells.
         """
         solder, strain = cell_number[self.solder_cells], cell_number[self.strain_cells]
         return WatchTable(
@@ -66,7 +70,7 @@ def joint_names(mesh: MeshData) -> tuple[str, ...]:
 
 
 def footprint(mesh: MeshData) -> NDArray[np.float64]:
-    """Return the corners ``(2, 2)`` [m] in x, y of the package and its margin: the patch, or all where none is."""
+    """Return the lower and upper corner in plan of the board patch, or of the mesh if it has none, (2, 2) [m]."""
     patch = mesh.in_parts("board_patch".__eq__)
     points = mesh.points[mesh.cells[patch if patch.any() else slice(None)]][:, :, :2]
     return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
@@ -83,16 +87,16 @@ def centre_nodes(mesh: MeshData) -> NDArray[np.int64]:
 
 
 def nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> int:
-    """Return the one of some nodes that is nearest to x = y = 0, -1 where there is none."""
+    """Return the node nearest to the axis x = y = 0, or -1 if ``nodes`` is empty."""
     return int(nodes[np.argmin(np.sum(points[nodes, :2] ** 2, axis=1))]) if len(nodes) else -1
 
 
 def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
-    """Return the table of all that is watched in a mesh, before it is divided.
+    """Return the watch table of a whole mesh.
 
     Args:
-        mesh: Whole.
-        thickness: Of the layer of solder at the pads over which stress and flow are averaged [m].
+        mesh: Whole mesh.
+        thickness: Thickness of the layers at the pads over which stress and plastic flow are averaged [m].
 
     Raises:
         MeshError: A pad of a joint has no solder element, or the layer is thicker than a joint.
@@ -119,21 +123,21 @@ def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
 def pad_layers(
     mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.intp]], faces: PadFaces, thickness: float
 ) -> PadLayer:
-    """Return the solder within a thickness of the pads; errors as ``whole_watch``."""
+    """Return the solder within a distance ``thickness`` [m] of the pads; errors as in ``whole_watch``."""
     height = np.einsum("ji,ji->j", np.subtract(*faces.centre.reshape(2, -1, 3)[::-1]), faces.frame[: len(joints), 2])
-    for name, own in zip(joints, height, strict=True):
-        if thickness > own:
+    for name, joint_height in zip(joints, height, strict=True):
+        if thickness > joint_height:
             raise MeshError(
                 f"shock.joint_layer = {1e6 * thickness:.4g} um is thicker than the solder of joint {name},"
-                f" {1e6 * own:.4g} um from pad to pad; allowed: up to {1e6 * height.min():.4g} um"
+                f" {1e6 * joint_height:.4g} um from pad to pad; allowed: up to {1e6 * height.min():.4g} um"
             )
     cells, slots, weights = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty((0, 8))]
     for k, centre in enumerate(faces.centre):
-        own = solder[k % len(joints)]
+        elements = solder[k % len(joints)]
         inward = faces.frame[k, 2] * (1.0 if k < len(joints) else -1.0)
-        weight = octant_volumes(mesh.points[mesh.cells[own]], centre, inward, thickness)
+        weight = octant_volumes(mesh.points[mesh.cells[elements]], centre, inward, thickness)
         inside = weight.sum(axis=1) > SLIVER * weight.sum()
-        cells.append(own[inside])
+        cells.append(elements[inside])
         slots.append(np.full(np.sum(inside), k))
         weights.append(weight[inside])
     slot, weight = np.concatenate(slots), np.concatenate(weights)

@@ -1,1 +1,1 @@
-"""Board, package and pads, and boxes of layers, as named structured meshes; start with `assembly.py`."""
+"""Structured meshes with named parts of board, package and pads, and of layered boxes; start with ``assembly.py``."""

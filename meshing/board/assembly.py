@@ -1,7 +1,7 @@
-"""The assembly: board with holes, package above it, as named structured hexahedra in one Gmsh file.
+"""Assembly of board and package: structured hexahedra with named parts and facet sets in one Gmsh file.
 
-It is flat, as drawn; `displaced_assembly.py` moves the package to where the solder froze. Joints are not in it: they
-are meshed after reflow and tied to ``board_side`` and ``package_side``.
+The assembly is flat, as drawn; ``displaced_assembly.py`` moves the package to its position after reflow. Joints are
+meshed separately after reflow and tied to ``board_side`` and ``package_side``.
 """
 
 from collections.abc import Iterable
@@ -31,18 +31,18 @@ COARSE = 2.0  # thicknesses of the board
 
 
 def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
-    """Mesh board and package, both flat, and write them as Gmsh 4.1 in metres.
+    """Mesh board and package, both flat, and write them as MSH 4.1 in metres.
 
     Args:
-        package: array, pads, layers.
-        board: sizes, holes, symmetry.
-        path: the ``.msh`` file to write.
+        package: Array, pads and layers of the package.
+        board: Sizes, holes and symmetry of the board.
+        path: The ``.msh`` file to write.
 
     Returns:
-        Number of hexahedra of every part.
+        Part name -> number of hexahedra.
 
     Raises:
-        ValueError: an element is inside out.
+        ValueError: An element is inverted.
     """
     with gmsh_model("assembly"):
         parts = _board_parts(package, board)
@@ -60,7 +60,7 @@ def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]
 
 
 def _board_parts(package: Package, board: Board) -> dict[str, list[int]]:
-    """Extrude the board from its lower face; its uppermost layers around the package are the meso model's patch."""
+    """Extrude the board from its lower face; its uppermost layers around the package form the meso model's patch."""
     plan, numerics = board_plan(package, board), board.numerics
     hole = RoundHole(0.5 * board.holes.diameter, hole_rings(board))
     layer = board.thickness / numerics.layers
@@ -99,7 +99,7 @@ def _package_parts(package: Package, board: Board) -> dict[str, list[int]]:
 
 
 def _planes_and_holes(board: Board) -> dict[str, list[int]]:
-    """Find symmetry planes and hole walls by where the surfaces lie."""
+    """Find symmetry planes and hole walls by the positions of the surfaces."""
     names: dict[str, list[int]] = {"mounting_holes": []}
     if board.symmetry == "quarter":
         names |= {"symmetry_x": [], "symmetry_y": []}
@@ -123,12 +123,11 @@ def _flat(surfaces: Surfaces) -> list[int]:
 
 
 def write_heated_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
-    """Mesh board and package for a reflow; package, and grid of the board below it, are those of ``write_assembly``.
+    """Mesh board and package for a reflow simulation: as ``write_assembly``, with a coarser board.
 
-    The shock's board may have a hundred thousand elements, for waves; what a reflow asks of it is how its pads move.
-    Two layers of the program's hexahedra and coarse cells away from the package give the gaps of hu_bga_drop's board
-    (0.5 mm everywhere, six layers) to a tenth of a nanometre, with a twentieth of the equations and 59 MB of factor,
-    not 2.8 GB.
+    A shock needs up to a hundred thousand board elements to resolve waves; a reflow only needs the motion of the pads.
+    With two layers, and coarse cells away from the package, the gaps of hu_bga_drop differ by a tenth of a nanometre
+    from those of its board for the shock (0.5 mm everywhere, six layers), with a twentieth of the equations.
     """
     coarse = max(board.numerics.coarse_size, COARSE * board.thickness)
     numerics = board.numerics.model_copy(update={"layers": 2, "patch_layers": 1, "coarse_size": coarse})

@@ -1,6 +1,6 @@
-"""Gmsh building blocks: a plan of transfinite rectangles, O-grids around round holes, layers extruded from it.
+"""Gmsh building blocks: transfinite rectangles in plan, O-grids around round holes, and extruded layers.
 
-Gmsh models are built in millimetres (its default tolerances suit them) and scaled to metres when written.
+Gmsh models are built in millimetres, which suit its default tolerances, and scaled to metres when written.
 """
 
 import math
@@ -20,14 +20,25 @@ Surfaces = dict[Block, list[int]]
 
 @dataclass(frozen=True, slots=True)
 class RoundHole:
-    """A round hole in a block of the plan [m]; ``rings`` cells between the circle and the block's edge."""
+    """Round hole in a block of the plan.
+
+    Attributes:
+        radius: Radius of the hole [m].
+        rings: Number of cells between the circle and the edge of the block.
+    """
 
     radius: float
     rings: int
 
 
 def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, recombine: bool = True) -> Surfaces:
-    """Add the plan as transfinite surfaces at z = height [m]: quadrilaterals if recombined, else triangles.
+    """Add the blocks of a plan to the Gmsh model as transfinite surfaces.
+
+    Args:
+        plan: Plan of board, package or box.
+        height: z coordinate of the surfaces [m].
+        hole: Round hole in the blocks ``plan.holes``.
+        recombine: Whether surfaces are meshed by quadrilaterals instead of triangles.
 
     Returns:
         Block (i, j) -> surface tags: one, or four around a hole.
@@ -57,10 +68,16 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
 
 
 def extrude(surfaces: Surfaces, thickness: float, elements: int, recombine: bool = True) -> tuple[Surfaces, Surfaces]:
-    """Extrude surfaces upwards by ``thickness`` [m] in ``elements`` layers of hexahedra, or of tetrahedra.
+    """Extrude surfaces upwards.
+
+    Args:
+        surfaces: Block -> surface tags.
+        thickness: Thickness of the extrusion [m].
+        elements: Number of element layers.
+        recombine: Whether volumes are meshed by hexahedra instead of tetrahedra.
 
     Returns:
-        Volumes and upper surfaces, by block.
+        Tags of the volumes and of the upper surfaces, by block.
     """
     volumes: Surfaces = {}
     tops: Surfaces = {}
@@ -85,17 +102,23 @@ def _line(start: int, end: int, part: Interval) -> int:
 
 
 def lies_within_hole(surface: int, centres: Iterable[tuple[float, float]], diameter: float) -> bool:
-    """Whether a surface lies within the square around a hole at one of the centres [m]."""
+    """Return whether a Gmsh surface lies within the bounding square of a hole.
+
+    Args:
+        surface: Tag of the surface.
+        centres: Centres of the holes in plan [m].
+        diameter: Diameter of the holes [m].
+    """
     x0, y0, _, x1, y1, _ = (value * MILLI for value in gmsh.model.getBoundingBox(2, surface))
     reach = 0.5 * diameter + TOLERANCE
     return any(x - reach <= x0 and x1 <= x + reach and y - reach <= y0 and y1 <= y + reach for x, y in centres)
 
 
 def check_elements(name: str) -> None:
-    """Find out whether all volume elements of the mesh are the right way out.
+    """Check that no volume element of the current Gmsh mesh is inverted; ``name`` appears in the message.
 
     Raises:
-        ValueError: one is not.
+        ValueError: The smallest scaled Jacobian is not positive.
     """
     tags = np.concatenate(list(gmsh.model.mesh.getElements(3)[1]))
     worst = gmsh.model.mesh.getElementQualities(tags, "minSJ").min()
@@ -104,7 +127,7 @@ def check_elements(name: str) -> None:
 
 
 def count_elements(volumes: Iterable[int]) -> int:
-    """Number of elements of some volumes."""
+    """Return the number of elements in Gmsh volumes."""
     return sum(len(tags) for volume in volumes for tags in gmsh.model.mesh.getElements(3, volume)[1])
 
 
@@ -120,7 +143,7 @@ def _transfinite_surface(sides: list[int], recombine: bool) -> int:
 def _ring_around_hole(
     hole: RoundHole, centre: tuple[float, float, float], corners: list[int], sides: list[tuple[int, int]]
 ) -> list[list[int]]:
-    """Outlines of four blocks between circle and square: spokes run from the circle's diagonals to the corners."""
+    """Return the outlines of four blocks between a circle and the square around it, divided along the diagonals."""
     geo = gmsh.model.geo
     middle, radius = geo.addPoint(*centre), hole.radius / MILLI
     angles = [math.pi * (1.25 + 0.5 * k) for k in range(4)]

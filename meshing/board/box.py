@@ -1,4 +1,4 @@
-"""A box of layers as hexahedra or tetrahedra in one Gmsh file: layers are volumes, its faces and holes named facets."""
+"""Layered box as hexahedra or tetrahedra in one Gmsh file; layers are volumes, faces and hole walls named facets."""
 
 from dataclasses import dataclass
 from itertools import accumulate, chain, pairwise
@@ -26,22 +26,22 @@ SIDES = ("x_min", "x_max", "y_min", "y_max")
 
 
 def write_box(box: Box, path: Path) -> dict[str, int]:
-    """Mesh the box and write it as Gmsh 4.1 in metres.
+    """Mesh a layered box and write it as MSH 4.1 in metres.
 
     Args:
-        box: sizes, layers, holes, kind of element.
-        path: the ``.msh`` file to write.
+        box: Sizes, layers, holes and element type.
+        path: The ``.msh`` file to write.
 
     Returns:
-        Number of elements of every layer.
+        Layer name -> number of elements.
 
     Raises:
-        ValueError: an element is inside out.
+        ValueError: An element is inverted.
     """
     with gmsh_model("structure"):
         thickness = [sum(layer.thickness for layer in stack.layers) for stack in box.stacks]
         bottoms = list(accumulate(thickness[:-1], initial=0.0))
-        gap = sum(thickness)  # Gmsh would make one of two faces that lie on each other
+        gap = sum(thickness)  # stacks are built apart, because Gmsh would merge coincident faces
         built = [
             _add_stack(stack, bottom + k * gap)
             for k, (stack, bottom) in enumerate(zip(box.stacks, bottoms, strict=True))
@@ -63,7 +63,7 @@ def write_box(box: Box, path: Path) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class _Stack:
-    """Gmsh tags of a stack: volumes of its layers, lower and upper faces."""
+    """Gmsh tags of a stack: volumes by layer name, lower and upper faces."""
 
     layers: dict[str, list[int]]
     bottom: list[int]
@@ -90,7 +90,7 @@ def _lower(distance: float, bottom: float, height: float) -> None:
 
 
 def _faces(box: Box, built: list[_Stack]) -> dict[str, list[int]]:
-    """Name the lowest and the highest face, and of every two stacks the finer face as slave of the coarser one."""
+    """Name the lowest and the highest face, and between two stacks the finer face as slave of the coarser one."""
     faces = {"z_min": built[0].bottom, "z_max": built[-1].top}
     for (lower, upper), (below, above) in zip(pairwise(box.stacks), pairwise(built), strict=True):
         pair = f"{lower.layers[-1].name}-{upper.layers[0].name}"
@@ -101,7 +101,7 @@ def _faces(box: Box, built: list[_Stack]) -> dict[str, list[int]]:
 
 
 def _sides(box: Box) -> dict[str, list[int]]:
-    """Find faces and hole walls by where the surfaces lie."""
+    """Find lateral faces and hole walls by the positions of the surfaces."""
     names: dict[str, list[int]] = {name: [] for name in SIDES}
     if box.holes:
         names["mounting_holes"] = []
@@ -109,8 +109,8 @@ def _sides(box: Box) -> dict[str, list[int]]:
     planes = ((0, low[0]), (0, 0.5 * box.size[0]), (1, low[1]), (1, 0.5 * box.size[1]))
     for _, tag in gmsh.model.getEntities(2):
         limits = [value * MILLI for value in gmsh.model.getBoundingBox(2, tag)]
-        for name, (axis, place) in zip(SIDES, planes, strict=True):
-            if max(abs(limits[axis] - place), abs(limits[axis + 3] - place)) < TOLERANCE:
+        for name, (axis, position) in zip(SIDES, planes, strict=True):
+            if max(abs(limits[axis] - position), abs(limits[axis + 3] - position)) < TOLERANCE:
                 names[name].append(tag)
         if box.holes and _is_wall(limits) and lies_within_hole(tag, box.holes.places, box.holes.diameter):
             names["mounting_holes"].append(tag)

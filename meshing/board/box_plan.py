@@ -1,4 +1,4 @@
-"""A box of layers as data: its intervals, its elements counted without a mesh, what cannot be meshed. Pure Python."""
+"""Layered box as data: intervals in plan, element counts without a mesh, and input checks. Pure Python."""
 
 import math
 import re
@@ -14,14 +14,21 @@ from reflowshock.problem import Problem
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 FACETS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max", "mounting_holes")
 ElementKind = Literal["hexahedron", "tetrahedron", "tetrahedron_quadratic"]
-TETRAHEDRA = 6  # of which a box is made: two prisms of three
+TETRAHEDRA = 6  # per box: two prisms of three tetrahedra each
 RING_SQUARE = 2.0  # side of the square around a hole that is meshed as an O-grid, in diameters, if it fits
 ROOM = 1.6  # the same side, over the distance from the hole's axis to the nearest edge
 
 
 @dataclass(frozen=True, slots=True)
 class BoxLayer:
-    """A layer [m], ``cells`` elements thick, and ``in_plane`` along x and y if it differs from the box."""
+    """Layer of a box.
+
+    Attributes:
+        name: Name of the layer.
+        thickness: Thickness [m].
+        cells: Number of elements through the thickness.
+        in_plane: Number of elements along x and y, if they differ from those of the box.
+    """
 
     name: str
     thickness: float
@@ -38,22 +45,22 @@ class BoxHoles:
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
-        """Their axes [m]."""
+        """Positions of the hole axes in plan [m]."""
         x, y = (0.5 * spacing for spacing in self.spacing)
         return (-x, -y), (-x, y), (x, -y), (x, y)
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Layers upon each other from z = 0, centred on the z axis; with planes of symmetry, the halves at x, y >= 0.
+    """Stack of layers from z = 0 upwards, centred on the z axis; with planes of symmetry, the part at x, y >= 0.
 
     Attributes:
-        size: length along x and width along y of the whole [m].
-        cells: elements along x and y, of what is meshed; around holes as near to that as divides the pieces.
-        layers: bottom to top.
-        symmetry: axes normal to planes of symmetry.
-        element: kind of element.
-        holes: holes, if there are any.
+        size: Length along x and width along y of the whole box [m].
+        cells: Numbers of elements along x and y of the meshed part; approximate if there are holes.
+        layers: Layers from bottom to top.
+        symmetry: Axes normal to planes of symmetry.
+        element: Element type.
+        holes: Holes, if any.
     """
 
     size: tuple[float, float]
@@ -73,7 +80,7 @@ class Box:
 
     @property
     def rings(self) -> int:
-        """Elements between a hole and the edge of its square."""
+        """Number of elements between a hole and the edge of its square."""
         if self.holes is None:
             return 0
         meshed = min(self.extent(axis) / self.cells[axis] for axis in (0, 1))
@@ -81,7 +88,7 @@ class Box:
 
     @property
     def stacks(self) -> tuple["Box", ...]:
-        """Neighbouring layers whose elements match, bottom to top: each stack a box that shares no node with others."""
+        """Stacks of neighbouring layers with matching elements, bottom to top; different stacks share no node."""
         stacks: list[Box] = []
         for layer in self.layers:
             cells = layer.in_plane or self.cells
@@ -92,22 +99,22 @@ class Box:
         return tuple(stacks)
 
     def is_halved(self, axis: int) -> bool:
-        """Whether a plane normal to an axis is one of symmetry."""
+        """Return whether the plane normal to an axis (0 or 1) is a plane of symmetry."""
         return "xy"[axis] in self.symmetry
 
     def extent(self, axis: int) -> float:
-        """Length [m] along an axis of what is meshed."""
+        """Return the length of the meshed part along an axis (0 or 1) [m]."""
         return self.size[axis] * (0.5 if self.is_halved(axis) else 1.0)
 
 
 def box_plan(box: Box) -> Plan:
-    """Cut the box along x and y: into equal cells, but for the squares around holes."""
+    """Divide the box along x and y into equal cells, except for the squares around holes."""
     x, y = _axis(box, 0), _axis(box, 1)
     return Plan(x, y, blocks_at(box.holes.places, x, y) if box.holes else frozenset())
 
 
 def count_box(box: Box) -> dict[str, PartEstimate]:
-    """Count the elements of every layer, exactly; lengths are those of the smallest box of cells."""
+    """Count the elements of every layer exactly, and estimate the edge lengths of the smallest element."""
     return {name: part for stack in box.stacks for name, part in _count_stack(stack).items()}
 
 
@@ -138,7 +145,7 @@ def _axis(box: Box, axis: int) -> tuple[Interval, ...]:
 
 
 def _smallest_in_ring(box: Box, plan: Plan) -> float:
-    """Shortest edge [m] around a hole: radial, or along the circle."""
+    """Return the shortest edge around a hole, radial or along the circle [m]."""
     assert box.holes is not None
     radial = 0.5 * (box.square - box.holes.diameter) / box.rings
     i, j = max(plan.holes)
@@ -147,7 +154,7 @@ def _smallest_in_ring(box: Box, plan: Plan) -> float:
 
 
 def box_problems(box: Box) -> list[Problem]:
-    """Find what cannot be built, before anything is meshed; keys are those of the table ``structure``."""
+    """Return the input errors of a box before it is meshed; keys refer to the table ``structure`` of a case file."""
     return [*_layer_problems(box), *_stack_problems(box), *_hole_problems(box)]
 
 
@@ -159,13 +166,13 @@ def _layer_problems(box: Box) -> Iterator[Problem]:
 
 
 def _stack_problems(box: Box) -> Iterator[Problem]:
-    """Layers whose elements do not match are tied: quadrilaterals on planes, outlines alike."""
+    """Check that layers with different elements can be tied: they need quadrilaterals and equal outlines."""
     for stack in box.stacks[1:]:
         layer = stack.layers[0]
         key = next(
-            f"structure.layers.{one.name}.in_plane"
-            for one in (layer, *reversed(box.layers))
-            if one.in_plane is not None
+            f"structure.layers.{candidate.name}.in_plane"
+            for candidate in (layer, *reversed(box.layers))
+            if candidate.in_plane is not None
         )
         if box.element != "hexahedron":
             message = f"layers of different in_plane are tied, which needs hexahedra, the element is {box.element}"
@@ -176,7 +183,7 @@ def _stack_problems(box: Box) -> Iterator[Problem]:
 
 
 def _hole_problems(box: Box) -> Iterator[Problem]:
-    """Holes lie inside the box, those of a pair apart."""
+    """Check that holes lie inside the box and do not overlap."""
     if box.holes is None:
         return
     diameter = box.holes.diameter

@@ -1,4 +1,4 @@
-"""Parameters of package, board and warpage that are each allowed but make no assembly together. Pure Python."""
+"""Consistency checks of package, board and warpage parameters that are valid individually. Pure Python."""
 
 import difflib
 import math
@@ -10,20 +10,20 @@ from reflowshock.meshing.board.parameters import IN_LINE, Board, Package, Pad, W
 from reflowshock.meshing.board.plan import WIDEST_SQUARE, hole_square, square_around, uniform
 from reflowshock.problem import Problem
 
-LEAST_ROOM = 1.1  # side of a column over the diameter of its pad
+LEAST_ROOM = 1.1  # least ratio of a column's side and the diameter of its pad
 ROUNDING = 1.0e-9
 SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
-WIDE_HOLE = 0.25  # of a side of the board: a wider hole is probably the mistake, not the board
+WIDE_HOLE = 0.25  # of a side of the board: with a wider hole the message names the hole instead of the board
 SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # of a hole's diameter: from the edge to its block's end
 
 
 def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
-    """Find what cannot be built, before anything is meshed.
+    """Return the contradictions between parameters of an assembly, before it is meshed.
 
     Args:
-        package: array, pads, layers.
-        board: sizes, holes, symmetry.
-        warpage: lift of the package.
+        package: Array, pads and layers of the package.
+        board: Sizes, holes and symmetry of the board.
+        warpage: Prescribed warpage of the package.
     """
     return [
         *_array(package),
@@ -40,7 +40,7 @@ def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
 
 
 def _array(package: Package) -> Iterator[Problem]:
-    """Depopulated names exist, and leave a joint."""
+    """Check that depopulated joints exist and that a joint is left."""
     names = [joint_name(row, column) for row in range(package.rows) for column in range(package.columns)]
     for name in sorted(set(package.depopulated) - set(names)):
         near = difflib.get_close_matches(name.upper(), names, n=1, cutoff=0.0)[0]
@@ -51,7 +51,7 @@ def _array(package: Package) -> Iterator[Problem]:
 
 
 def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
-    """A quarter stands for the whole only if no joint lies on a plane of symmetry and depopulation is symmetric."""
+    """Check that the array of a quarter model is symmetric and that no joint lies on a plane of symmetry."""
     if board.symmetry == "full":
         return
     for key, count in (("package.rows", package.rows), ("package.columns", package.columns)):
@@ -69,7 +69,7 @@ def _symmetry(package: Package, board: Board) -> Iterator[Problem]:
 
 
 def _pad(key: str, pad: Pad, package: Package) -> Iterator[Problem]:
-    """Neighbouring pads stay apart; the definition says which of pad and opening is the smaller one."""
+    """Check that neighbouring pads do not overlap and that the mask opening suits the definition (SMD or NSMD)."""
     several = package.rows * package.columns > 1
     for name, diameter in (("diameter", pad.diameter), ("mask_opening", pad.mask_opening)):
         if several and diameter >= package.pitch:
@@ -84,7 +84,7 @@ def _pad(key: str, pad: Pad, package: Package) -> Iterator[Problem]:
 
 
 def _layers(package: Package, board: Board) -> Iterator[Problem]:
-    """Array inside substrate, die inside substrate, substrate inside board."""
+    """Check that the array and the die lie inside the substrate, and the substrate inside the board."""
     widest_pad = max(package.board_pad.diameter, package.package_pad.diameter)
     for side, count in (("length", package.columns), ("width", package.rows)):
         substrate, die, whole = getattr(package.substrate, side), getattr(package.die, side), getattr(board, side)
@@ -102,11 +102,11 @@ def _layers(package: Package, board: Board) -> Iterator[Problem]:
         elif 0.5 * substrate >= min(-low, high):
             away = 0.5 * (whole - substrate)
             message = f"the package at the origin reaches beyond the board along its {side}"
-            yield Problem("board.centre", message, _places(board.centre), f"within {_mm(away)} of the origin")
+            yield Problem("board.centre", message, _point(board.centre), f"within {_mm(away)} of the origin")
 
 
 def _holes(package: Package, board: Board) -> Iterator[Problem]:
-    """Holes lie inside the board, and the blocks around them beyond the package along both axes."""
+    """Check that holes given by insets lie inside the board, with their blocks beyond the package along both axes."""
     diameter, x, y = board.holes.diameter, board.holes.inset_x, board.holes.inset_y
     if x is None or y is None:
         return
@@ -122,17 +122,17 @@ def _holes(package: Package, board: Board) -> Iterator[Problem]:
         elif inset < SMALLEST_INSET * diameter:
             yield Problem(key, "a mounting hole reaches beyond the board", _mm(inset), allowed)
         elif inset > largest:
-            message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
+            message = "a mounting hole lies under or next to the package: it needs separate strips of the board"
             yield Problem(key, message, _mm(inset), allowed)
 
 
 def _which_holes(board: Board) -> Iterator[Problem]:
-    """Holes are given by their insets or by their places; a quarter has those of a board in the middle."""
+    """Check that holes are given by insets or by positions, and that the holes of a quarter model are symmetric."""
     holes = board.holes
     insets = [name for name in ("inset_x", "inset_y") if getattr(holes, name) is not None]
     if holes.at and insets:
         yield Problem(
-            f"board.holes.{insets[0]}", "goes with no holes at places of their own", None, "no board.holes.at"
+            f"board.holes.{insets[0]}", "cannot be combined with holes at given positions", None, "no board.holes.at"
         )
     elif not holes.at and len(insets) < 2:
         missing = next(name for name in ("inset_x", "inset_y") if name not in insets)
@@ -141,61 +141,63 @@ def _which_holes(board: Board) -> Iterator[Problem]:
         return
     whole = 'in the middle, or board.symmetry = "full"'
     if any(board.centre):
-        yield Problem("board.centre", "a quarter stands for a board with its package in the middle", None, whole)
+        yield Problem("board.centre", "a quarter model needs a centred package", None, whole)
     for x, y in holes.at:
-        if not all(any(math.dist(mirror, place) <= IN_LINE for place in holes.at) for mirror in ((-x, y), (x, -y))):
-            message = "a quarter stands for a board whose holes have their mirror images"
-            yield Problem("board.holes.at", message, _places((x, y)), f"{_places((-x, y))} and {_places((x, -y))} too")
+        if not all(any(math.dist(mirror, centre) <= IN_LINE for centre in holes.at) for mirror in ((-x, y), (x, -y))):
+            message = "a quarter model needs symmetric mounting holes"
+            yield Problem("board.holes.at", message, _point((x, y)), f"{_point((-x, y))} and {_point((x, -y))} too")
 
 
 def _hole_places(package: Package, board: Board) -> Iterator[Problem]:
-    """Holes at any places lie inside the board, beyond the package along both axes, in line or apart."""
+    """Check that holes at given positions lie inside the board, beyond the package, and in line or apart."""
     key, least = "board.holes.at", SMALLEST_INSET * board.holes.diameter
     if not board.hole_places:
         return
     if not any(places[-1] > places[0] for places in board.hole_lines):
-        yield Problem(key, "a board on one hole would turn about it", str(len(board.holes.at)), ">= 2 places")
+        yield Problem(key, "a board with one hole could rotate about it", str(len(board.holes.at)), ">= 2 positions")
     sides = (package.substrate.length, package.substrate.width)
     square = hole_square(board)
     for axis, (side, (low, high), lines) in enumerate(zip(sides, board.ends, board.hole_lines, strict=True)):
         beyond = _taken_by_package(side, board) + 0.5 * max(square, 2.0 * least)
-        for place in lines:
+        for position in lines:
             inside = f"{_mm(low + least)} to {_mm(-beyond)} and {_mm(beyond)} to {_mm(high - least)}"
-            if not low + least <= place <= high - least:
-                yield Problem(key, f"a mounting hole reaches beyond the board along {'xy'[axis]}", _mm(place), inside)
-            elif abs(place) < beyond:
-                message = "a mounting hole lies under or beside the package: it needs strips of the board of its own"
-                yield Problem(key, f"{message} along {'xy'[axis]}", _mm(place), inside)
+            if not low + least <= position <= high - least:
+                yield Problem(
+                    key, f"a mounting hole reaches beyond the board along {'xy'[axis]}", _mm(position), inside
+                )
+            elif abs(position) < beyond:
+                message = "a mounting hole lies under or next to the package: it needs separate strips of the board"
+                yield Problem(key, f"{message} along {'xy'[axis]}", _mm(position), inside)
         for first, second in pairwise(lines):
             if second - first < 2.0 * least:
                 message = f"mounting holes are neither in line nor apart along {'xy'[axis]}"
                 yield Problem(key, message, _mm(second - first), f"0 mm, or >= {_mm(2.0 * least)}")
 
 
-def _places(place: tuple[float, float]) -> str:
-    return f"({_mm(place[0])}, {_mm(place[1])})"
+def _point(centre: tuple[float, float]) -> str:
+    return f"({_mm(centre[0])}, {_mm(centre[1])})"
 
 
 def _no_room(side: str, needed: float, room: float, board: Board) -> Problem:
-    """Say that the board is too small, or its holes too large: there is room [m] beside the package on each side."""
+    """Return the error that the board is too small or its holes are too large for the room next to the package [m]."""
     whole, diameter = getattr(board, side), board.holes.diameter
     board_at_least = f">= {_mm(needed)}"
     if room > 0.0 and diameter > WIDE_HOLE * whole:
-        message = "the mounting holes do not fit beside the package and its patch"
+        message = "the mounting holes do not fit next to the package and its patch"
         allowed = f"<= {_mm(room / SMALLEST_ROOM)}, or board.{side} {board_at_least}"
         return Problem("board.holes.diameter", message, _mm(diameter), allowed)
-    message = "too small for the package, its patch and the mounting holes beside each other"
+    message = "too small for the package, its patch and the mounting holes next to each other"
     return Problem(f"board.{side}", message, _mm(whole), board_at_least)
 
 
 def _taken_by_package(side: float, board: Board) -> float:
-    """Half of the strip of the board that the package, its patch and one more element take [m]."""
+    """Return half the width of the board's strip that package, patch and one more element occupy [m]."""
     size, margin = board.numerics.element_size, board.numerics.patch_margin
     return 0.5 * side * (1.0 + (margin + 1) / uniform(0.0, 0.5 * side, size).cells)
 
 
 def _gaps(package: Package, board: Board, warpage: Warpage) -> Iterator[Problem]:
-    """The warped package stays above the board, and its pads above the board's pads."""
+    """Check that the warped package stays above the board, and its pads above those of the board."""
     sites = pad_table(package, board, Warpage())
     unit = Warpage(corner=1.0)
     over_joints = max((float(lift(package, unit, site.x, site.y)) for site in sites), default=0.0)
@@ -221,12 +223,12 @@ def _numerics(board: Board) -> Iterator[Problem]:
 
 
 def _imprint(package: Package) -> Iterator[Problem]:
-    """Columns lie apart, inside the substrate, around their pads; their joints stand between copper pads."""
+    """Check that columns do not overlap, lie inside the substrate and enclose their pads, which must be copper pads."""
     size = package.column_size
     if size is None:
         return
     if package.copper.layout == "plate":
-        message = "pads are imprinted where joints have pads of their own"
+        message = "imprinted pads need a copper pad for each joint"
         yield Problem("package.copper.layout", message, "plate", "pads, or no package.imprint")
     key, pad = "package.imprint.size", max(package.board_pad.diameter, package.package_pad.diameter)
     sides = (package.substrate.length - (package.columns - 1) * package.pitch,

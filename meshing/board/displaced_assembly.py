@@ -1,7 +1,7 @@
-"""The assembly as the shock uses it: the board flat, the package where it was when the solder froze.
+"""Assembly for the shock: a flat board, and the package at its position when the solder froze.
 
-What counts is where the package is, seen from the board below it, u_package(x) - u_board(top face, same x and y). It is
-raised flat, lifted as prescribed, or as computed.
+The package is displaced relative to the board below it, u_package(x) - u_board(top face, same x and y): by a uniform
+lift, a prescribed warpage, or the displacement computed by a reflow simulation.
 """
 
 from collections.abc import Callable
@@ -17,32 +17,32 @@ from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Package, Warpage
 from reflowshock.meshing.core.gmsh_session import gmsh_model, write_msh
 
-Displacement = Callable[[np.ndarray], np.ndarray]  # reference places (n, 3) [m] -> displacements (n, 3) [m]
+Displacement = Callable[[np.ndarray], np.ndarray]  # reference positions (n, 3) [m] -> displacements (n, 3) [m]
 PACKAGE_PARTS = ("substrate", "die", "copper_package")
 
 
 class DisplacementError(ValueError):
-    """Nodes that a computed displacement does not know."""
+    """Error for a node without a computed displacement."""
 
 
 class ContactError(ValueError):
-    """A package that would lie in the board; says where."""
+    """Error for a displaced package that penetrates the board; gives the position."""
 
 
 def write_displaced_assembly(source: Path, displacement: Displacement, path: Path) -> PackageSide:
-    """Write an assembly again, the nodes of its package displaced.
+    """Displace the nodes of the package in a flat assembly and write the result.
 
     Args:
-        source: the flat assembly.
-        displacement: of the package, relative to the board.
-        path: the ``.msh`` file to write.
+        source: The ``.msh`` file of the flat assembly.
+        displacement: Displacement of the package relative to the board.
+        path: The ``.msh`` file to write.
 
     Returns:
-        The package's underside.
+        Underside of the displaced package.
 
     Raises:
-        ContactError: the package would touch the board.
-        ValueError: an element is inside out, or the displacement does not know a node.
+        ContactError: The package would touch the board.
+        ValueError: An element is inverted, or the displacement of a node is missing.
     """
     with gmsh_model("assembly"):
         gmsh.merge(str(source))
@@ -61,20 +61,20 @@ def write_displaced_assembly(source: Path, displacement: Displacement, path: Pat
 
 def _nodes(groups: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
     """Return tags (n,) and points (n, 3) [m] of the nodes of physical groups, each once."""
-    found = [gmsh.model.mesh.getNodesForPhysicalGroup(*group) for group in groups]
-    tags, first = np.unique(np.concatenate([tags for tags, _ in found]), return_index=True)
-    return tags, np.concatenate([points for _, points in found]).reshape(-1, 3)[first]
+    nodes = [gmsh.model.mesh.getNodesForPhysicalGroup(*group) for group in groups]
+    tags, first = np.unique(np.concatenate([tags for tags, _ in nodes]), return_index=True)
+    return tags, np.concatenate([points for _, points in nodes]).reshape(-1, 3)[first]
 
 
 def _check_room(underside: np.ndarray) -> None:
     lowest = underside[underside[:, 2].argmin()]
     if lowest[2] <= 0.0:
-        place = f"x = {1e3 * lowest[0]:.4g} mm, y = {1e3 * lowest[1]:.4g} mm"
-        raise ContactError(f"the package lies {-1e3 * lowest[2]:.4g} mm inside the board at {place}, allowed < 0 mm")
+        position = f"x = {1e3 * lowest[0]:.4g} mm, y = {1e3 * lowest[1]:.4g} mm"
+        raise ContactError(f"the package lies {-1e3 * lowest[2]:.4g} mm inside the board at {position}, allowed < 0 mm")
 
 
-def prescribed(package: Package, warpage: Warpage) -> Displacement:
-    """Return the displacement of a package that is lifted."""
+def prescribed_displacement(package: Package, warpage: Warpage) -> Displacement:
+    """Return the displacement of a package with prescribed warpage."""
 
     def displacement(points: np.ndarray) -> np.ndarray:
         height = lift(package, warpage, points[:, 0], points[:, 1])
@@ -83,39 +83,39 @@ def prescribed(package: Package, warpage: Warpage) -> Displacement:
     return displacement
 
 
-def raised(height: float) -> Displacement:
-    """Return the displacement of a flat package that stands higher than drawn [m]."""
+def uniform_lift(height: float) -> Displacement:
+    """Return the displacement of a flat package that lies a height [m] above its drawn position."""
     return lambda points: np.broadcast_to([0.0, 0.0, height], points.shape)
 
 
-def read_computed(path: Path) -> Displacement:
-    """Read the displacement that a reflow left in its ``structure.npz``; errors as ``computed``."""
+def read_displacement(path: Path) -> Displacement:
+    """Read the displacement that a reflow wrote to ``structure.npz``; errors as in ``computed_displacement``."""
     with np.load(path) as arrays:
-        return computed(arrays["points"], arrays["displacement"], arrays["package"])
+        return computed_displacement(arrays["points"], arrays["displacement"], arrays["package"])
 
 
-def computed(points: np.ndarray, displacement: np.ndarray, is_package: np.ndarray) -> Displacement:
-    """Return the displacement of the package relative to the board's top face, by the nodes of both.
+def computed_displacement(points: np.ndarray, displacement: np.ndarray, is_package: np.ndarray) -> Displacement:
+    """Return the displacement of the package relative to the board's top face from nodal displacements of both.
 
     Args:
-        points: (n, 3) where the nodes of package and board were [m].
-        displacement: (n, 3) of them [m].
-        is_package: (n,) which of them are the package's.
+        points: Reference positions of the nodes of package and board, shape (n, 3) [m].
+        displacement: Displacements of these nodes, shape (n, 3) [m].
+        is_package: Whether each node belongs to the package, shape (n,).
 
     Raises:
-        NotStructuredError: the board's top face under the package is no grid.
+        NotStructuredError: The nodes of the board's top face under the package do not form a grid.
     """
     package, moved = points[is_package], displacement[is_package]
     top = _board_top(points[~is_package], displacement[~is_package], package)
     relative = moved - top(package[:, 0], package[:, 1])
     tree = cKDTree(package)
 
-    def at(places: np.ndarray) -> np.ndarray:
-        distance, node = tree.query(places)
+    def at(positions: np.ndarray) -> np.ndarray:
+        distance, node = tree.query(positions)
         if (worst := int(distance.argmax())) >= 0 and distance[worst] > MERGE:
-            place = ", ".join(f"{value:.6g}" for value in places[worst])
+            position = ", ".join(f"{value:.6g}" for value in positions[worst])
             raise DisplacementError(
-                f"no displacement is known at ({place}) m: the nearest is {distance[worst]:.3g} m off"
+                f"no displacement is known at ({position}) m: the nearest node is {distance[worst]:.3g} m away"
             )
         return relative[node]
 

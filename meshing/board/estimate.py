@@ -1,4 +1,4 @@
-"""Element counts and smallest lengths of the meshes, from parameters alone (for ``plan``)."""
+"""Element counts and smallest edge lengths of the meshes, estimated from parameters without a mesh (for ``plan``)."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -29,14 +29,14 @@ Edges = tuple[tuple[float, float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class PartEstimate:
-    """What the hexahedra of a part are like.
+    """Number and sizes of the hexahedra of a part.
 
     Attributes:
-        elements: Their number.
-        smallest: Edge lengths (x, y, z) of the smallest box [m].
-        rows: Rows of equal boxes side by side; 0 where they are not counted.
-        around_holes: How many of the elements lie around mounting holes, and are no boxes.
-        shapes: The three edges [m] of each of their shapes, in the middle of the element.
+        elements: Number of elements.
+        smallest: Edge lengths along x, y and z of the smallest box-shaped element [m].
+        rows: Number of rows of equal boxes; 0 if they are not counted.
+        around_holes: Number of elements around mounting holes, which are not boxes.
+        shapes: Edge vectors at the centre of each distinct element around a mounting hole, three per element [m].
     """
 
     elements: int
@@ -49,12 +49,16 @@ class PartEstimate:
 def count_elements(
     package: Package, board: Board, warpage: Warpage = FLAT, fine: int | None = None
 ) -> dict[str, PartEstimate]:
-    """Count the hexahedra of every part; the joints' ``solder`` and ``copper`` are summed over the array.
+    """Count the hexahedra of every part; ``solder`` and ``copper`` are sums over the array.
 
-    Of all joints but ``fine``, where this is given, ``solder_coarse`` has the coarse mesh.
+    Counts are exact if the solder wets its pads up to the edge of pad or mask; element lengths in joints follow from a
+    cylinder with the smallest wetted radius and gap.
 
-    The counts are exact as long as solder reaches the edge of its pad or mask; lengths of joint elements are those of a
-    cylinder of the smallest wetted radius and gap.
+    Args:
+        package: Array, pads and layers of the package.
+        board: Sizes, holes and symmetry of the board.
+        warpage: Prescribed warpage of the package.
+        fine: Number of joints with a fine mesh; the others are coarse (``solder_coarse``). None: all are fine.
     """
     joints = pad_table(package, board, warpage)
     count = len(joints) if fine is None else fine
@@ -82,25 +86,25 @@ def _board_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
 
 
 def _rows(plan: Plan) -> int:
-    """Count the rows of equal cells of one layer, along the axis that has fewer: a graded cell is one of its own."""
+    """Count the rows of equal cells of one layer along the axis with fewer rows; each graded cell is a row."""
     pieces, cells = zip(*(_pieces(axis) for axis in (plan.x, plan.y)), strict=True)
     return min(pieces[0] * cells[1], cells[0] * pieces[1])
 
 
 def _pieces(axis: tuple[Interval, ...]) -> tuple[int, int]:
-    """Count the pieces of equal cells of an axis, and its cells."""
+    """Return the number of runs of equal cells of an axis, and of its cells."""
     return sum(1 if part.ratio == 1.0 else part.cells for part in axis), sum(part.cells for part in axis)
 
 
 def _shapes_around_holes(plan: Plan, board: Board) -> tuple[Edges, ...]:
-    """Return the edges of each shape of element between a round hole and the square around it, as they are meshed.
+    """Return the edge vectors of each distinct element between a round hole and the square around it.
 
-    Lines run straight from points of the arc, equally far apart, to those of the square's side. Of more cells than are
-    ever meshed nothing is laid out.
+    Straight lines connect equidistant points of an arc to points of the square's side. The result is empty if there
+    are more cells than are ever meshed.
     """
     rings, square, radius = hole_rings(board), hole_square(board), 0.5 * board.holes.diameter
     height = (0.0, 0.0, board.thickness / board.numerics.layers)
-    found = []
+    shapes = []
     for cells in sorted(
         {axis[k].cells for block in plan.holes for axis, k in zip((plan.x, plan.y), block, strict=True)}
     ):
@@ -115,8 +119,8 @@ def _shapes_around_holes(plan: Plan, board: Board) -> tuple[Edges, ...]:
         spokes = 0.5 * (np.diff(points, axis=0)[:, 1:] + np.diff(points, axis=0)[:, :-1])
         pairs = zip(between.reshape(-1, 2).tolist(), spokes.reshape(-1, 2).tolist(), strict=True)
         for (x, y), (u, v) in pairs:
-            found += [((x, y, 0.0), (u, v, 0.0), height), ((-y, x, 0.0), (-v, u, 0.0), height)]
-    return tuple(found)
+            shapes += [((x, y, 0.0), (u, v, 0.0), height), ((-y, x, 0.0), (-v, u, 0.0), height)]
+    return tuple(shapes)
 
 
 def _package_estimates(package: Package, board: Board) -> dict[str, PartEstimate]:
@@ -149,7 +153,7 @@ def _joint_estimates(package: Package, joints: int, gap: float) -> dict[str, Par
 def _column_estimates(
     package: Package, board: Board, parts: dict[str, PartEstimate], joints: int
 ) -> dict[str, PartEstimate]:
-    """Count the columns of fine joints, and the boxes that are left beside them."""
+    """Count the elements of the columns of fine joints, and those of the remaining boxes."""
     imprint, numerics = package.imprint, package.joint_numerics
     if imprint is None or package.column_size is None:
         return {}
@@ -163,28 +167,28 @@ def _column_estimates(
             package.package_pad,
         ),
     }
-    found = {}
+    estimates = {}
     for name, (thickness, boxes, plan, pad) in layers.items():
         levels = column_levels(thickness, boxes, imprint)
         section = _section(numerics) + 4 * numerics.core * (rim_count(pad, edge) + imprint.rings)
         cells = joints * section * (len(levels) - 1)
         beyond = 0.5 * (package.column_size - pad.diameter)  # from the pad's edge to the nearest side
         ring = beyond / float(np.sum(imprint.growth ** np.arange(imprint.rings)))
-        found[f"{name}_column"] = PartEstimate(cells, (edge, min(edge, ring), float(np.diff(levels).min())))
+        estimates[f"{name}_column"] = PartEstimate(cells, (edge, min(edge, ring), float(np.diff(levels).min())))
         site = pad_table(package, board, FLAT)[0]
-        place = [_cells_between(axis, at, package.column_size) for axis, at in ((plan.x, site.x), (plan.y, site.y))]
-        taken = joints * place[0] * place[1] * boxes
+        replaced = [_cells_between(axis, at, package.column_size) for axis, at in ((plan.x, site.x), (plan.y, site.y))]
+        taken = joints * replaced[0] * replaced[1] * boxes
         patch_layers = min(boxes, board.numerics.patch_layers)
         upper = taken * patch_layers // boxes if name == "board" else 0
-        found[name] = replace(parts[name], elements=parts[name].elements - taken + upper)
+        estimates[name] = replace(parts[name], elements=parts[name].elements - taken + upper)
         if name == "board":
-            own = parts["board_patch"]
-            found["board_patch"] = replace(own, elements=own.elements - upper)
-    return found
+            board_patch = parts["board_patch"]
+            estimates["board_patch"] = replace(board_patch, elements=board_patch.elements - upper)
+    return estimates
 
 
 def _cells_between(axis: tuple[Interval, ...], centre: float, size: float) -> int:
-    """Return the cells of an axis in a joint's column."""
+    """Return the number of cells of an axis inside the column of a joint."""
     return sum(part.cells for part in axis if abs(0.5 * (part.start + part.end) - centre) < 0.5 * size)
 
 
@@ -196,18 +200,18 @@ def _coarse_estimates(package: Package, joints: int, gap: float) -> dict[str, Pa
 
 
 def _section(numerics: JointNumerics) -> int:
-    """Number of quadrilaterals in the cross-section of a joint."""
+    """Return the number of quadrilaterals in the cross-section of a joint."""
     return numerics.core**2 + 4 * numerics.core * numerics.rings
 
 
 def element_edge(package: Package, numerics: JointNumerics) -> float:
-    """Edge length in the cross-section of a joint [m]."""
+    """Return the typical edge length in the cross-section of a joint [m]."""
     wetted = min(pad.wetted_radius for pad in (package.board_pad, package.package_pad))
     return wetted / (0.5 * numerics.core + numerics.rings)
 
 
 def rim_count(pad: Pad, edge: float) -> int:
-    """Return the circles of elements of copper beyond the wetted disc of a pad, as long as ``edge`` [m] each."""
+    """Return the number of element rings of copper beyond the wetted disc of a pad, each about ``edge`` [m] wide."""
     if not has_rim(0.5 * pad.diameter, pad.wetted_radius):
         return 0
     return max(1, round((0.5 * pad.diameter - pad.wetted_radius) / edge))

@@ -1,4 +1,4 @@
-"""The package's underside where the shock has it: displaced, and bilinear between its nodes as its facets are."""
+"""Displaced underside of the package, bilinear between its nodes like its facets."""
 
 from dataclasses import dataclass
 
@@ -8,22 +8,23 @@ from reflowshock.meshing.board.pads import lift
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
 from reflowshock.meshing.board.plan import Interval, package_plan
 
-MERGE = 1.0e-9  # m: grid lines nearer than this are one
-STEPS = 30  # of the search for the point that was displaced to a place; each gains the digits of the strain
+MERGE = 1.0e-9  # m: grid lines at a smaller distance coincide
+STEPS = 30  # of the fixed-point iteration, whose error decreases by the strain in each step
 EXACT = 1.0e-15  # m
 
 
 class NotStructuredError(ValueError):
-    """Nodes that are no complete grid in plan, or a point outside the grid."""
+    """Error for nodes that do not form a complete grid in plan, or for a point outside the grid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructuredFace:
-    """Values on a grid.
+    """Bilinear interpolation of values on a rectilinear grid.
 
     Attributes:
-        x, y: grid lines (m,), (n,) [m], increasing.
-        values: (m, n, c) at the nodes.
+        x: Grid lines, increasing, shape (m,) [m].
+        y: Grid lines, increasing, shape (n,) [m].
+        values: Values at the nodes, shape (m, n, c).
     """
 
     x: np.ndarray
@@ -32,32 +33,32 @@ class StructuredFace:
 
     @classmethod
     def of_nodes(cls, points: np.ndarray, values: np.ndarray) -> "StructuredFace":
-        """Sort nodes into their grid.
+        """Build the grid from its nodes.
 
         Args:
-            points: (k, 2 or more) [m], in any order, each node once.
-            values: (k, c) at the nodes.
+            points: Nodes in any order, each once, shape (k, 2 or more) [m].
+            values: Values at the nodes, shape (k, c).
 
         Raises:
-            NotStructuredError: the nodes are not all crossings of their lines, each once.
+            NotStructuredError: The nodes do not form a complete grid.
         """
-        lines, places = [], []
+        lines, indices = [], []
         for axis in range(2):
-            _, first, place = np.unique(np.round(points[:, axis] / MERGE), return_index=True, return_inverse=True)
+            _, first, index = np.unique(np.round(points[:, axis] / MERGE), return_index=True, return_inverse=True)
             lines.append(points[first, axis])
-            places.append(place)
+            indices.append(index)
         shape = len(lines[0]), len(lines[1])
-        if len(points) != shape[0] * shape[1] or len(np.unique(places[0] * shape[1] + places[1])) != len(points):
-            raise NotStructuredError(f"{len(points)} nodes are no grid of {shape[0]} x {shape[1]} lines")
+        if len(points) != shape[0] * shape[1] or len(np.unique(indices[0] * shape[1] + indices[1])) != len(points):
+            raise NotStructuredError(f"{len(points)} nodes do not form a grid of {shape[0]} x {shape[1]} lines")
         grid = np.empty((*shape, values.shape[1]))
-        grid[places[0], places[1]] = values
+        grid[indices[0], indices[1]] = values
         return cls(lines[0], lines[1], grid)
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the values at points (k,), (k,) [m]: (k, c).
+        """Return the values at points x, y, both (k,) [m], shape (k, c).
 
         Raises:
-            NotStructuredError: a point lies outside the grid.
+            NotStructuredError: A point lies outside the grid.
         """
         (i, s), (j, t) = _cell(self.x, x, "x"), _cell(self.y, y, "y")
         s, t, grid = s[:, None], t[:, None], self.values
@@ -65,23 +66,23 @@ class StructuredFace:
         return (1.0 - t) * lower + t * ((1.0 - s) * grid[i, j + 1] + s * grid[i + 1, j + 1])
 
 
-def _cell(lines: np.ndarray, places: np.ndarray, axis: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cell in which each place lies, and where in it (0 to 1)."""
-    worst = places[np.argmax(np.maximum(lines[0] - places, places - lines[-1]))]
+def _cell(lines: np.ndarray, positions: np.ndarray, axis: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cell that contains each position, and the relative position in it (0 to 1)."""
+    worst = positions[np.argmax(np.maximum(lines[0] - positions, positions - lines[-1]))]
     if not lines[0] - MERGE <= worst <= lines[-1] + MERGE:
         raise NotStructuredError(f"{axis} = {worst:.6g} m, allowed {lines[0]:.6g} to {lines[-1]:.6g} m")
-    cell = np.clip(np.searchsorted(lines, places, side="right") - 1, 0, len(lines) - 2)
-    return cell, np.clip((places - lines[cell]) / np.diff(lines)[cell], 0.0, 1.0)
+    cell = np.clip(np.searchsorted(lines, positions, side="right") - 1, 0, len(lines) - 2)
+    return cell, np.clip((positions - lines[cell]) / np.diff(lines)[cell], 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PackageSide:
-    """The underside of the package.
+    """Displaced underside of the package, with the node planes of the substrate above it.
 
     Attributes:
-        level: its height over the board's top face where it is not displaced [m].
-        displacement: (m, n, 3) of its nodes, relative to the board's top face [m].
-        above: the same of the planes of nodes in the substrate, upwards.
+        level: Undisplaced height above the board's top face [m].
+        displacement: Displacement of its nodes relative to the board's top face, values of shape (m, n, 3) [m].
+        above: Level and displacement of each node plane of the substrate, upwards.
     """
 
     level: float
@@ -90,25 +91,26 @@ class PackageSide:
 
     @classmethod
     def of_nodes(cls, points: np.ndarray, displacement: np.ndarray) -> "PackageSide":
-        """Make it of the nodes of its facets, or of all of the substrate.
+        """Build the underside from the nodes of its facets, or from all nodes of the substrate.
 
         Args:
-            points: (k, 3) before they are displaced [m].
-            displacement: (k, 3) [m].
+            points: Undisplaced node coordinates, shape (k, 3) [m].
+            displacement: Displacements of the nodes, shape (k, 3) [m].
 
         Raises:
-            NotStructuredError: the nodes of a plane are no grid.
+            NotStructuredError: The nodes of a plane do not form a grid.
         """
         levels, plane = np.unique(np.round(points[:, 2] / MERGE), return_inverse=True)
         planes = [plane == number for number in range(len(levels))]
         faces = [
-            (float(points[own, 2].mean()), StructuredFace.of_nodes(points[own], displacement[own])) for own in planes
+            (float(points[rows, 2].mean()), StructuredFace.of_nodes(points[rows], displacement[rows]))
+            for rows in planes
         ]
         return cls(*faces[0], tuple(faces[1:]))
 
     @classmethod
     def prescribed(cls, package: Package, board: Board, warpage: Warpage) -> "PackageSide":
-        """Make it of the package's plan and a prescribed lift."""
+        """Build the underside from the plan of the package and a prescribed warpage."""
         plan = package_plan(package, board)
         x, y = _lines(plan.x), _lines(plan.y)
         displacement = np.zeros((len(x), len(y), 3))
@@ -118,33 +120,32 @@ class PackageSide:
         return cls(level, face, tuple((float(plane), face) for plane in planes))
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height (k,) over the board's top face at points (k,), (k,) [m]; errors as ``origin``."""
+        """Return the height above the board's top face at points x, y, all (k,) [m]; errors as in ``origin``."""
         origin = self.origin(x, y)
         return self.level + self.displacement(origin[:, 0], origin[:, 1])[:, 2]
 
     def origin(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the points (k, 2) of the underside that were displaced to (k,), (k,) [m].
+        """Return the undisplaced points, shape (k, 2) [m], of the underside that are displaced to x, y, both (k,) [m].
 
-        Each facet is the bilinear image of a rectangle: the point X that was displaced to (x, y) is found by
-        X <- (x, y) - u(X), which contracts by the strain.
+        The point X is found by the fixed-point iteration X <- (x, y) - u(X), which contracts by the strain.
 
         Raises:
-            NotStructuredError: a point lies beyond the package.
+            NotStructuredError: A point lies beyond the package.
         """
-        place = np.column_stack([x, y])
-        origin = place
+        target = np.column_stack([x, y])
+        origin = target
         for _ in range(STEPS):
-            found = self.displacement(origin[:, 0], origin[:, 1])
-            before, origin = origin, place - found[:, :2]
+            moves = self.displacement(origin[:, 0], origin[:, 1])
+            before, origin = origin, target - moves[:, :2]
             if np.abs(origin - before).max() < EXACT:
                 break
         return origin
 
     def displaced(self, points: np.ndarray) -> np.ndarray:
-        """Return where points (k, 3) of the substrate are after its displacement, linear between its nodes [m].
+        """Return the displaced positions of points (k, 3) [m] of the substrate, interpolated linearly, (k, 3) [m].
 
         Raises:
-            NotStructuredError: a point lies beyond the package.
+            NotStructuredError: A point lies beyond the package.
         """
         faces = ((self.level, self.displacement), *self.above)
         levels = np.array([level for level, _ in faces])
@@ -155,7 +156,7 @@ class PackageSide:
 
 
 def underside(package: Package) -> float:
-    """Return the height of the undisplaced underside over the board's top face [m]: of the copper's plate, if any."""
+    """Return the height of the undisplaced underside, or of its copper plate, above the board's top face [m]."""
     return package.standoff + (1 if package.copper.layout == "plate" else 2) * package.copper.thickness
 
 

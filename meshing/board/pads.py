@@ -1,4 +1,4 @@
-"""The pad table: where every joint sits, what solder can wet, and the gap that it bridges."""
+"""Pad table: position, wettable radii and gap of every joint."""
 
 import json
 import math
@@ -13,22 +13,29 @@ from reflowshock.meshing.board.parameters import Board, Package, Warpage
 
 # JEDEC JEP95 design guide 4.5: row letters skip those that look like digits or other letters.
 ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
-SMALLEST_RIM = 1.02  # pad over wetted radius; a thinner rim counts as wetted, its slivers would rule the time step
+SMALLEST_RIM = 1.02  # ratio of pad and wetted radius; slivers of a thinner rim would limit the time step
 
 Length = TypeVar("Length", float, np.ndarray)
 
 
 @dataclass(frozen=True, slots=True)
 class PadSite:
-    """One joint's place: its pads, the package's relative to the board's; in metres, row and column from 0.
+    """Positions and sizes of the two pads of a joint.
 
     Attributes:
         name: JEDEC name.
-        x, y: centre of the pad on the board.
-        gap: height of the centre of the package's pad over that of the board's, copper to copper.
-        z_board: height of the board's copper over the board.
-        offset: x and y of the centre of the package's pad, seen from the board's.
-        tilt: rotation vector of the package's pad about its centre: turns about the x and the y axis [rad].
+        row: Row, counted from 0.
+        column: Column, counted from 0.
+        x: x coordinate of the centre of the pad on the board [m].
+        y: y coordinate of the centre of the pad on the board [m].
+        gap: Height between the centres of both pads, copper to copper [m].
+        wetted_radius_board: Radius that solder can wet on the board [m].
+        wetted_radius_package: Radius that solder can wet on the package [m].
+        pad_radius_board: Radius of the copper on the board [m].
+        pad_radius_package: Radius of the copper on the package [m].
+        z_board: Height of the copper's upper face above the board [m].
+        offset: Centre of the package's pad in plan, relative to the board's [m].
+        tilt: Rotation of the package's pad about the x and y axes through its centre [rad].
     """
 
     name: str
@@ -67,9 +74,9 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
     """List the joints of the array, row by row.
 
     Args:
-        package: array, pads, standoff.
-        board: its symmetry decides whether only x > 0, y > 0 is kept.
-        warpage: lift of the package, which widens or narrows each gap and tilts the pads above it.
+        package: Array, pads and standoff of the package.
+        board: Board; of a quarter model only joints at x > 0 and y > 0 are listed.
+        warpage: Prescribed warpage of the package, which changes each gap and tilts the upper pads.
     """
     corner = corner_axis(package)
     sites = []
@@ -85,7 +92,7 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
 
 
 def lifted(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
-    """Return joints that are as drawn with the gaps and tilts that a warpage of the package gives them."""
+    """Return the sites of undeformed joints with the gaps and tilts under a warpage of the package."""
     return [
         replace(
             site,
@@ -97,9 +104,9 @@ def lifted(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list
 
 
 def _tilt(package: Package, warpage: Warpage, x: float, y: float) -> tuple[float, float]:
-    """Return the rotation vector (x, y) [rad] that lays a pad into the tangent plane of the lift w(x, y).
+    """Return the rotation vector (x, y) [rad] of a pad in the tangent plane of the lift w(x, y).
 
-    Its normal is that of the surface, (-w_x, -w_y, 1), reached from the z axis by the smallest turn.
+    It is the smallest rotation that turns the z axis into the surface normal (-w_x, -w_y, 1).
     """
     corner = corner_axis(package)
     if corner == (0.0, 0.0):
@@ -118,12 +125,12 @@ def _pad_sizes(package: Package) -> tuple[float, float, float, float, float]:
 
 
 def has_rim(pad_radius: float, wetted_radius: float) -> bool:
-    """Whether a copper pad is wide enough beyond the wetted disc for a ring of elements of its own."""
+    """Return whether a copper pad is wide enough for a ring of elements beyond its wetted disc; radii in metres."""
     return pad_radius > SMALLEST_RIM * wetted_radius
 
 
 def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
-    """Return the warpage of the package at (x, y), scalars or arrays [m]; a single joint has none."""
+    """Return the lift of the package by warpage at (x, y), scalars or arrays [m]; 0 for a single joint."""
     corner_x, corner_y = corner_axis(package)
     if corner_x == corner_y == 0.0:
         return 0.0 * x

@@ -1,6 +1,6 @@
 """Parameters of the geometry: array, pads, package, board, warpage.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them.
+All values are SI floats; ``Quantity`` holds the unit that is shown to users.
 """
 
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
 Length = Annotated[float, Quantity("mm")]
-IN_LINE = 1.0e-9  # m: holes whose places along an axis differ by less are in line
+IN_LINE = 1.0e-9  # m: holes whose coordinates along an axis differ by less are in line
 
 
 class Pad(Parameters):
@@ -32,7 +32,7 @@ class Pad(Parameters):
 
 
 class Copper(Parameters):
-    """Copper under and above the joints (H 4.3 draws it as thin plates, 0.02 mm)."""
+    """Copper under and above the joints (thin plates of 0.02 mm in H 4.3)."""
 
     thickness: Length = Field(2.0e-5, gt=0)
     layout: Literal["pads", "plate"] = "pads"
@@ -48,16 +48,17 @@ class Layer(Parameters):
 
 
 class PackageNumerics(Parameters):
-    """How the package is meshed."""
+    """Mesh parameters of the package."""
 
     element_size: Length = Field(5.0e-4, gt=0)
 
 
 class JointNumerics(Parameters):
-    """How a joint is meshed: butterfly cross-section swept from pad to pad.
+    """Mesh parameters of a joint: a butterfly cross-section swept from pad to pad.
 
-    With ``pad_layer``, the thickness over which stress and plastic work are averaged, ``pad_layers`` of the ``layers``
-    divide it equally at either pad; the others grow from there to the middle by one ratio. Without, all are alike.
+    ``pad_layer`` is the thickness over which stress and plastic work are averaged. At each pad ``pad_layers`` of the
+    ``layers`` divide it equally; the other layers grow towards the middle by a constant ratio. Without ``pad_layer``
+    all layers are equally high.
     """
 
     core: int = Field(2, ge=1, le=16)
@@ -69,13 +70,13 @@ class JointNumerics(Parameters):
 
 
 class Imprint(Parameters):
-    """Pads imprinted in the faces of board and substrate: each fine joint stands in a square column of its own.
+    """Pads imprinted in the faces of board and substrate, so that each fine joint stands in a square column.
 
-    The column goes through board and substrate. From the pad's edge ``rings`` of elements, each ``growth`` times as
-    wide as the one inside it, reach out to a square of side ``size`` (the pitch, if none is given). Its layers are as
-    high as ``first_layer`` at the pad and grow with the depth z, h = first_layer + (growth - 1) z. Its sides are tied
-    to structured boxes, which should be a quarter of its side long: larger ones make the joint too stiff. Joints that
-    cannot be swept (voids, arms) have the same columns and are tied to their pads, which adds 1 % to what they bear.
+    The column extends through board and substrate. From the edge of the pad ``rings`` of elements, each ``growth``
+    times as wide as the previous one, extend to a square of side ``size`` (default: the pitch). Its layers have the
+    height ``first_layer`` at the pad and grow with the depth z, h = first_layer + (growth - 1) z. Its sides are tied to
+    structured boxes, whose edges should be a quarter of its side; larger boxes make the joint too stiff. Joints that
+    cannot be swept (voids, arms) have the same columns and are tied to their pads, which increases their load by 1 %.
     """
 
     size: Length | None = Field(None, gt=0)
@@ -85,11 +86,11 @@ class Imprint(Parameters):
 
 
 class Package(Parameters):
-    """A ball grid array package: the array of joints, substrate and die.
+    """Ball grid array package: array of joints, substrate and die.
 
-    ``surfaces`` are files (STL, PLY, VTU; lengths in ``surface_unit``) of joints whose shape is given, by their names.
-    ``coarse_joint_numerics`` is for joints of a shock that are not fine: solder alone, also in place of their copper.
-    ``imprint`` is for the fine ones: without, they are tied to boxes of board and substrate that ignore the pads.
+    ``surfaces`` maps names of joints to files with their shapes (STL, PLY, VTU; lengths in ``surface_unit``).
+    ``coarse_joint_numerics`` applies to the coarse joints of a shock: solder only, which also replaces their copper.
+    ``imprint`` applies to fine joints; without it, they are tied to boxes of board and substrate that ignore the pads.
     """
 
     rows: int = Field(ge=1, le=100)
@@ -111,7 +112,7 @@ class Package(Parameters):
 
     @property
     def column_size(self) -> float | None:
-        """Side of the square in which a fine joint stands [m]; none where pads are not imprinted."""
+        """Side of the square column of a fine joint [m]; None if pads are not imprinted."""
         return (self.imprint.size or self.pitch) if self.imprint else None
 
 
@@ -119,10 +120,10 @@ Place = Annotated[tuple[float, float], Quantity("mm")]
 
 
 class Holes(Parameters):
-    """Mounting holes of one diameter: four, one near each corner of the board, or ``at`` any places beside the package.
+    """Mounting holes of one diameter: four near the corners of the board, or ``at`` any positions around the package.
 
-    Those at places have the package's centre as their origin; each needs strips of the board of its own along both
-    axes, which holes in line share.
+    Positions are relative to the centre of the package. Each hole needs strips of the board along both axes, which
+    only holes in line with it may share.
     """
 
     diameter: Length = Field(gt=0)
@@ -132,10 +133,10 @@ class Holes(Parameters):
 
 
 class BoardNumerics(Parameters):
-    """How the board is meshed, and how much of it belongs to the meso model.
+    """Mesh parameters of the board, and the size of its patch that belongs to the meso model.
 
-    ``patch_layers`` layers of elements under the package, and ``patch_margin`` elements around its
-    footprint, are part of the meso model: the cut lies inside the FR4 (stability of the held-velocity scheme).
+    The patch has ``patch_layers`` layers of elements under the package and ``patch_margin`` elements around its
+    footprint. Its boundary lies inside the FR4, because the held-velocity scheme is stable only there.
     """
 
     element_size: Length = Field(5.0e-4, gt=0)
@@ -147,9 +148,9 @@ class BoardNumerics(Parameters):
 
 
 class Board(Parameters):
-    """The printed circuit board; its top face is z = 0, the origin below the package's centre.
+    """Printed circuit board; its top face is z = 0, the origin lies below the centre of the package.
 
-    ``centre`` is where the middle of the board lies: off the origin, if the package is not in the middle.
+    ``centre`` is the position of the centre of the board, which differs from the origin if the package is off-centre.
     """
 
     length: Length = Field(gt=0)
@@ -162,13 +163,13 @@ class Board(Parameters):
 
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Where the whole board begins and ends along x and y [m]."""
+        """Coordinates of the ends of the whole board along x and along y [m]."""
         (x, y), (a, b) = self.centre, (0.5 * self.length, 0.5 * self.width)
         return (x - a, x + a), (y - b, y + b)
 
     @property
     def hole_places(self) -> tuple[tuple[float, float], ...]:
-        """Axes of the mounting holes of the whole board [m]."""
+        """Positions in plan of the mounting holes of the whole board [m]."""
         if self.holes.at or self.holes.inset_x is None or self.holes.inset_y is None:
             return self.holes.at
         insets = (self.holes.inset_x, self.holes.inset_y)
@@ -177,18 +178,18 @@ class Board(Parameters):
 
     @property
     def hole_lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Places along x and y [m] at which there are mounting holes, in ascending order."""
-        xs, ys = ([place[axis] for place in self.hole_places] for axis in (0, 1))
-        return _apart(xs), _apart(ys)
+        """Coordinates of the mounting holes along x and along y, ascending, each once [m]."""
+        xs, ys = ([centre[axis] for centre in self.hole_places] for axis in (0, 1))
+        return _distinct(xs), _distinct(ys)
 
 
-def _apart(places: list[float]) -> tuple[float, ...]:
-    """Sort places [m] and leave out those that only rounding tells apart."""
-    kept: list[float] = []
-    for place in sorted(places):
-        if not kept or place - kept[-1] > IN_LINE:
-            kept.append(place)
-    return tuple(kept)
+def _distinct(coordinates: list[float]) -> tuple[float, ...]:
+    """Sort coordinates [m] and drop those that differ only by rounding."""
+    distinct: list[float] = []
+    for coordinate in sorted(coordinates):
+        if not distinct or coordinate - distinct[-1] > IN_LINE:
+            distinct.append(coordinate)
+    return tuple(distinct)
 
 
 class Warpage(Parameters):
@@ -197,10 +198,10 @@ class Warpage(Parameters):
     corner: Length = 0.0
 
     def height(self, x, y, corner_x: float, corner_y: float):
-        """Return the lift of the package's underside at (x, y) [m]; scalars or arrays [m]."""
+        """Return the lift of the package's underside at (x, y), scalars or arrays [m]."""
         return self.corner * (x**2 + y**2) / (corner_x**2 + corner_y**2)
 
     def slope(self, x, y, corner_x: float, corner_y: float):
-        """Return the derivatives of the lift along x and y; scalars or arrays."""
+        """Return the derivatives of the lift along x and y at (x, y), scalars or arrays."""
         twice = 2.0 * self.corner / (corner_x**2 + corner_y**2)
         return twice * x, twice * y

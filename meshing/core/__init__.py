@@ -1,1 +1,1 @@
-"""Gmsh sessions, quality of elements, sections and outlines: what boards and joints share."""
+"""Tools that boards and joints share: Gmsh sessions, element quality, sections and outlines of facets."""

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def pieces(facets: np.ndarray) -> list[np.ndarray]:
-    """Return the pieces of facets (f, m) that hang together by edges: row numbers of each, largest piece first."""
+    """Return row numbers of the pieces of facets (f, m) that are connected by edges, largest piece first."""
     ends = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = np.unique(ends, axis=0, return_inverse=True)[1].reshape(facets.shape)
     label = np.arange(int(edges.max()) + 1)
@@ -14,13 +14,12 @@ def pieces(facets: np.ndarray) -> list[np.ndarray]:
         label = label[label]
         if np.array_equal(label, previous):
             break
-    own = label[edges[:, 0]]
-    found = [np.flatnonzero(own == value) for value in np.unique(own)]
-    return sorted(found, key=len, reverse=True)
+    piece = label[edges[:, 0]]
+    return sorted((np.flatnonzero(piece == value) for value in np.unique(piece)), key=len, reverse=True)
 
 
 def outlines(facets: np.ndarray) -> list[np.ndarray]:
-    """Return the closed lines along the edges that one facet (f, m) has, in its direction; longest first."""
+    """Return the closed outlines of facets (f, m) as node numbers in the direction of the facets, longest first."""
     first, second = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     count = int(facets.max()) + 1
     forward, backward = first * np.int64(count) + second, second * np.int64(count) + first
@@ -39,12 +38,12 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
     """Cut triangles with the plane z = height.
 
     Args:
-        points: (n, 3) [m].
-        triangles: (t, 3), outward oriented.
-        height: [m]; vertices exactly on the plane count as above it.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, outward oriented, shape (t, 3).
+        height: Height of the plane [m]; vertices exactly on the plane count as above it.
 
     Returns:
-        (s, 2, 2) segments [m]; the body lies to the left of each, so a section is traced counter-clockwise.
+        Segments of the section, shape (s, 2, 2) [m], with the body to their left, thus counter-clockwise.
     """
     above = points[:, 2] >= height
     count = above[triangles].sum(axis=1)
@@ -59,31 +58,31 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
 
 
 def section_area(segments: np.ndarray) -> float:
-    """Area enclosed by oriented segments [m^2] (Green)."""
+    """Return the area enclosed by oriented segments (s, 2, 2) [m^2] (Green's theorem)."""
     start, end = segments[:, 0], segments[:, 1]
     return 0.5 * float(np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
 
 
 def section_centroid(segments: np.ndarray) -> np.ndarray:
-    """Centroid (2,) of the enclosed area [m]."""
+    """Return the centroid of the area enclosed by oriented segments (s, 2, 2), shape (2,) [m]."""
     start, end = segments[:, 0], segments[:, 1]
     cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     return ((start + end) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
 
 
 def radius_by_angle(segments: np.ndarray, centre: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Distance from ``centre`` to the section's outline along each angle.
+    """Return the distance from a centre to the outline of a section along each angle.
 
     Args:
-        segments: (s, 2, 2) [m].
-        centre: (2,) [m].
-        angles: (a,) [rad].
+        segments: Segments of the outline, shape (s, 2, 2) [m].
+        centre: Start of the rays, shape (2,) [m].
+        angles: Directions of the rays, shape (a,) [rad].
 
     Returns:
-        (a,) [m].
+        Distances, shape (a,) [m].
 
     Raises:
-        ValueError: a ray meets the outline not exactly once; the section is not star-shaped about its centre.
+        ValueError: The section is not star-shaped about the centre: a ray does not meet its outline exactly once.
     """
     start, along = segments[:, 0] - centre, segments[:, 1] - segments[:, 0]
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -95,19 +94,19 @@ def radius_by_angle(segments: np.ndarray, centre: np.ndarray, angles: np.ndarray
     nearest = np.where(hit, distance, np.inf).min(axis=1)
     farthest = np.where(hit, distance, -np.inf).max(axis=1)
     if not hit.any(axis=1).all() or np.any(farthest - nearest > 1e-6 * farthest):
-        raise ValueError("section is not star-shaped about its centroid: a ray meets its outline not exactly once")
+        raise ValueError("section is not star-shaped about its centroid: a ray does not meet its outline exactly once")
     return nearest
 
 
 def _crossing(points: np.ndarray, first: np.ndarray, second: np.ndarray, height: float) -> np.ndarray:
-    """Where the edges first-second cross the plane, (e, 2) [m]; independent of the edge's direction."""
+    """Return the points where the edges first-second cross the plane, (e, 2) [m], independent of their direction."""
     low, high = np.minimum(first, second), np.maximum(first, second)
     share = (height - points[low, 2]) / (points[high, 2] - points[low, 2])
     return points[low, :2] + share[:, None] * (points[high, :2] - points[low, :2])
 
 
 def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    """Return the point nearest to each query (q, 3) on triangles (t, 3): (q, 3) [m]."""
+    """Return the point on triangles (t, 3) that is nearest to each query point (q, 3), shape (q, 3) [m]."""
     import pyvista
 
     surface = pyvista.PolyData.from_regular_faces(points, triangles)
@@ -115,9 +114,9 @@ def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.
 
 
 def nearest_on_line(line: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    """Return the point nearest to each query (q, 3) on a closed polygon (k, 3): (q, 3) [m]."""
+    """Return the point on a closed polygon (k, 3) that is nearest to each query point (q, 3), shape (q, 3) [m]."""
     along = np.roll(line, -1, axis=0) - line
     share = np.einsum("qki,ki->qk", queries[:, None] - line, along) / np.einsum("ki,ki->k", along, along)
-    found = line + np.clip(share, 0.0, 1.0)[..., None] * along
-    nearest = np.linalg.norm(found - queries[:, None], axis=2).argmin(axis=1)
-    return found[np.arange(len(queries)), nearest]
+    candidates = line + np.clip(share, 0.0, 1.0)[..., None] * along
+    nearest = np.linalg.norm(candidates - queries[:, None], axis=2).argmin(axis=1)
+    return candidates[np.arange(len(queries)), nearest]

@@ -1,4 +1,4 @@
-"""Gmsh sessions: opened silent, closed whatever happens, written as MSH 4.1 in metres."""
+"""Gmsh sessions: silent, always finalised, with output as MSH 4.1 in metres."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,13 +22,13 @@ def gmsh_model(name: str) -> Iterator[None]:
 
 
 def name_groups(dimension: int, groups: dict[str, list[int]]) -> None:
-    """Make each named list of entities a physical group."""
+    """Add a physical group for each name and its list of entity tags."""
     for name, tags in groups.items():
         gmsh.model.addPhysicalGroup(dimension, tags, name=name)
 
 
 def write_msh(path: Path, scale: float = 1.0) -> None:
-    """Write the current model, binary, its coordinates times ``scale``."""
+    """Write the current model as binary MSH 4.1, its coordinates multiplied by ``scale``."""
     gmsh.option.setNumber("Mesh.ScalingFactor", scale)
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.option.setNumber("Mesh.Binary", 1)

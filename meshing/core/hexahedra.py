@@ -1,14 +1,15 @@
-"""Eight-node hexahedra (VTK node order): volumes, quality, characteristic length, and relaxation to a better shape.
+"""Eight-node hexahedra in VTK node order: volume, scaled Jacobian, characteristic length, and mesh smoothing.
 
-Relaxed nodes inside move freely, those on the surface along it.
+Smoothing minimises the sum of (J0 - J)^2 over all corners whose scaled Jacobian J is below a target J0, by gradient
+descent. Interior nodes move freely, surface nodes along the surface.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-WANTED = 0.35  # scaled Jacobian up to which corners pull at their nodes
-WATCHED = 0.55  # corners up to this one take part in a round
+TARGET_JACOBIAN = 0.35  # corners with a smaller scaled Jacobian contribute to the objective
+ACTIVE_JACOBIAN = 0.55  # corners with a smaller scaled Jacobian are evaluated in a round
 ROUNDS, STEPS = 4, 15
 STRIDE = 0.5  # of the square of the shortest edge at a node, times the gradient
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
@@ -19,7 +20,7 @@ CORNERS = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1,
 
 
 def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Volume of each trilinear hexahedron (c,) [m^3], by the 2 x 2 x 2 Gauss rule, which is exact."""
+    """Return the volume of each trilinear hexahedron (c, 8), shape (c,) [m^3]; the 2 x 2 x 2 Gauss rule is exact."""
     total = np.zeros(len(cells))
     for location in np.array(np.meshgrid(GAUSS, GAUSS, GAUSS)).reshape(3, -1).T:
         factors = 1.0 + CORNERS * location
@@ -30,7 +31,10 @@ def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Smallest triple product of unit edge vectors over the eight corners (c,): 1 for a box, <= 0 inside out."""
+    """Return the scaled Jacobian of each hexahedron (c, 8), shape (c,): 1 for a box, <= 0 if inverted.
+
+    It is the smallest triple product of the unit edge vectors over the eight corners.
+    """
     corners = points[cells]
     edges = corners[:, CORNER_NEIGHBOURS] - corners[:, :, None, :]
     edges /= np.linalg.norm(edges, axis=-1, keepdims=True)
@@ -38,19 +42,22 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def shortest_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Volume over the largest face (c,) [m]: the length that, over the wave speed, estimates the critical time step."""
+    """Return the volume over the largest face of each hexahedron (c, 8), shape (c,) [m].
+
+    This length over the wave speed estimates the critical time step.
+    """
     faces = cells[:, FACES].reshape(-1, 4)
     return volumes(points, cells) / quad_areas(points, faces).reshape(-1, len(FACES)).max(axis=1)
 
 
 def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """Area of each flat quadrilateral (q,) [m^2]: half the cross product of its diagonals."""
+    """Return the area of each plane quadrilateral (q, 4), half the cross product of its diagonals, (q,) [m^2]."""
     corners = points[quads]
     return 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=-1)
 
 
 def boundary_quads(cells: np.ndarray) -> np.ndarray:
-    """Return the faces (f, 4) that belong to one cell only, seen from outside counter-clockwise."""
+    """Return the faces that belong to one cell only, counter-clockwise seen from outside, shape (f, 4)."""
     faces = cells[:, FACES].reshape(-1, 4)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]
@@ -58,53 +65,53 @@ def boundary_quads(cells: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """What nodes may do.
+    """Constraints on the motion of nodes during smoothing.
 
     Attributes:
-        free: (n,) whether a node moves.
-        normals: (n, 3) unit vectors along which it does not; zero for nodes inside.
+        free: Whether each node may move, shape (n,).
+        normals: Unit vectors along which nodes may not move, zero for interior nodes, shape (n, 3).
     """
 
     free: np.ndarray
     normals: np.ndarray
 
     def admitted(self, directions: np.ndarray) -> np.ndarray:
-        """Return what is left of directions (n, 3)."""
+        """Return the admissible part of directions of motion, shape (n, 3)."""
         along = np.einsum("ni,ni->n", directions, self.normals)
         return np.where(self.free[:, None], directions - along[:, None] * self.normals, 0.0)
 
 
 def relax_hexahedra(points: np.ndarray, cells: np.ndarray, freedom: Freedom) -> np.ndarray:
-    """Move nodes so that the corners with a small scaled Jacobian get a larger one.
+    """Smooth a mesh so that corners with a small scaled Jacobian get a larger one.
 
-    Descends along the gradient of sum (wanted - J)^2 over the corners whose scaled Jacobian J is below the wanted one,
-    each node by a stride in the scale of its own edges; a step after which the sum is not smaller is taken back.
+    Nodes descend along the gradient of the objective with a stride in proportion to their own edges; a step that does
+    not reduce the objective is rejected.
 
     Args:
-        points: (n, 3) [m].
-        cells: (c, 8).
-        freedom: of the nodes.
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8).
+        freedom: Constraints on the motion of the nodes.
 
     Returns:
-        Points (n, 3) [m].
+        Smoothed node coordinates, shape (n, 3) [m].
     """
     corners = np.concatenate([cells[:, [k, *CORNER_NEIGHBOURS[k]]] for k in range(8)])
     corners = corners[freedom.free[corners].any(axis=1)]
     reach = _reach(points, corners)
     for _ in range(ROUNDS):
-        points = _round(points, corners[_jacobian(points, corners) < WATCHED], reach, freedom)
+        points = _round(points, corners[_jacobian(points, corners) < ACTIVE_JACOBIAN], reach, freedom)
     return points
 
 
 def _round(points: np.ndarray, corners: np.ndarray, reach: np.ndarray, freedom: Freedom) -> np.ndarray:
-    """Take some steps for the corners that are watched."""
+    """Take descent steps for the active corners."""
     stride = STRIDE
-    total, gradient = _badness(points, corners)
+    total, gradient = _objective(points, corners)
     for _ in range(STEPS):
         if total == 0.0:
             break
         trial = points - stride * reach[:, None] * freedom.admitted(gradient)
-        after, next_gradient = _badness(trial, corners)
+        after, next_gradient = _objective(trial, corners)
         if after < total:
             points, total, gradient, stride = trial, after, next_gradient, 1.3 * stride
         else:
@@ -113,7 +120,7 @@ def _round(points: np.ndarray, corners: np.ndarray, reach: np.ndarray, freedom: 
 
 
 def _units(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (k, 3, 3) along the edges of corners (k, 4), and their lengths (k, 3, 1) [m]."""
+    """Return unit vectors along the edges of corners (k, 4), (k, 3, 3), and their lengths, (k, 3, 1) [m]."""
     edges = points[corners[:, 1:]] - points[corners[:, :1]]
     lengths = np.linalg.norm(edges, axis=2, keepdims=True)
     return edges / lengths, lengths
@@ -123,13 +130,13 @@ def _jacobian(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.linalg.det(_units(points, corners)[0])
 
 
-def _badness(points: np.ndarray, corners: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the sum over corners (k, 4), each with its three neighbours, and its gradient (n, 3)."""
+def _objective(points: np.ndarray, corners: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the objective over corners (k, 4), each a node and its three neighbours, and its gradient, (n, 3)."""
     units, lengths = _units(points, corners)
     normals = np.cross(np.roll(units, -1, axis=1), np.roll(units, -2, axis=1))
     jacobian = np.einsum("ki,ki->k", units[:, 0], normals[:, 0])
-    bad = jacobian < WANTED
-    miss = (WANTED - jacobian[bad])[:, None, None]
+    bad = jacobian < TARGET_JACOBIAN
+    miss = (TARGET_JACOBIAN - jacobian[bad])[:, None, None]
     pull = normals[bad] - units[bad] * jacobian[bad][:, None, None]
     pull *= -2.0 * miss / lengths[bad]
     at_nodes = np.concatenate([-pull.sum(axis=1, keepdims=True), pull], axis=1).reshape(-1, 3)
@@ -139,7 +146,7 @@ def _badness(points: np.ndarray, corners: np.ndarray) -> tuple[float, np.ndarray
 
 
 def _reach(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Square of the shortest edge at each node (n,) [m^2]."""
+    """Return the square of the shortest edge at each node, shape (n,) [m^2]."""
     shortest = np.full(len(points), np.inf)
     np.minimum.at(shortest, corners[:, 0], _units(points, corners)[1].min(axis=(1, 2)))
     return np.where(np.isfinite(shortest), shortest, 0.0) ** 2

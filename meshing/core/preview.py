@@ -1,4 +1,4 @@
-"""A picture of the meshed board and package, in seconds, without a screen."""
+"""Pictures of the meshed board and package, rendered off-screen."""
 
 from pathlib import Path
 
@@ -31,19 +31,19 @@ def write_preview(paths: list[Path], picture: Path) -> None:
 
     Args:
         paths: ``.msh`` files (assembly, and joints if they exist).
-        picture: PNG file to write.
+        picture: The PNG file to write.
     """
     parts = [part for path in paths for part in _parts(path)]
     around_package = [(name, grid) for name, grid in parts if _role(name) != "board"]
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=list(SIZE), border=False)
     plotter.set_background("white", all_renderers=True)
     views = (("whole model", parts, FROM_ABOVE, 0.5), ("package and patch", around_package, FROM_THE_SIDE, 1.5))
-    for column, (title, shown, direction, line_width) in enumerate(views):
+    for column, (title, visible_parts, direction, line_width) in enumerate(views):
         plotter.subplot(0, column)
-        for name, grid in shown:
+        for name, grid in visible_parts:
             _add_part(plotter, grid, colour(name), line_width)
         plotter.add_text(title, font_size=12, color="black")
-        _fit(plotter, np.vstack([_corners(grid) for _, grid in shown]), direction, 0.5 * SIZE[0] / SIZE[1])
+        _fit(plotter, np.vstack([_corners(grid) for _, grid in visible_parts]), direction, 0.5 * SIZE[0] / SIZE[1])
     roles = [role for role in COLOURS if any(_role(name) == role for name, _ in parts)]
     _add_legend(plotter, [(role.replace("_", " "), COLOURS[role]) for role in roles])
     plotter.screenshot(picture)
@@ -51,22 +51,22 @@ def write_preview(paths: list[Path], picture: Path) -> None:
 
 
 def write_layers_preview(path: Path, picture: Path) -> None:
-    """Render the elements of a Gmsh file, each physical volume in a colour of its own."""
+    """Render the elements of a Gmsh file, each physical volume in a different colour."""
     parts = _parts(path)
     colours = [LAYER_COLOURS[k % len(LAYER_COLOURS)] for k in range(len(parts))]
     plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), border=False)
     plotter.set_background("white")
-    for (_, grid), shown in zip(parts, colours, strict=True):
-        _add_part(plotter, grid, shown, 1.0)
+    for (_, grid), layer_colour in zip(parts, colours, strict=True):
+        _add_part(plotter, grid, layer_colour, 1.0)
     _fit(plotter, np.vstack([_corners(grid) for _, grid in parts]), FROM_ABOVE, SIZE[0] / SIZE[1])
-    _add_legend(plotter, [(name, shown) for (name, _), shown in zip(parts, colours, strict=True)])
+    _add_legend(plotter, [(name, layer_colour) for (name, _), layer_colour in zip(parts, colours, strict=True)])
     plotter.screenshot(picture)
     plotter.close()
 
 
-def _add_part(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid, shown: str, line_width: float) -> None:
+def _add_part(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid, tint: str, line_width: float) -> None:
     surface = grid.extract_surface(algorithm="dataset_surface")
-    plotter.add_mesh(surface, color=shown, show_edges=True, edge_color="#1d262e", line_width=line_width, ambient=0.3)
+    plotter.add_mesh(surface, color=tint, show_edges=True, edge_color="#1d262e", line_width=line_width, ambient=0.3)
 
 
 def _add_legend(plotter: pyvista.Plotter, entries: list[tuple[str, str]]) -> None:
@@ -75,7 +75,7 @@ def _add_legend(plotter: pyvista.Plotter, entries: list[tuple[str, str]]) -> Non
 
 
 def colour(part: str) -> str:
-    """Colour of a part by its role."""
+    """Return the colour of a part by its material role."""
     return COLOURS[_role(part)]
 
 
@@ -85,7 +85,7 @@ def _role(part: str) -> str:
 
 
 def _parts(path: Path) -> list[tuple[str, pyvista.UnstructuredGrid]]:
-    """Name and elements [mm], by their corners, of every physical volume."""
+    """Return name and elements of every physical volume, reduced to their corner nodes [mm]."""
     mesh = meshio.read(path)
     names = [name for name, (_, dimension) in mesh.field_data.items() if dimension == 3]
     grids = []
@@ -100,13 +100,13 @@ def _parts(path: Path) -> list[tuple[str, pyvista.UnstructuredGrid]]:
 
 
 def _corners(grid: pyvista.UnstructuredGrid) -> np.ndarray:
-    """Corners (8, 3) of the box around a part."""
+    """Return the corners of the bounding box of a part, shape (8, 3) [mm]."""
     x, y, z = np.reshape(grid.bounds, (3, 2))
     return np.array([(a, b, c) for a in x for b in y for c in z])
 
 
 def _fit(plotter: pyvista.Plotter, points: np.ndarray, direction: tuple[float, float, float], aspect: float) -> None:
-    """Look at points (n, 3) from a direction, in parallel projection, so that they fill a view of this aspect."""
+    """Point the camera at points (n, 3) from a direction, so that they fill a parallel view of this aspect ratio."""
     toward = np.array(direction) / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], toward)
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""Ten-node tetrahedra of a free-form body, for other codes: curved along its surface, straight inside."""
+"""Ten-node tetrahedra of a free-form body for other codes: curved along its surface, straight inside."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -16,18 +16,18 @@ ORDER = np.array([0, 3, 1, 2, 5, 4])  # Gmsh's edges 01 12 20 03 23 13 among our
 # Exact for cubics (Keast 1986, five points): barycentric coordinates and weights of the unit tetrahedron.
 STATIONS = np.vstack([np.full(4, 0.25), np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0])
 WEIGHTS = np.array([-0.8, 0.45, 0.45, 0.45, 0.45]) / 6.0
-CUBIC = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # of its Bernstein polynomials
-LEAST_JACOBIAN = 0.05  # of a curved tetrahedron, over that of the straight one
+CUBIC = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # exponents (Bernstein basis)
+LEAST_JACOBIAN = 0.05  # ratio of the Jacobians of the curved and the straight tetrahedron
 
 
 @dataclass(frozen=True, slots=True)
 class QuadraticTetrahedra:
-    """Ten-node tetrahedra.
+    """Mesh of ten-node tetrahedra in Gmsh's node order.
 
     Attributes:
-        points: (n, 3) [m].
-        cells: (c, 10) in Gmsh's order.
-        faces: name of a facet set -> (f, 6) in Gmsh's order.
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the tetrahedra, shape (c, 10).
+        faces: Facet set name -> nodes of the six-node triangles, shape (f, 6).
     """
 
     points: np.ndarray
@@ -38,13 +38,13 @@ class QuadraticTetrahedra:
 def quadratic_tetrahedra(
     split: SplitTetrahedra, points: np.ndarray, tetrahedra: np.ndarray, faces: dict[str, np.ndarray]
 ) -> QuadraticTetrahedra:
-    """Make ten-node tetrahedra of those that were split.
+    """Build ten-node tetrahedra whose surface edges are curved like those of the split hexahedra.
 
     Args:
-        split: their hexahedra.
-        points: (n, 3) of these, where they are now [m]; those at the middles of edges of ``faces`` are taken.
-        tetrahedra: (c, 4).
-        faces: name -> triangles (f, 3) of the surface.
+        split: Hexahedra into which the tetrahedra were split.
+        points: Present node coordinates of these hexahedra, shape (n, 3) [m]; gives the midpoints of surface edges.
+        tetrahedra: Vertices of the tetrahedra, shape (c, 4).
+        faces: Facet set name -> surface triangles, shape (f, 3).
     """
     count = split.vertices + len(split.edges)
     cells = np.hstack([tetrahedra, split.middles(tetrahedra[:, EDGES])[:, ORDER]])
@@ -58,7 +58,12 @@ def quadratic_tetrahedra(
 
 
 def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[str, float]:
-    """Return number, smallest scaled Jacobian of the straight ones, and relative error of the volume [m^3]."""
+    """Return the number of tetrahedra, their smallest scaled Jacobian and the relative error of their volume.
+
+    Args:
+        tetrahedra: Ten-node tetrahedra; the scaled Jacobian is that of the straight ones.
+        volume: Exact volume [m^3].
+    """
     return {
         "count": len(tetrahedra.cells),
         "minimum_scaled_jacobian": corner_quality(tetrahedra.points, tetrahedra.cells[:, :4]),
@@ -67,21 +72,21 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
 
 
 def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return a lower bound of the Jacobian of ten-node tetrahedra (c, 10), over that of the straight ones (c,).
+    """Return a lower bound of the Jacobian of ten-node tetrahedra (c, 10), relative to the straight ones, shape (c,).
 
-    It is a cubic, so no smaller than the least of its coefficients in Bernstein polynomials (Johnen, Remacle & Geuzaine
-    2013).
+    The Jacobian is a cubic polynomial and thus not below its smallest Bernstein coefficient (Johnen, Remacle &
+    Geuzaine 2013).
     """
     corners = points[cells]
     straight = np.linalg.det(corners[:, 1:4] - corners[:, :1])
     values = np.stack([np.linalg.det(_jacobian(station, corners)) for station in CUBIC / 3.0], axis=1)
-    ways = np.array([6.0 / np.prod([factorial(power) for power in powers]) for powers in CUBIC])
-    bernstein = ways * np.prod((CUBIC / 3.0)[:, None, :] ** CUBIC, axis=2)
+    multinomial = np.array([6.0 / np.prod([factorial(power) for power in powers]) for powers in CUBIC])
+    bernstein = multinomial * np.prod((CUBIC / 3.0)[:, None, :] ** CUBIC, axis=2)
     return np.linalg.solve(bernstein, values.T).min(axis=0) / straight
 
 
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
-    """Volume of ten-node tetrahedra (c, 10) [m^3], exact."""
+    """Return the exact volume of ten-node tetrahedra (c, 10) [m^3]."""
     total = 0.0
     corners = points[cells]
     for station, weight in zip(STATIONS, WEIGHTS, strict=True):
@@ -90,7 +95,7 @@ def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
 
 
 def corner_quality(points: np.ndarray, tetrahedra: np.ndarray) -> float:
-    """Smallest scaled Jacobian of the straight tetrahedra (c, 4): 0.707 at the corners of a regular one."""
+    """Return the smallest scaled Jacobian of straight tetrahedra (c, 4); 0.707 for a regular tetrahedron."""
     corners = points[tetrahedra]
     smallest = np.inf
     for k in range(4):
@@ -101,7 +106,7 @@ def corner_quality(points: np.ndarray, tetrahedra: np.ndarray) -> float:
 
 
 def write_tetrahedra(path: Path, name: str, tetrahedra: QuadraticTetrahedra) -> None:
-    """Write them as Gmsh 4.1 in metres: the volume ``solder@name`` and its facet sets."""
+    """Write tetrahedra as MSH 4.1 in metres: the volume ``solder@name`` and its facet sets."""
     with gmsh_model("free form"):
         first = 1
         groups = [(3, KIND, f"solder@{name}", tetrahedra.cells)]
@@ -118,7 +123,7 @@ def write_tetrahedra(path: Path, name: str, tetrahedra: QuadraticTetrahedra) -> 
 
 
 def _unfold(points: np.ndarray, cells: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Straighten the edges of tetrahedra that are flat on a surface so curved that they would fold."""
+    """Straighten the edges of tetrahedra that would fold on a strongly curved surface."""
     while len(folded := cells[least_jacobian(points, cells) < LEAST_JACOBIAN]):
         middles = np.unique(folded[:, 4:])
         points = points.copy()
@@ -132,13 +137,13 @@ def _with_middles(split: SplitTetrahedra, triangles: np.ndarray) -> np.ndarray:
 
 
 def _jacobian(station: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Jacobian matrices (c, 3, 3) at a place of tetrahedra with nodes (c, 10, 3)."""
+    """Return Jacobian matrices (c, 3, 3) at a point of tetrahedra with nodes (c, 10, 3)."""
     slopes = _slopes(station)
     return np.einsum("na,cni->cai", slopes[:, 1:] - slopes[:, :1], corners)
 
 
 def _slopes(station: np.ndarray) -> np.ndarray:
-    """Derivatives (10, 4) of the shape functions with respect to the barycentric coordinates."""
+    """Return the derivatives of the shape functions with respect to the barycentric coordinates, shape (10, 4)."""
     slopes = np.zeros((10, 4))
     slopes[np.arange(4), np.arange(4)] = 4.0 * station - 1.0
     for node, (first, second) in enumerate(EDGES[ORDER], start=4):

@@ -1,4 +1,4 @@
-"""Tetrahedra split into four hexahedra each: nodes at the middles of edges, faces and cells; conforming."""
+"""Conforming split of tetrahedra into four hexahedra each, with new nodes at midpoints of edges, faces and cells."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ EDGE_OF = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 
 @dataclass(frozen=True, slots=True)
 class SplitTetrahedra:
-    """The hexahedra of a mesh of tetrahedra.
+    """Hexahedra into which a mesh of tetrahedra was split.
 
     Attributes:
-        points: (n, 3) [m]: vertices, then middles of edges, of faces, of cells.
-        cells: (4 c, 8) in VTK's order.
-        vertices: number of vertices.
-        edges: (e,) keys of the edges, ascending.
-        faces: (f,) keys of the faces, ascending.
+        points: Vertices, then midpoints of edges, faces and cells, shape (n, 3) [m].
+        cells: Nodes of the hexahedra in VTK's order, shape (4 c, 8).
+        vertices: Number of vertices.
+        edges: Keys of the edges, ascending, shape (e,).
+        faces: Keys of the faces, ascending, shape (f,).
     """
 
     points: np.ndarray
@@ -30,11 +30,11 @@ class SplitTetrahedra:
     faces: np.ndarray
 
     def middles(self, pairs: np.ndarray) -> np.ndarray:
-        """Return the nodes at the middles of edges (..., 2)."""
+        """Return the nodes at the midpoints of edges (..., 2)."""
         return self.vertices + np.searchsorted(self.edges, _keys(pairs, self.vertices))
 
     def quads_of(self, triangles: np.ndarray) -> np.ndarray:
-        """Return the quadrilaterals (3 t, 4) of faces (t, 3) of the tetrahedra, three each in turn, oriented alike."""
+        """Return the three quadrilaterals of each face (t, 3) of the tetrahedra, equally oriented, shape (3 t, 4)."""
         middle = self.vertices + len(self.edges) + np.searchsorted(self.faces, _keys(triangles, self.vertices))
         following, preceding = np.roll(triangles, -1, axis=1), np.roll(triangles, 1, axis=1)
         ahead, behind = (self.middles(np.stack([triangles, other], axis=2)) for other in (following, preceding))
@@ -68,7 +68,7 @@ def split_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> SplitTetrahe
 
 
 def _keys(nodes: np.ndarray, count: int) -> np.ndarray:
-    """One number for each set of nodes in the last axis, whatever their order."""
+    """Return an integer key for each set of nodes along the last axis, independent of their order."""
     ordered = np.sort(nodes, axis=-1).astype(np.int64)
     key = ordered[..., 0]
     for k in range(1, ordered.shape[-1]):

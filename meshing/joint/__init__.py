@@ -1,1 +1,1 @@
-"""A joint's surface as hexahedra or tetrahedra in its place; start with `solder_mesh.py`."""
+"""Hexahedral meshes of solder joints, made from their closed surfaces; start with ``solder_mesh.py``."""

@@ -1,11 +1,11 @@
-"""Ways to mesh a body of solder, the most wanted first; the first whose mesh meets its bars is taken.
+"""Meshing methods for a body of solder in order of preference; the first mesh that passes its checks is used.
 
-First come swept hexahedra: the joint is made straight between its pads (``pad_planes``), shares of the height kept, so
-that its ends stay in both planes; then the same with more layers. Otherwise Gmsh remeshes the surface patch by patch,
-and each tetrahedron is split into four hexahedra. Bodies with voids or with several pads are never swept, because a
-section between two levels would be lost. The volume is exact either way. Split hexahedra bend and vibrate better than
-swept ones of their size, but need about a fifth of their time step. The record of a joint says what earlier ways
-missed.
+Swept hexahedra come first. The joint is straightened between its pads (``pad_planes``) in proportion to the height, so
+that its ends stay in both planes; the second attempt has more layers, the third a finer section as well. If all fail,
+Gmsh remeshes the surface patch by patch, and each tetrahedron is split into four hexahedra. Bodies with voids or with
+several pads are never swept, because sweeping would lose features between two levels. Both methods keep the volume
+exactly. Split hexahedra are more accurate in bending and vibration than swept ones of the same size, but need about a
+fifth of the time step. The record of a joint lists the failed attempts with their reasons.
 """
 
 import math
@@ -37,17 +37,17 @@ from reflowshock.meshing.surface.closed_surface import (
 
 MOST_LAYERS = 64
 FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # of two layers: split in two, an edge is as long as a layer is high
-LARGEST_DEVIATION = 0.1  # of the radius of a ball of the same volume, beside that of the wanted polygon from a circle
+LARGEST_DEVIATION = 0.1  # of the equal-volume sphere's radius, in addition to that of the section's polygon
 
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One way to mesh a body.
+    """Method and settings with which a body can be meshed.
 
     Attributes:
-        record: of it.
-        make: makes the solder.
-        largest_deviation: of its shape, over the radius of a ball of the same volume.
+        record: Method and settings, for the record of the joint.
+        make: Function that meshes the body.
+        largest_deviation: Largest allowed deviation of the shape, relative to the radius of a sphere of equal volume.
     """
 
     record: dict[str, Any]
@@ -56,7 +56,7 @@ class Attempt:
 
 
 def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """List the ways to mesh a body: swept, if it is one piece between two pads, then free-form."""
+    """Yield the meshing attempts for a body: swept if it is one piece between two pads, then free-form."""
     one_piece = len(pieces_of(surface)) == 1
     if one_piece and all(len(pieces_of(surface, pad)) == 1 for pad in (BOARD_PAD, PACKAGE_PAD)):
         yield from _swept(surface, numerics, place)
@@ -64,16 +64,16 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
 
 
 def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """List the ways to mesh a body of any shape."""
+    """Yield the meshing attempts that suit a body of any shape: split tetrahedra of several sizes."""
     element = 2.0 * pad_planes(surface).gap / numerics.layers
     for share in FREE_FORM_SIZES:
         for cut in (False, True):
             record = {"method": "free-form", "size": share * element, "cut_into_patches": cut}
-            yield Attempt(record, partial(_fill, surface, (share * element, cut), place), LARGEST_DEVIATION)
+            yield Attempt(record, partial(_fill, surface, share * element, cut, place), LARGEST_DEVIATION)
 
 
 def _swept(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """The wanted resolution, with more layers, and with a finer section as well."""
+    """Yield swept attempts: the requested resolution, then more layers, then a finer section as well."""
     taller = {"layers": min(2 * numerics.layers, MOST_LAYERS)}
     for finer in ({}, taller, taller | {"core": numerics.core + 1, "rings": numerics.rings + 1}):
         chosen = numerics.model_copy(update=finer)
@@ -82,46 +82,47 @@ def _swept(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> I
         yield Attempt(record, partial(swept_solder, surface, chosen, place), LARGEST_DEVIATION + corner)
 
 
-def _fill(surface: ClosedSurface, how: tuple[float, bool], place: Placing) -> Solder:
-    return free_form_solder(surface, fill_apart(surface, *how), place)
+def _fill(surface: ClosedSurface, size: float, cut_into_patches: bool, place: Placing) -> Solder:
+    return free_form_solder(surface, fill_apart(surface, size, cut_into_patches), place)
 
 
 def first_good(
-    surface: ClosedSurface, ways: Iterator[Attempt], name: str, build: Callable[[Solder], JointMesh]
+    surface: ClosedSurface, candidates: Iterator[Attempt], name: str, build: Callable[[Solder], JointMesh]
 ) -> JointMesh:
-    """Return the first mesh that meets its bars; its record tells what others missed.
+    """Return the first mesh that passes its checks; its record lists why earlier attempts failed.
 
     Args:
-        surface: that it fills.
-        ways: to mesh it.
-        name: of the joint.
-        build: puts solder into its place.
+        surface: Closed surface of the body.
+        candidates: Meshing attempts in order of preference.
+        name: Name of the joint.
+        build: Function that moves the solder into the assembly and adds copper pads.
 
     Raises:
-        JointMeshError: none does; tells what each missed.
+        JointMeshError: All attempts fail; the message gives the reason of each.
     """
     radius = math.cbrt(0.75 * enclosed_volume(surface) / math.pi)
-    missed: list[dict[str, Any]] = []
-    for way in ways:
+    failures: list[dict[str, Any]] = []
+    for attempt in candidates:
         try:
-            solder = way.make()
+            solder = attempt.make()
             mesh, errors = build(solder), shape_errors(surface, solder)
-            check_errors(mesh, errors, way.largest_deviation * radius)
+            check_errors(mesh, errors, attempt.largest_deviation * radius)
         except ValueError as error:
-            missed.append({**way.record, "missed": str(error)})
+            failures.append({**attempt.record, "missed": str(error)})
             continue
-        return replace(mesh, record={**way.record, **errors, **mesh.record, "tries": missed})
-    reasons = dict.fromkeys(f"{way['missed']} ({way['method']})" for way in missed)
+        return replace(mesh, record={**attempt.record, **errors, **mesh.record, "tries": failures})
+    reasons = dict.fromkeys(f"{failure['missed']} ({failure['method']})" for failure in failures)
     raise JointMeshError(f"joint {name}: {'; '.join(reasons)}")
 
 
 def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:
-    """Compare solder with the surface that it fills, both in the body's own frame.
+    """Compare the solder mesh with the surface that it fills, both in the body's own frame.
 
     Returns:
-        standoff_error: between the mean heights of the wetted faces, relative; contact_area_error: the larger of both
-        sides, relative; shape_deviation: largest distance between the surfaces [m], from the nodes and centres of the
-        mesh's facets to the given surface, and from the vertices of that to the mesh's.
+        standoff_error: Relative error of the distance between the mean heights of the wetted faces.
+        contact_area_error: Larger relative error of the wetted areas of both sides.
+        shape_deviation: Largest distance between both surfaces [m]: from nodes and facet centres of the mesh to the
+            closed surface, and from the vertices of the closed surface to the mesh.
     """
     heights = {side: _wetted(solder, side) for side in ("board", "package")}
     standoff = heights["package"][1] - heights["board"][1]
@@ -137,7 +138,7 @@ def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:
 
 
 def _wetted(solder: Solder, side: str) -> tuple[float, float]:
-    """Area [m^2] and mean height [m] of the wetted faces of one side."""
+    """Return area [m^2] and mean height [m] of the wetted faces of one side."""
     quads = np.vstack([face.quads for face in solder.faces if face.side == side])
     areas = quad_areas(solder.points, quads)
     return float(areas.sum()), float(areas @ solder.points[quads, 2].mean(axis=1) / areas.sum())

@@ -1,4 +1,4 @@
-"""Butterfly (O-grid) sections of the unit disc; plain NumPy, since forecasts measure their edges."""
+"""Butterfly (O-grid) meshes of the unit disc. Plain NumPy, because forecasts use the edge lengths without Gmsh."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +13,13 @@ CORE_DIAGONAL, CORE_SIDE = 0.60, 0.50
 
 @dataclass(frozen=True, slots=True)
 class Butterfly:
-    """A section of the unit disc: points (n, 2), quads (q, 4) counter-clockwise, rim (4 core,) nodes of the outline."""
+    """Quadrilateral mesh of the unit disc.
+
+    Attributes:
+        points: Node coordinates, shape (n, 2).
+        quads: Nodes of the quadrilaterals, counter-clockwise, shape (q, 4).
+        rim: Nodes of the outline, counter-clockwise, shape (4 core,).
+    """
 
     points: np.ndarray
     quads: np.ndarray
@@ -21,9 +27,13 @@ class Butterfly:
 
 
 def butterfly(core: int, rings: int, opening: float = 1.0, beyond: int = 0) -> Butterfly:
-    """Build the section with core x core quads inside ``rings`` rings of 4 core quads each; without, it fills all.
+    """Mesh the unit disc by a core of ``core`` x ``core`` quadrilaterals inside rings of 4 ``core`` quadrilaterals.
 
-    It fills the disc up to the radius ``opening``; ``beyond`` rings more go from there to the unit circle.
+    Args:
+        core: Number of core elements along each side.
+        rings: Number of rings around the core; with 0 the core fills the disc.
+        opening: Radius that core and rings fill, relative to the unit circle.
+        beyond: Number of further rings between this radius and the unit circle.
     """
     outline = _core_outline(core)
     inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)
@@ -42,13 +52,18 @@ def butterfly(core: int, rings: int, opening: float = 1.0, beyond: int = 0) -> B
 
 
 def circumradius(sides: int) -> float:
-    """Return the distance of the corners from the centre of a regular polygon that has the unit disc's area."""
+    """Return the circumradius of a regular polygon with the area of the unit disc."""
     angle = 2.0 * np.pi / sides
     return float(np.sqrt(angle / np.sin(angle)))
 
 
 def section_edges(numerics: JointNumerics, radius: float) -> np.ndarray:
-    """Return the two edges ``(q, 2, 2)`` [m], in the middle of each quad, of a round section with an area of pi r^2."""
+    """Return two edge vectors of each quadrilateral of a round section, at its centre, shape (q, 2, 2) [m].
+
+    Args:
+        numerics: Resolution of the section.
+        radius: Radius r of a disc with the area of the section, pi r^2 [m].
+    """
     section = butterfly(numerics.core, numerics.rings)
     corners = (radius * circumradius(len(section.rim)) * section.points)[section.quads]
     first, second, third, fourth = (corners[:, k] for k in range(4))
@@ -56,7 +71,7 @@ def section_edges(numerics: JointNumerics, radius: float) -> np.ndarray:
 
 
 def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
-    """Square grid of given half-diagonal and half-side: its sides are bent outwards towards the circle."""
+    """Return a square grid whose sides bulge towards the circle, from its half-diagonal and half-side."""
     steps = np.linspace(-1.0, 1.0, core + 1)
     x, y = np.meshgrid(steps, steps)
     corner = diagonal / np.sqrt(2.0)
@@ -65,7 +80,7 @@ def _core_points(core: int, diagonal: float, side: float) -> np.ndarray:
 
 
 def _core_outline(core: int) -> np.ndarray:
-    """Outline nodes of the core, counter-clockwise from the corner at (-1, -1)."""
+    """Return the outline nodes of the core, counter-clockwise from the corner at (-1, -1)."""
     grid = np.arange((core + 1) ** 2).reshape(core + 1, core + 1)
     return np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
 

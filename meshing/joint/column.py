@@ -1,12 +1,13 @@
-"""Columns of board and substrate that continue a joint's pads: rings out to a square, swept through their layers.
+"""Columns of board and substrate under and over a joint: the pad's mesh, extended to a square and swept.
 
-With ``package.imprint`` a fine joint stands in such a column. The boxes beside have lines on the square's edges
-(``board.plan``). Copper and column share the pad's nodes; ``fem`` takes out the boxes and ties the column's sides to
-those beside it. Where the boxes' lines divide the column's, constant stress passes; where they do not, measures change
-by about 1 %. All columns have as many nodes around, so neighbours fit. Where copper has another mesh (free-form joints,
-swept ones that had to be finer), it is tied to that column, whose pad has the copper's outline: forces and layer
-averages of stress are 1 % above those of shared nodes. ``joint_numerics.pad_layer`` is the thickness over which stress
-and plastic work are averaged, ``pad_layers`` the elements through it.
+With ``package.imprint`` a fine joint stands in such a column. The lines of the surrounding boxes lie on the edges of
+the square (``board.plan``). Copper and column share the nodes of the pad; ``fem`` removes the boxes inside the column
+and ties its sides to the surrounding ones. Constant stress passes exactly where the lines of the boxes subdivide those
+of the column; elsewhere results change by about 1 %. All columns have the same number of nodes around, so that
+neighbours match. Copper with a different mesh (free-form joints, swept joints that needed a finer mesh) is tied to its
+column, whose pad has the outline of the copper: forces and layer averages of stress are then 1 % larger than with
+shared nodes. ``joint_numerics.pad_layer`` is the thickness over which stress and plastic work are averaged,
+``pad_layers`` the number of elements through it.
 """
 
 from collections.abc import Callable
@@ -26,18 +27,18 @@ from reflowshock.meshing.joint.swept import section_nodes
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """The column on one side of a joint.
+    """Geometry and resolution of the column on one side of a joint.
 
     Attributes:
-        side: of the joint.
-        part: begins the name of its part.
-        numerics: of the butterfly that its pad has.
-        levels: heights as drawn, from the pad's face (k + 1,) [m].
-        square: (2, 2) lower and upper corner in plan, as drawn [m].
-        rings: of elements between the pad's edge and the square.
-        growth: width of each ring over that of the one inside it.
-        drawn: x and y (n, 2) as drawn of points (n, 3) on the pad's face [m].
-        place: where points (n, 3) as drawn are in the assembly (n, 3) [m].
+        side: Side of the joint.
+        part: Prefix of the part name.
+        numerics: Resolution of the butterfly mesh of the pad.
+        levels: Heights of the layers as drawn, from the face of the pad, shape (k + 1,) [m].
+        square: Lower left and upper right corner of the square in plan, as drawn, shape (2, 2) [m].
+        rings: Number of element rings between the edge of the pad and the square.
+        growth: Ratio of the widths of successive rings, outwards.
+        drawn: Map from points in the assembly on the face of the pad, shape (n, 3) [m], to x and y as drawn, (n, 2).
+        place: Map from points as drawn to points in the assembly, both of shape (n, 3) [m].
     """
 
     side: Side
@@ -53,14 +54,16 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMesh:
-    """A column's hexahedra; its nodes are numbered after those of the joint, whose foot or head it shares.
+    """Hexahedra of a column; new nodes are numbered after those of the joint, whose foot or head it shares.
+
+    All faces are counter-clockwise seen from outside.
 
     Attributes:
-        points: its own (n, 3) [m].
-        cells: (c, 8).
-        sides: (f, 4) its lateral faces, from outside counter-clockwise.
-        end: (e, 4) its face away from the joint, likewise.
-        top: (t, 4) its face towards the joint but for the outermost ring, whose nodes boxes may hold, likewise.
+        points: Coordinates of the new nodes, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8).
+        sides: Lateral faces, shape (f, 4).
+        end: Face away from the joint, shape (e, 4).
+        top: Face towards the joint without the outermost ring, whose nodes may be tied to boxes, shape (t, 4).
     """
 
     points: np.ndarray
@@ -71,7 +74,7 @@ class ColumnMesh:
 
 
 def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide) -> tuple[Column, ...]:
-    """Return the columns under and over a joint; none where pads are not imprinted."""
+    """Return the columns under and over a joint, or an empty tuple if pads are not imprinted."""
     size, imprint = package.column_size, package.imprint
     if size is None or imprint is None:
         return ()
@@ -83,34 +86,34 @@ def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide)
             (package.substrate.thickness, package.substrate.elements),
         )
     )
-    alike = {"numerics": package.joint_numerics, "square": square, "rings": imprint.rings, "growth": imprint.growth}
+    common = {"numerics": package.joint_numerics, "square": square, "rings": imprint.rings, "growth": imprint.growth}
     return (
-        Column("board", "board_column", levels=-foot, drawn=lambda points: points[:, :2], place=np.copy, **alike),
+        Column("board", "board_column", levels=-foot, drawn=lambda points: points[:, :2], place=np.copy, **common),
         Column(
             "package",
             "substrate_column",
             levels=underside(package) + head,
             drawn=lambda points: side.origin(points[:, 0], points[:, 1]),
             place=side.displaced,
-            **alike,
+            **common,
         ),
     )
 
 
 def column_pad(column: Column, outline: np.ndarray, opening: float, beyond: int) -> tuple[np.ndarray, Butterfly]:
-    """Mesh a pad of any outline as a column has it.
+    """Mesh a pad of any outline with the butterfly section of its column.
 
     Args:
-        column: whose pad it is.
-        outline: (r, 3) nodes of the copper's outer face in their place, counter-clockwise seen from above [m].
-        opening: radius of the mask's opening over that of the copper.
-        beyond: rings of elements between both.
+        column: Column that continues the pad.
+        outline: Outline of the copper's outer face, counter-clockwise seen from above, shape (r, 3) [m].
+        opening: Ratio of the radii of mask opening and copper.
+        beyond: Number of element rings between mask opening and edge of the copper.
 
     Returns:
-        Its nodes in their place (n, 3) [m], and how they make up the pad.
+        Nodes of the pad in the assembly, shape (n, 3) [m], and the section with their connectivity.
 
     Raises:
-        ValueError: the outline is not star-shaped about its centre.
+        ValueError: The outline is not star-shaped about its centre.
     """
     flat, numerics = column.drawn(outline), column.numerics
     section = butterfly(numerics.core, numerics.rings, opening, beyond)
@@ -119,13 +122,14 @@ def column_pad(column: Column, outline: np.ndarray, opening: float, beyond: int)
 
 
 def grow_column(column: Column, points: np.ndarray, quads: np.ndarray, rim: np.ndarray) -> ColumnMesh:
-    """Continue a pad's outer face into board or substrate.
+    """Extend the outer face of a pad to the square of its column and sweep it through board or substrate.
 
     Args:
-        column: what it is to be.
-        points: (n, 3) of the joint in its place [m].
-        quads: (q, 4) of that face, counter-clockwise seen from above.
-        rim: (4 m,) nodes of its outline, counter-clockwise from the one nearest to the square's lower left corner.
+        column: Geometry and resolution of the column.
+        points: Nodes of the joint in the assembly, shape (n, 3) [m].
+        quads: Quadrilaterals of the pad's outer face, counter-clockwise seen from above, shape (q, 4).
+        rim: Outline nodes of that face, counter-clockwise from the one nearest to the square's lower left corner,
+            shape (4 m,).
     """
     inner, local = np.unique(quads, return_inverse=True)
     flat = column.drawn(points[inner])
@@ -151,7 +155,7 @@ def grow_column(column: Column, points: np.ndarray, quads: np.ndarray, rim: np.n
 
 
 def _outline(square: np.ndarray, count: int) -> np.ndarray:
-    """Return points (4 count, 2) around a square, counter-clockwise from its lower left corner."""
+    """Return equidistant points around a square, counter-clockwise from its lower left corner, shape (4 count, 2)."""
     (left, low), (right, high) = square
     corners = np.array([[left, low], [right, low], [right, high], [left, high]])
     share = np.arange(count)[:, None] / count

@@ -1,7 +1,8 @@
-"""Solder of any shape as hexahedra: tetrahedra in its surface, each split into four, volume and wetted areas kept.
+"""Hexahedral meshes of solder of any shape: tetrahedra, each split into four hexahedra.
 
-New nodes go to the surface, and nodes slide until the corners are good (``core.hexahedra``). Outlines are scaled to the
-areas of their sections, and what is free by one factor (``section_scale``), which is reported.
+New surface nodes are projected onto the closed surface, and nodes are relaxed until the element corners are well shaped
+(``core.hexahedra``). Wetted faces are scaled to their exact areas; the free surface moves along its normals to the
+exact volume, by a factor that is reported (``section_scale``).
 """
 
 from collections.abc import Callable
@@ -31,18 +32,18 @@ SIDES: dict[int, Side] = {BOARD_PAD: "board", PACKAGE_PAD: "package"}
 
 
 def free_form_solder(surface: ClosedSurface, tetrahedra: Tetrahedra, place: Placing) -> Solder:
-    """Make hexahedra of tetrahedra in a surface.
+    """Split tetrahedra into hexahedra and fit these to the closed surface, keeping volume and wetted areas.
 
-    The new nodes of the surface go to where it is: those on contact lines to these lines, others along it. Wetted faces
-    are scaled about their centres to their areas, then the free surface moves along its normals to the volume.
+    New nodes on contact lines are projected onto these lines, other surface nodes onto the free surface. Wetted faces
+    are scaled about their centres to their areas, then the free surface moves along its normals until the volume fits.
 
     Args:
-        surface: the body in its own frame.
-        tetrahedra: in it.
-        place: moves points (n, 3) [m] to where the body will be, where its volume is kept.
+        surface: Closed surface in the body's pad_triangles frame.
+        tetrahedra: Tetrahedra that fill it.
+        place: Map from the pad_triangles frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
 
     Raises:
-        ValueError: the free surface would have to move too far to keep the volume.
+        ValueError: The free surface would have to move too far to keep the volume.
     """
     split = split_tetrahedra(tetrahedra.points, tetrahedra.cells)
     triangles = {label: tetrahedra.triangles[tetrahedra.boundary == label] for label in (FREE, *SIDES)}
@@ -73,7 +74,7 @@ def free_form_solder(surface: ClosedSurface, tetrahedra: Tetrahedra, place: Plac
 
 
 def _wetted_face(side: Side, quads: np.ndarray) -> WettedFace:
-    """Make a face of outward quadrilaterals: those on the board are seen from below."""
+    """Build a wetted face from outward quadrilaterals; those on the board are reversed, to be seen from above."""
     upward = quads[:, ::-1] if side == "board" else quads
     return WettedFace(side, upward, outlines(upward)[0])
 
@@ -81,15 +82,15 @@ def _wetted_face(side: Side, quads: np.ndarray) -> WettedFace:
 def _fit_pad(points: np.ndarray, surface: ClosedSurface, label: int, quads: np.ndarray) -> np.ndarray:
     """Move the rims of a wetted face to the contact lines and scale the face to the wetted area."""
     centre = points[np.unique(quads)].mean(axis=0)
-    own = min(
+    pad_triangles = min(
         pieces_of(surface, label), key=lambda pad: np.linalg.norm(surface.points[np.unique(pad)].mean(axis=0) - centre)
     )
-    lines = [surface.points[line] for line in outlines(own)]
+    lines = [surface.points[line] for line in outlines(pad_triangles)]
     result = points.copy()
     for rim in outlines(quads):
         line = min(lines, key=lambda line: np.linalg.norm(line.mean(axis=0) - points[rim].mean(axis=0)))
         result[rim] = nearest_on_line(line, points[rim])
-    wetted = np.linalg.norm(area_vectors(surface.points, own), axis=1).sum()
+    wetted = np.linalg.norm(area_vectors(surface.points, pad_triangles), axis=1).sum()
     stretch = np.sqrt(wetted / quad_areas(result, quads).sum())
     nodes = np.unique(quads)
     result[nodes] = centre + stretch * (result[nodes] - centre)
@@ -97,7 +98,7 @@ def _fit_pad(points: np.ndarray, surface: ClosedSurface, label: int, quads: np.n
 
 
 def _fit_free(points: np.ndarray, surface: ClosedSurface, quads: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """Move the nodes of the free surface, but those of contact lines, to the nearest points of the given one."""
+    """Project the nodes of the free surface, except those of contact lines, onto the closed surface."""
     nodes = np.setdiff1d(quads, fixed)
     result = points.copy()
     result[nodes] = nearest_on_triangles(surface.points, surface.triangles[surface.boundary == FREE], points[nodes])
@@ -105,7 +106,7 @@ def _fit_free(points: np.ndarray, surface: ClosedSurface, quads: np.ndarray, fix
 
 
 def _normals(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """Unit normals at the nodes of outward quadrilaterals (n, 3); zero elsewhere."""
+    """Return unit normals at the nodes of outward quadrilaterals, zero elsewhere, shape (n, 3)."""
     corners = points[quads]
     areas = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     sums = np.stack([np.bincount(quads.ravel(), np.repeat(areas[:, k], 4), len(points)) for k in range(3)], axis=1)
@@ -114,14 +115,14 @@ def _normals(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 def _sliding(points: np.ndarray, quads: dict[int, np.ndarray], fixed: np.ndarray) -> Freedom:
-    """All nodes but those of contact lines move, those of the surface along it."""
+    """Return the freedom of nodes that slide: all except those of contact lines, surface nodes along the surface."""
     free = np.ones(len(points), dtype=bool)
     free[fixed] = False
     return Freedom(free, _normals(points, np.concatenate(list(quads.values()))))
 
 
 def _inside(points: np.ndarray, quads: dict[int, np.ndarray]) -> Freedom:
-    """Only nodes inside move."""
+    """Return the freedom of nodes of which only interior ones move."""
     free = np.ones(len(points), dtype=bool)
     free[np.concatenate(list(quads.values()))] = False
     return Freedom(free, np.zeros_like(points))
@@ -130,7 +131,11 @@ def _inside(points: np.ndarray, quads: dict[int, np.ndarray]) -> Freedom:
 def _keep_volume(
     points: np.ndarray, normals: np.ndarray, volume_of: Callable[[np.ndarray], float], volume: float
 ) -> tuple[np.ndarray, float]:
-    """Move points along normals (n, 3) to a volume [m^3]: by a share of the radius of a ball that has it."""
+    """Move points along normals (n, 3) until they enclose a volume [m^3].
+
+    Returns:
+        Moved points, shape (n, 3) [m], and 1 plus the distance over the radius of a sphere of that volume.
+    """
     radius = np.cbrt(0.75 * volume / np.pi)
 
     def moved(scale: float) -> np.ndarray:

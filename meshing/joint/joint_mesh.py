@@ -1,6 +1,6 @@
-"""A joint's mesh in its place: solder and copper pads, named facets, quality; what exceeds a limit is an error.
+"""Mesh of a joint in the assembly: solder, copper pads, columns, named facets, and checks of its quality.
 
-Its place is that of its pad on the board, its head laid on the package's underside.
+A joint moves to its pad on the board and is sheared along z, so that its head lies on the underside of the package.
 """
 
 import math
@@ -21,22 +21,26 @@ from reflowshock.meshing.surface.closed_surface import ClosedSurface, pad_planes
 
 
 class Underside(Protocol):
-    """The underside of a package."""
+    """Underside of a package as a height field."""
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height (k,) over the board's top face at points (k,), (k,) [m]; ValueError beyond the package."""
+        """Return the height above the board's top face at points x, y, all of shape (k,) [m].
+
+        Raises:
+            ValueError: A point lies beyond the package.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class JointPlace:
-    """The way of a joint to its site.
+    """Map from the own frame of a joint to its position in the assembly.
 
     Attributes:
-        site: where its pads are.
-        side: the package's underside.
-        copper: thickness of the copper between the solder and that underside, but for a plate's, which is part of
-            the package [m].
-        head: the solder's upper face in its own frame.
+        site: Positions and sizes of the pads.
+        side: Underside of the package.
+        copper: Thickness of the copper pad between solder and underside [m]; 0 with a copper plate, which is part of
+            the package.
+        head: Plane of the solder's upper face in its own frame.
     """
 
     site: PadSite
@@ -46,17 +50,17 @@ class JointPlace:
 
     @classmethod
     def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
-        """Take the upper face from the joint's closed surface."""
+        """Build the map, with the upper face found from the closed surface of the joint."""
         return cls(site, side, copper, pad_planes(surface))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Move points (n, 3) [m] to the site; shear them in z so that the upper face gets where the package is."""
+        """Move points (n, 3) [m] to the site, sheared along z so that the upper face lies on the package."""
         share = np.clip(points[:, 2] / self.head.height(*points[:, :2].T), 0.0, 1.0)
         x, y = points[:, 0] + self.site.x, points[:, 1] + self.site.y
         return np.column_stack([x, y, self.site.z_board + points[:, 2] + share * self.rise(points)])
 
     def rise(self, points: np.ndarray) -> np.ndarray:
-        """Return how far the upper face lies below its place at the x and y of points (n, 3) [m]: (n,)."""
+        """Return the distance along z from the upper face up to the package at points (n, 3) [m], shape (n,) [m]."""
         height = self.side.height(points[:, 0] + self.site.x, points[:, 1] + self.site.y)
         return height - self.copper - self.site.z_board - self.head.height(*points[:, :2].T)
 
@@ -66,23 +70,23 @@ LARGEST_ERROR = 3.0e-3  # of volume, standoff and contact areas
 
 
 class JointMeshError(ValueError):
-    """A joint that cannot be meshed to the required quality; names the joint, the value and the allowed range."""
+    """Error for a joint that cannot be meshed well enough; gives the joint, the value and the allowed range."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointMesh:
-    """Hexahedra of one joint, or of several that are one body, in their place.
+    """Hexahedra of a joint, or of a bridge of several joints, in the assembly.
 
     Attributes:
-        name: JEDEC name, or several joined by "+".
-        points: (n, 3) [m].
-        cells: part name -> (c, 8) int32.
-        facets: facet set name -> (f, 4) int32, seen from outside counter-clockwise.
-        volume_error: of the solder in its place against the body that it fills, relative.
-        section_scale: factor by which free outlines were scaled to keep the volume.
-        head_mismatch: largest distance by which its head was sheared to lie on the package's underside [m].
-        tetrahedra: of which it was made, in its place, if it is free-form.
-        record: what else is recorded of it: how it was made, its errors against the given surface.
+        name: JEDEC name, or several names joined by "+".
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Part name -> nodes of the hexahedra, shape (c, 8), int32.
+        facets: Facet set name -> nodes of the facets, counter-clockwise seen from outside, shape (f, 4), int32.
+        volume_error: Relative error of the solder volume.
+        section_scale: Factor by which free outlines were scaled to keep the volume.
+        head_mismatch: Largest distance by which the head was sheared to lie on the underside of the package [m].
+        tetrahedra: Quadratic tetrahedra of the same body in the assembly, for free-form meshes.
+        record: Meshing method, deviations from the closed surface, and failed attempts.
     """
 
     name: str
@@ -98,20 +102,24 @@ class JointMesh:
 
 @dataclass(frozen=True, slots=True)
 class _Pad:
-    """A copper pad: name of its joint, radius [m], nodes (k, r) of circles outwards beyond its solder, if any.
+    """Copper pad of a joint.
 
-    ``swept`` says whether its solder is: its mesh is then a butterfly.
+    Attributes:
+        name: Name of the joint.
+        radius: Radius of the copper [m].
+        is_swept: Whether the solder on it is swept, so that its mesh is a butterfly.
+        rims: Nodes on circles beyond the solder, from inside outwards, shape (k, r).
     """
 
     name: str
     radius: float
-    swept: bool
+    is_swept: bool
     rims: np.ndarray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
 
 
 @dataclass(slots=True)
 class _Parts:
-    """A joint while its parts are put on each other."""
+    """Joint under construction, to which parts are added."""
 
     points: np.ndarray
     cells: dict[str, np.ndarray]
@@ -119,14 +127,22 @@ class _Parts:
 
 
 @dataclass(frozen=True, slots=True)
+class _Face:
+    """Face of a part: its quadrilaterals, shape (q, 4), and the nodes of its outline, shape (r,)."""
+
+    quads: np.ndarray
+    rim: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
 class CopperPads:
-    """Copper pads on the wetted faces of a joint, and what continues them.
+    """Copper pads on the wetted faces of a joint, and the columns that continue them.
 
     Attributes:
-        thickness: of each [m].
-        layers: of elements.
-        edge: wanted length of elements beyond the solder [m].
-        columns: of board and substrate, where the joint stands in some.
+        thickness: Thickness of each pad [m].
+        layers: Number of element layers.
+        edge: Target length of elements beyond the solder [m].
+        columns: Columns of board and substrate, if pads are imprinted.
     """
 
     thickness: float
@@ -136,25 +152,25 @@ class CopperPads:
 
 
 def build_joint(solder: Solder, sites: Sequence[PadSite], copper: CopperPads | None, place: JointPlace) -> JointMesh:
-    """Put a body of solder in its place and copper pads on its wetted faces.
+    """Move a body of solder into the assembly and add copper pads to its wetted faces.
 
     Args:
-        solder: in its own frame.
-        sites: of the joints whose pads it wets: a face lies on the pad that is nearest.
-        copper: the pads; none where solder sits on plates, or fills the place of copper.
-        place: from the own frame to the assembly.
+        solder: Hexahedra in the body's own frame.
+        sites: Sites of the joints whose pads the solder wets; each face belongs to the nearest pad.
+        copper: Copper pads; None if solder sits on copper plates or replaces the copper.
+        place: Map from the own frame to the assembly.
 
     Raises:
-        JointMeshError: a scaled Jacobian is too small.
+        JointMeshError: A scaled Jacobian is too small.
     """
-    own, pads = solder.points, []
+    points, pads = solder.points, []
     for face in solder.faces:
         pad = _pad_of(solder, face, sites, place)
         rim = np.empty((0, 0, 3)) if copper is None else _rim(solder, face, pad.radius, copper.edge)
-        pads.append(replace(pad, rims=len(own) + np.arange(rim.size // 3).reshape(rim.shape[:2])))
-        own = np.vstack([own, rim.reshape(-1, 3)])
+        pads.append(replace(pad, rims=len(points) + np.arange(rim.size // 3).reshape(rim.shape[:2])))
+        points = np.vstack([points, rim.reshape(-1, 3)])
     name = place.site.name
-    parts = _Parts(place(own), {f"solder@{name}": solder.cells}, {})
+    parts = _Parts(place(points), {f"solder@{name}": solder.cells}, {})
     for face, pad in zip(solder.faces, pads, strict=True):
         _add_pad(parts, face, pad, copper)
     cells = {part: hexahedra.astype(np.int32) for part, hexahedra in parts.cells.items()}
@@ -177,7 +193,16 @@ def build_joint(solder: Solder, sites: Sequence[PadSite], copper: CopperPads | N
 
 
 def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: float) -> None:
-    """Raise JointMeshError where volume, standoff, contact areas or shape [m] are too far from the given surface's."""
+    """Check volume, standoff, contact areas and shape of a joint mesh against its closed surface.
+
+    Args:
+        mesh: Mesh of the joint.
+        errors: Errors returned by ``shape_errors``.
+        largest_deviation: Largest allowed deviation of the shape [m].
+
+    Raises:
+        JointMeshError: An error exceeds its limit.
+    """
     limits = dict.fromkeys(("volume_error", "standoff_error", "contact_area_error"), LARGEST_ERROR)
     limits["shape_deviation"] = largest_deviation
     for name, value in {"volume_error": mesh.volume_error, **errors}.items():
@@ -189,8 +214,8 @@ def joint_quality(mesh: JointMesh) -> dict:
     """Return the quality of a joint mesh.
 
     Returns:
-        volume_error, section_scale, head_mismatch (see ``JointMesh``), minimum_scaled_jacobian, smallest_length:
-        material role -> volume over largest face of the thinnest element [m], and what the mesh's record holds.
+        volume_error, section_scale and head_mismatch (see ``JointMesh``); minimum_scaled_jacobian; smallest_length:
+        material role -> smallest ratio of volume and largest face of an element [m]; and the record of the mesh.
     """
     lengths: dict[str, float] = {}
     for part, cells in mesh.cells.items():
@@ -217,7 +242,7 @@ def _pad_of(solder: Solder, face: WettedFace, sites: Sequence[PadSite], place: J
 
 
 def _rim(solder: Solder, face: WettedFace, pad_radius: float, edge: float) -> np.ndarray:
-    """Return circles of nodes (k, r, 3) out to a copper pad's edge in its plane, none where the solder covers it."""
+    """Return circles of nodes from the solder to the edge of the copper, shape (k, r, 3) [m]; k = 0 without rim."""
     wetted_radius = math.sqrt(quad_areas(solder.points, face.quads).sum() / math.pi)
     if not has_rim(pad_radius, wetted_radius):
         return np.empty((0, 0, 3))
@@ -231,7 +256,7 @@ def _rim(solder: Solder, face: WettedFace, pad_radius: float, edge: float) -> np
 
 
 def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: CopperPads | None) -> None:
-    """Name a wetted face; put copper on it as wide as its rims reach, and the column that continues it."""
+    """Name a wetted face and add its copper pad and, if pads are imprinted, the column that continues it."""
     board, quads, rim = face.side == "board", face.quads, face.rim
     end = "foot" if board else "head"
     facets = {f"pad_{face.side}@{pad.name}": quads, f"{end}@{pad.name}": quads}
@@ -240,50 +265,55 @@ def _add_pad(parts: _Parts, face: WettedFace, pad: _Pad, copper: CopperPads | No
             around = np.column_stack([rim, circle, np.roll(circle, -1), np.roll(rim, -1)])
             quads, rim = np.vstack([quads, around]), circle
         step = np.array([0.0, 0.0, -copper.thickness if board else copper.thickness])
-        beyond, rim = _add_copper(parts, f"copper_{face.side}@{pad.name}", (quads, rim), (step, copper.layers))
-        facets[f"{end}@{pad.name}"] = beyond
+        outer = _add_copper(parts, f"copper_{face.side}@{pad.name}", _Face(quads, rim), step, copper.layers)
+        facets[f"{end}@{pad.name}"] = outer.quads
         for column in copper.columns:
             if column.side == face.side:
                 del facets[f"{end}@{pad.name}"]
-                if pad.swept and len(rim) == 4 * column.numerics.core:
-                    _add_column(parts, column, pad.name, (beyond, rim))
+                if pad.is_swept and len(outer.rim) == 4 * column.numerics.core:
+                    _add_column(parts, column, pad.name, outer)
                 else:
-                    facets[f"slave@{end}@{pad.name}"] = beyond
-                    top = _add_tied_column(parts, column, pad, (beyond, rim), face)
+                    facets[f"slave@{end}@{pad.name}"] = outer.quads
+                    top = _add_tied_column(parts, column, pad, outer, face)
                     parts.facets[f"master@{end}@{pad.name}"] = top
     parts.facets |= {name: faces[:, ::-1] if board else faces for name, faces in facets.items()}
 
 
-def _add_copper(
-    parts: _Parts, name: str, face: tuple[np.ndarray, np.ndarray], layers: tuple[np.ndarray, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sweep a face, its quads and its outline, along a step [m] in so many layers; return the face at the other end."""
-    (quads, rim), (step, count) = face, layers
-    nodes, local = np.unique(quads, return_inverse=True)
+def _add_copper(parts: _Parts, name: str, face: _Face, step: np.ndarray, count: int) -> _Face:
+    """Sweep a face along a step, shape (3,) [m], in ``count`` layers; return the face at the other end."""
+    nodes, local = np.unique(face.quads, return_inverse=True)
     levels = [nodes, *(len(parts.points) + len(nodes) * layer + np.arange(len(nodes)) for layer in range(count))]
     shares = np.arange(1, count + 1)[:, None, None] / count
     parts.points = np.vstack([parts.points, (parts.points[nodes] + shares * step).reshape(-1, 3)])
     order = levels if step[2] > 0.0 else levels[::-1]
-    local = local.reshape(quads.shape)
+    local = local.reshape(face.quads.shape)
     parts.cells[name] = np.vstack([np.hstack([low[local], high[local]]) for low, high in pairwise(order)])
-    return levels[-1][local], levels[-1][np.searchsorted(nodes, rim)]
+    return _Face(levels[-1][local], levels[-1][np.searchsorted(nodes, face.rim)])
 
 
-def _add_tied_column(
-    parts: _Parts, column: Column, pad: _Pad, end: tuple[np.ndarray, np.ndarray], face: WettedFace
-) -> np.ndarray:
-    """Add the column under a pad with another mesh, given its outer and its wetted face; return what the pad is on."""
-    quads, rim = end
-    wetted, all_of_it = (quad_areas(parts.points, some).sum() for some in (face.quads, quads))
-    points, section = column_pad(column, parts.points[rim], math.sqrt(wetted / all_of_it), len(pad.rims))
+def _add_tied_column(parts: _Parts, column: Column, pad: _Pad, outer: _Face, wetted: WettedFace) -> np.ndarray:
+    """Add a column whose mesh differs from the copper's, which is to be tied to it.
+
+    Args:
+        parts: Joint under construction.
+        column: Geometry and resolution of the column.
+        pad: Copper pad.
+        outer: Outer face of the copper.
+        wetted: Wetted face of the solder on it.
+
+    Returns:
+        Facets of the column under the copper, shape (t, 4).
+    """
+    wetted_area, outer_area = (quad_areas(parts.points, quads).sum() for quads in (wetted.quads, outer.quads))
+    points, section = column_pad(column, parts.points[outer.rim], math.sqrt(wetted_area / outer_area), len(pad.rims))
     first = len(parts.points)
     parts.points = np.vstack([parts.points, points])
-    return _add_column(parts, column, pad.name, (first + section.quads, first + section.rim)).top
+    return _add_column(parts, column, pad.name, _Face(first + section.quads, first + section.rim)).top
 
 
-def _add_column(parts: _Parts, column: Column, name: str, face: tuple[np.ndarray, np.ndarray]) -> ColumnMesh:
-    """Continue the outer face of a pad, its quads and its outline; what may be tied is ``column_<side>@<joint>``."""
-    mesh = grow_column(column, parts.points, *face)
+def _add_column(parts: _Parts, column: Column, name: str, face: _Face) -> ColumnMesh:
+    """Continue the outer face of a pad; the facets that boxes may touch are named ``column_<side>@<joint>``."""
+    mesh = grow_column(column, parts.points, face.quads, face.rim)
     parts.points = np.vstack([parts.points, mesh.points])
     parts.cells[f"{column.part}@{name}"] = mesh.cells
     free = f"board_bottom@{name}" if column.side == "board" else None

@@ -1,4 +1,4 @@
-"""All joint meshes of an array as one Gmsh file with a physical name for every part and facet set."""
+"""Gmsh file with all joint meshes of an array; every part and facet set is a physical group."""
 
 from pathlib import Path
 
@@ -10,14 +10,14 @@ from reflowshock.meshing.joint.solder_mesh import JointMesh
 
 
 def write_joints(meshes: list[JointMesh], path: Path) -> dict[str, float]:
-    """Write joints as discrete Gmsh volumes in metres.
+    """Write joint meshes to a Gmsh file in metres, each part as a discrete volume.
 
     Args:
-        meshes: the joints in their places.
-        path: the ``.msh`` file to write.
+        meshes: Joint meshes in the assembly.
+        path: The ``.msh`` file to write.
 
     Returns:
-        Joint name -> smallest scaled Jacobian by Gmsh's own measure.
+        Joint name -> smallest scaled Jacobian, computed by Gmsh.
     """
     with gmsh_model("joints"):
         nodes = elements = 1

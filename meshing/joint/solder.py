@@ -1,4 +1,4 @@
-"""A body of solder as hexahedra in its own frame, and its wetted faces."""
+"""Hexahedral mesh of a body of solder in its own frame, with its wetted faces."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,12 +13,12 @@ Side = Literal["board", "package"]
 
 @dataclass(frozen=True, slots=True)
 class WettedFace:
-    """A wetted face of a pad.
+    """Face of the solder on a pad, oriented counter-clockwise seen from above.
 
     Attributes:
-        side: of the solder.
-        quads: (q, 4) nodes, counter-clockwise seen from above.
-        rim: (r,) nodes of its outline, counter-clockwise seen from above.
+        side: Side of the pad.
+        quads: Nodes of the quadrilaterals, shape (q, 4).
+        rim: Nodes of the outline, shape (r,).
     """
 
     side: Side
@@ -28,16 +28,16 @@ class WettedFace:
 
 @dataclass(frozen=True, slots=True)
 class Solder:
-    """Hexahedra of solder.
+    """Hexahedra of a body of solder.
 
     Attributes:
-        points: (n, 3) in the body's own frame [m].
-        cells: (c, 8).
-        faces: wetted faces; of a joint the board's, then the package's.
-        volume: that the cells are to have in their place [m^3].
-        scale: by which free outlines were scaled to have it.
-        planes: of its pads.
-        tetrahedra: of which free-form hexahedra were made, in the same frame.
+        points: Node coordinates in the body's own frame, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8).
+        faces: Wetted faces; for a single joint the board's, then the package's.
+        volume: Exact volume of the body [m^3].
+        scale: Factor by which free outlines were scaled to keep the volume.
+        planes: Planes of the pads.
+        tetrahedra: Quadratic tetrahedra of a free-form body in the same frame.
     """
 
     points: np.ndarray

@@ -1,8 +1,9 @@
-"""Joint meshes: the closed surface of a joint, or of two that are bridged, as hexahedra in its place.
+"""Joint meshes: hexahedra in the assembly from the closed surface of a joint or of two bridged joints.
 
-A coarse joint (``package.coarse_joint_numerics``) is solder alone, also in place of its copper: eight hexahedra, tied
-by the same facet sets. In bga_drop its step is nine times that of copper and nearly three times that of fine solder. A
-joint that few hexahedra cannot follow keeps its fine mesh; ``fine_instead`` in ``coarse_quality.json`` says why.
+A coarse joint (``package.coarse_joint_numerics``) consists of solder only, which also replaces its copper: eight
+hexahedra, tied by the same facet sets. In bga_drop its critical time step is nine times the copper's and nearly three
+times that of fine solder. A joint whose shape a few hexahedra cannot represent keeps its fine mesh; ``fine_instead`` in
+``coarse_quality.json`` gives the reason.
 """
 
 import math
@@ -46,32 +47,35 @@ HEAD_TOLERANCE = 0.03  # of the gap: mean distance of the solder's upper face fr
 def mesh_joint(
     surface: ClosedSurface, site: PadSite, package: Package, side: Underside, columns: tuple[Column, ...] = ()
 ) -> JointMesh:
-    """Mesh a joint and put it in its place.
+    """Mesh a joint in its position in the assembly.
 
     Args:
-        surface: closed surface in the joint's own frame.
-        site: where it sits.
-        package: copper and numerics.
-        side: the package's underside, which the joint's head follows.
-        columns: of board and substrate that continue its pads.
+        surface: Closed surface in the joint's own frame.
+        site: Positions and sizes of its pads.
+        package: Package with copper and numerics.
+        side: Underside of the package, which the head of the joint follows.
+        columns: Columns of board and substrate that continue the pads.
 
     Raises:
-        JointMeshError: the surface spans another gap, or one in which the package is not, or no mesh of it meets its
-            bars; tells what each of them missed.
+        JointMeshError: The height of the surface differs from the gap, the package is not at its upper end, or every
+            meshing attempt fails its checks; the message gives the reason of each.
     """
-    return _mesh(surface, site, [site], (package, side, columns))
+    copper = _copper_pads(package, columns)
+    to_assembly = JointPlace.of(surface, site, side, copper.thickness if copper else 0.0)
+    return _mesh(surface, package, [site], copper, to_assembly)
 
 
 def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Package, side: Underside) -> JointMesh:
-    """Mesh two joints that are one body.
+    """Mesh two joints that a solder bridge connects to one body.
 
     Args:
-        surface: closed surface; its origin is midway between the axes, the second lies towards +x from the first.
-        sites: of both, the first to the left.
-        package: copper and numerics.
-        side: the package's underside.
+        surface: Closed surface; its origin is midway between the joints, the second lies towards +x of the first.
+        sites: Sites of both joints, the left one first.
+        package: Package with copper and numerics.
+        side: Underside of the package.
 
-    Raises: as ``mesh_joint``.
+    Raises:
+        JointMeshError: As in ``mesh_joint``, or the body crosses a plane of symmetry.
     """
     first, second = sites
     _check_distance(surface, first, second)
@@ -85,38 +89,41 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
         y=0.5 * (first.y + second.y),
         gap=0.5 * (first.gap + second.gap),
     )
-    return _mesh(replace(surface, points=turned), middle, sites, (package, side, ()))
+    body, copper = replace(surface, points=turned), _copper_pads(package, ())
+    to_assembly = JointPlace.of(body, middle, side, copper.thickness if copper else 0.0)
+    return _mesh(body, package, sites, copper, to_assembly)
 
 
 def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
-    """Mesh a joint by few hexahedra of solder alone, which also fill the place of the copper on its wetted discs.
+    """Mesh a joint with a few hexahedra of solder, which also replace the copper on its wetted discs.
 
-    Args and errors as ``mesh_joint``.
+    Arguments and errors as in ``mesh_joint``.
     """
     overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
-    place = JointPlace.of(surface, site, side, overhang)
-    _check_place(surface, place)
+    to_assembly = JointPlace.of(surface, site, side, overhang)
+    _check_place(surface, to_assembly)
     try:
-        solder = swept_solder(surface, package.coarse_joint_numerics, place, overhang)
-        return build_joint(solder, [site], None, place)
+        solder = swept_solder(surface, package.coarse_joint_numerics, to_assembly, overhang)
+        return build_joint(solder, [site], None, to_assembly)
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
 
 
 def mesh_coarse_or_fine(
-    surface: ClosedSurface, fine: JointMesh, at: tuple[Package, PadSite], side: Underside
+    surface: ClosedSurface, fine: JointMesh, site: PadSite, package: Package, side: Underside
 ) -> JointMesh:
-    """Mesh a joint by few hexahedra; where they cannot follow its shape, its fine mesh stands for them and says why.
+    """Mesh a joint with a few hexahedra, or return its fine mesh if these cannot represent its shape.
 
-    It then is tied to boxes, too, so it is meshed again where columns continue its pads.
+    The record of a fine mesh gives the reason. Coarse joints are tied to the boxes of the board; a joint with columns
+    is therefore meshed again without them.
 
     Args:
-        surface: closed surface in the joint's own frame.
-        fine: its fine mesh.
-        at: the package and where the joint sits.
-        side: the package's underside.
+        surface: Closed surface in the joint's own frame.
+        fine: Fine mesh of the joint.
+        site: Positions and sizes of its pads.
+        package: Package with copper and numerics.
+        side: Underside of the package.
     """
-    package, site = at
     try:
         return mesh_coarse_joint(surface, site, package, side)
     except JointMeshError as error:
@@ -126,21 +133,20 @@ def mesh_coarse_or_fine(
 
 def _mesh(
     surface: ClosedSurface,
-    site: PadSite,
+    package: Package,
     sites: Sequence[PadSite],
-    above: tuple[Package, Underside, tuple[Column, ...]],
+    copper: CopperPads | None,
+    to_assembly: JointPlace,
 ) -> JointMesh:
-    """Mesh a body whose own frame is at a site, on the pads of its sites."""
-    package, side, columns = above
-    copper = _copper_pads(package, columns)
-    place = JointPlace.of(surface, site, side, copper.thickness if copper else 0.0)
-    _check_place(surface, place)
-    ways = attempts(surface, package.joint_numerics, place)
-    return first_good(surface, ways, site.name, partial(build_joint, sites=sites, copper=copper, place=place))
+    """Mesh a body of solder on the pads of the sites that it wets."""
+    _check_place(surface, to_assembly)
+    candidates = attempts(surface, package.joint_numerics, to_assembly)
+    build = partial(build_joint, sites=sites, copper=copper, place=to_assembly)
+    return first_good(surface, candidates, to_assembly.site.name, build)
 
 
 def _copper_pads(package: Package, columns: tuple[Column, ...]) -> CopperPads | None:
-    """Return the pads of fine joints, none where copper is a plate."""
+    """Return the copper pads of a fine joint, or None if the copper is a plate."""
     if package.copper.layout == "plate":
         return None
     numerics = package.joint_numerics
@@ -149,29 +155,29 @@ def _copper_pads(package: Package, columns: tuple[Column, ...]) -> CopperPads | 
 
 
 def _check_distance(surface: ClosedSurface, first: PadSite, second: PadSite) -> None:
-    """Raise JointMeshError where the body lies across a plane of symmetry: its second joint is then an image."""
+    """Raise JointMeshError if the body crosses a plane of symmetry, so that its second joint is a mirror image."""
     lower = surface.points[np.unique(surface.triangles[surface.boundary == BOARD_PAD])]
     between, distance = float(np.ptp(lower[:, 0])), math.dist((first.x, first.y), (second.x, second.y))
     widest = distance + 4.0 * max(first.pad_radius_board, second.pad_radius_board)
     if not distance < between < widest:
         distances = f"its pads span {between:.4g} m, allowed {distance:.4g} to {widest:.4g} m"
-        raise JointMeshError(f"joints {first.name} and {second.name}: {distances}; an image of one may be meant")
+        raise JointMeshError(f"joints {first.name} and {second.name}: {distances}; one may be a mirror image")
 
 
-def _check_place(surface: ClosedSurface, place: JointPlace) -> None:
-    """Raise JointMeshError unless the surface spans its gap and ends where the package is.
+def _check_place(surface: ClosedSurface, to_assembly: JointPlace) -> None:
+    """Raise JointMeshError unless the surface spans its gap and ends at the package.
 
-    The gap is measured at the package pad's centre: solder that overflows goes off it, up or down a tilted plane.
+    The gap is measured at the centre of the package's pad, because overflowing solder may leave a tilted pad.
     """
-    site = place.site
-    gap = float(place.head.height(*np.array(site.offset)))
+    site = to_assembly.site
+    gap = float(to_assembly.head.height(*np.array(site.offset)))
     bottom = float(surface.points[:, 2].min())
     if max(abs(bottom), abs(gap - site.gap)) > GAP_TOLERANCE * site.gap:
         span = f"z = {bottom:.6g} to {gap:.6g} m, allowed 0 to its gap of {site.gap:.6g} m"
         raise JointMeshError(f"joint {site.name}: its surface spans {span}")
     upper = surface.points[np.unique(surface.triangles[surface.boundary == PACKAGE_PAD])]
     try:
-        limit, mean = HEAD_TOLERANCE * site.gap, float(place.rise(upper).mean())
+        limit, mean = HEAD_TOLERANCE * site.gap, float(to_assembly.rise(upper).mean())
     except ValueError as error:
         raise JointMeshError(f"joint {site.name}: {error}") from error
     if abs(mean) > limit:

@@ -1,4 +1,4 @@
-"""Swept solder: butterfly sections of a body, stacked from the board's pad to the package's."""
+"""Swept solder meshes: butterfly sections of a body, stacked from the board's pad to the package's."""
 
 import math
 from collections.abc import Callable
@@ -27,9 +27,9 @@ class Levels:
     """Nodes of the solder, level by level.
 
     Attributes:
-        points: (layers + 1, n, 3) [m].
-        scale: factor by which the inner outlines were scaled to keep the volume.
-        volume: the volume that they keep [m^3].
+        points: Node coordinates, shape (layers + 1, n, 3) [m].
+        scale: Factor by which the inner outlines were scaled to keep the volume.
+        volume: Exact volume of the body [m^3].
     """
 
     points: np.ndarray
@@ -38,7 +38,7 @@ class Levels:
 
 
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
-    """Sweep hexahedra through a body; arguments and errors as ``solder_levels``."""
+    """Sweep hexahedra through a body from pad to pad; arguments and errors as in ``solder_levels``."""
     section = butterfly(numerics.core, numerics.rings)
     levels = solder_levels(surface, section, numerics, place, overhang)
     count = len(section.points)
@@ -58,22 +58,22 @@ def solder_levels(
     place: Placing,
     overhang: float = 0.0,
 ) -> Levels:
-    """Cut a body into sections and lay the butterfly into each.
+    """Cut a body into horizontal sections and fit a butterfly mesh to each.
 
-    The body is made straight between its pads first, and put back. A polygon of few sides encloses less than the
-    section that it follows, and straight layers less than a bulge: each outline is scaled to its section's area, then
-    those between the ends by one common factor to the body's volume.
+    The body is straightened between its pads first, and restored afterwards. A polygon encloses less than the section
+    that it approximates, and straight layers less than a bulge: each outline is scaled to the area of its section, then
+    all outlines between the ends by one common factor to the volume of the body.
 
     Args:
-        surface: the body in its own frame.
-        section: the butterfly.
-        numerics: its layers.
-        place: moves points (n, 3) [m] to where the joint will be, where its volume is kept: a curved package makes a
-            joint higher here, lower there, and its mean gap another than that on its axis.
-        overhang: height [m] by which each end face is drawn out as a prism, which belongs to the body.
+        surface: Closed surface in the body's own frame.
+        section: Butterfly mesh of the unit disc.
+        numerics: Number and heights of the layers.
+        place: Map from the own frame to the assembly, points of shape (n, 3) [m]. The volume is kept there, because
+            the gap under a curved package varies over the joint.
+        overhang: Height by which each end face is extruded as a part of the body [m].
 
     Raises:
-        ValueError: a section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.
+        ValueError: A section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.
     """
     planes, layers = pad_planes(surface), numerics.layers
     straight = planes.straighten(surface.points)
@@ -98,10 +98,10 @@ def solder_levels(
 
 
 def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
-    """Return the levels of the layers of a joint of some height, from 0 upwards, (layers + 1,) [m].
+    """Return the levels between the layers of a joint of a height [m], from 0 upwards, shape (layers + 1,) [m].
 
     Raises:
-        ValueError: no smooth growth fits between the layers at the pads.
+        ValueError: No growth ratio within the limits fits between the layers at the pads.
     """
     if numerics.pad_layer is None:
         return np.linspace(0.0, height, numerics.layers + 1)
@@ -115,8 +115,8 @@ def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
     limits = -math.log(LARGEST_GROWTH), math.log(LARGEST_GROWTH)
     if between < 1 or not missing(limits[0]) <= 0.0 <= missing(limits[1]):
         raise ValueError(
-            f"{numerics.layers} layers, of which {numerics.pad_layers} in {numerics.pad_layer:.3g} m at either pad, do"
-            f" not fill {height:.3g} m: each next one may be {LARGEST_GROWTH:g} times as high or low as the one before"
+            f"{numerics.layers} layers, {numerics.pad_layers} of them in {numerics.pad_layer:.3g} m at each pad, do not"
+            f" fill {height:.3g} m: the heights of neighbouring layers may differ by a factor of {LARGEST_GROWTH:g}"
         )
     inner = first * np.exp(brentq(missing, *limits, xtol=1.0e-14) * steps)
     pad = np.full(numerics.pad_layers, first)
@@ -124,12 +124,24 @@ def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
 
 
 def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
-    """Sweep quads (q, 4) through ``layers`` layers of ``nodes`` nodes a level: hexahedra (layers q, 8)."""
+    """Sweep quadrilaterals (q, 4) through layers with ``nodes`` nodes per level.
+
+    Returns:
+        Nodes of the hexahedra, shape (layers q, 8).
+    """
     return np.vstack([np.hstack([quads + k * nodes, quads + (k + 1) * nodes]) for k in range(layers)]).astype(np.int32)
 
 
 def section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
-    """Section nodes at one height, (n, 2) [m]: the unit disc stretched to the outline (s, 2, 2) along each angle."""
+    """Stretch the unit disc radially to the outline of a section, keeping its area.
+
+    Args:
+        segments: Oriented segments of the outline, shape (s, 2, 2) [m].
+        section: Mesh of the unit disc.
+
+    Returns:
+        Nodes of the section, shape (n, 2) [m].
+    """
     centre, area = section_centroid(segments), section_area(segments)
     angles = _angles(section.points[section.rim])
     radii = radius_by_angle(segments, centre, angles)
@@ -141,23 +153,31 @@ def section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
 
 
 def volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
-    """Find the scale of the inner outlines at which the swept hexahedra have the volume (secant method)."""
+    """Find the scale of the inner outlines at which the mesh has the exact volume, by the secant method.
+
+    Args:
+        swept_volume: Volume of the mesh as a function of the scale [m^3].
+        volume: Exact volume [m^3].
+
+    Raises:
+        ValueError: The scale would differ from 1 by more than the allowed correction.
+    """
     before, scale = 1.0 - LARGEST_CORRECTION, 1.0
     errors = [swept_volume(value) / volume - 1.0 for value in (before, scale)]
-    held, steps = 1.0 + errors[1], 0
+    share, steps = 1.0 + errors[1], 0
     while abs(errors[1]) > VOLUME_TOLERANCE and abs(scale - 1.0) <= LARGEST_CORRECTION and steps < SECANT_STEPS:
         before, scale = scale, scale - errors[1] * (scale - before) / (errors[1] - errors[0])
         errors, steps = [errors[1], swept_volume(scale) / volume - 1.0], steps + 1
     if abs(errors[1]) > VOLUME_TOLERANCE or abs(scale - 1.0) > LARGEST_CORRECTION:
         raise ValueError(
-            f"its layers hold {held:.3f} of its volume, allowed is what a scaling of the inner sections by"
-            f" 1 +- {LARGEST_CORRECTION:g} corrects; use more layers"
+            f"its layers enclose {share:.3f} of its volume; scaling the inner sections by a factor of"
+            f" 1 +- {LARGEST_CORRECTION:g} at most cannot correct this; use more layers"
         )
     return scale
 
 
 def _scaled(points: np.ndarray, section: Butterfly, scale: float) -> np.ndarray:
-    """Scale all levels but the ends about their centres."""
+    """Scale all levels except the ends about their centres."""
     result = points.copy()
     inner = points[1:-1, :, :2]
     centres = inner[:, section.rim].mean(axis=1, keepdims=True)

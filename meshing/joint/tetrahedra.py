@@ -1,7 +1,7 @@
-"""Tetrahedra in any closed surface by Gmsh: surface remeshed to a size, edges of pads kept.
+"""Tetrahedral meshes of closed surfaces by Gmsh: the surface is remeshed to a size, the edges of pads are kept.
 
-Gmsh runs in a process of its own (``fill_apart``), because it may crash and keeps state. Stages never load Gmsh and
-DOLFINx together: on Debian 13 the PETSc inside Gmsh's wheel does not start beside DOLFINx, and Gmsh aborts.
+Gmsh runs in a separate process (``fill_apart``), because it may crash and keeps state. Stages never load Gmsh and
+DOLFINx together: on Debian 13 the PETSc inside the Gmsh wheel conflicts with the one of DOLFINx, and Gmsh aborts.
 """
 
 import math
@@ -20,11 +20,11 @@ from reflowshock.processes import ProcessPool
 TRIANGLE, TETRAHEDRON = 2, 4  # Gmsh's element types
 LONGEST = 300.0  # seconds
 FLAT = 1.0e-6  # of the gap: how far from a pad's plane a remeshed pad may lie
-ACROSS = 3.0  # elements across a patch of its own, as a small void
+ACROSS = 3.0  # elements across a small patch, such as the surface of a void
 
 
 class FreeFormError(ValueError):
-    """A surface in which Gmsh makes no tetrahedra."""
+    """Error for a closed surface that Gmsh cannot fill with tetrahedra."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +32,10 @@ class Tetrahedra:
     """Tetrahedra of a body in its own frame.
 
     Attributes:
-        points: (n, 3) [m].
-        cells: (c, 4), positively oriented.
-        triangles: (t, 3) of its surface, outward oriented.
-        boundary: (t,) FREE, BOARD_PAD or PACKAGE_PAD.
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the tetrahedra, positively oriented, shape (c, 4).
+        triangles: Surface triangles, outward oriented, shape (t, 3).
+        boundary: Label of each triangle, FREE, BOARD_PAD or PACKAGE_PAD, shape (t,).
     """
 
     points: np.ndarray
@@ -45,15 +45,15 @@ class Tetrahedra:
 
 
 def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
-    """Remesh a closed surface and fill it.
+    """Remesh a closed surface and fill it with tetrahedra.
 
     Args:
-        surface: the body in its own frame, with any number of pads and of shells.
-        size: of the elements [m].
-        cut_into_patches: whether Gmsh may cut the surface into patches that it can lay flat, as closed shells need.
+        surface: Closed surface in the body's own frame, with any number of pads and shells.
+        size: Target edge length [m].
+        cut_into_patches: Whether Gmsh cuts the surface into patches that it can parametrise, as closed shells need.
 
     Raises:
-        FreeFormError: Gmsh cannot lay a patch flat, or cannot fill the surface.
+        FreeFormError: Gmsh cannot parametrise a patch or cannot fill the surface.
     """
     with gmsh_model("free form"):
         _add_patches(surface)
@@ -72,15 +72,15 @@ def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: 
 
 
 def fill_apart(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
-    """As ``fill_with_tetrahedra``, in a process of its own.
+    """Run ``fill_with_tetrahedra`` in a separate process; same arguments and errors.
 
-    The mesh does not depend on what Gmsh made before, and a surface on which it fails takes nothing else with it.
+    The mesh then does not depend on earlier calls of Gmsh, and a crash of Gmsh ends only that process.
     """
     with ProcessPool(1) as pool:
         try:
             return pool.submit(fill_with_tetrahedra, surface, size, cut_into_patches).result(LONGEST)
         except BrokenProcessPool as error:
-            raise FreeFormError("Gmsh ended without a word") from error
+            raise FreeFormError("Gmsh ended without an error message") from error
         except TimeoutError as error:
             raise FreeFormError(f"Gmsh: no mesh within {LONGEST:g} s") from error
 
@@ -99,7 +99,7 @@ def _add_patches(surface: ClosedSurface) -> None:
 
 
 def _generate(size: float, patches: list[int]) -> None:
-    """Mesh the current model with a size [mm], small patches finer."""
+    """Mesh the current model with an edge length [mm], finer on small patches."""
     smaller = {patch: extent for patch in patches if (extent := math.sqrt(_patch_area(patch)) / ACROSS) < size}
     for option, value in (("Min", min([size, *smaller.values()])), ("Max", size), ("FromPoints", 0)):
         gmsh.option.setNumber(f"Mesh.MeshSize{option}", value)
@@ -123,13 +123,13 @@ def _size_field(patch: int, inside: float, elsewhere: float) -> int:
 
 
 def _patch_area(patch: int) -> float:
-    """Area of the triangles of a discrete surface [mm^2]."""
+    """Return the area of the triangles of a discrete surface [mm^2]."""
     tags, nodes = gmsh.model.mesh.getElementsByType(TRIANGLE, patch)
     return float(gmsh.model.mesh.getElementQualities(tags, "volume").sum()) if len(nodes) else 0.0
 
 
 def _collect(height: Callable[[np.ndarray, np.ndarray], np.ndarray], patches: list[int]) -> Tetrahedra:
-    """Take the mesh from Gmsh; patches in the plane of a pad are wetted."""
+    """Copy the mesh from Gmsh; patches in the plane of a pad are labelled as wetted."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     nodes = gmsh.model.mesh.getElementsByType(TETRAHEDRON)[1]
     if not len(nodes):
@@ -137,15 +137,15 @@ def _collect(height: Callable[[np.ndarray, np.ndarray], np.ndarray], patches: li
     used, cells = np.unique(nodes, return_inverse=True)
     order = np.argsort(tags)
     points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags, used, sorter=order)]] * MILLI
-    found = [gmsh.model.mesh.getElementsByType(TRIANGLE, patch)[1].reshape(-1, 3) for patch in patches]
-    triangles = [np.searchsorted(used, part) for part in found]
+    tagged = [gmsh.model.mesh.getElementsByType(TRIANGLE, patch)[1].reshape(-1, 3) for patch in patches]
+    triangles = [np.searchsorted(used, part) for part in tagged]
     labels = [_label(points, np.unique(part), height) for part in triangles]
     boundary = np.repeat(labels, [len(part) for part in triangles])
     return Tetrahedra(points, cells.reshape(-1, 4), np.vstack(triangles), boundary)
 
 
 def _label(points: np.ndarray, nodes: np.ndarray, height: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> int:
-    """Say what a patch with these nodes is; those of a pad are laid exactly into its plane, in place."""
+    """Return the label of a patch; nodes of a wetted patch are moved exactly into the plane of its pad, in place."""
     z, top = points[nodes, 2], height(points[nodes, 0], points[nodes, 1])
     for label, plane in ((BOARD_PAD, np.zeros_like(z)), (PACKAGE_PAD, top)):
         if np.abs(z - plane).max() < FLAT * top.max():

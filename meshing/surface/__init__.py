@@ -1,1 +1,1 @@
-"""Closed surfaces of joints: from particles, from a formula, from a user's file."""
+"""Closed surfaces of joints, from particles, formulas or user files; start with ``closed_surface.py``."""

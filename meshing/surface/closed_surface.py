@@ -1,4 +1,4 @@
-"""Closed surface of a joint: the particles' free surface and the two wetted discs, checked and measured."""
+"""Closed surfaces of joints: the free surface of the particles, closed by wetted discs, checked and measured."""
 
 import math
 from collections.abc import Sequence
@@ -18,14 +18,17 @@ SECTIONS, DEGREE, SAMPLES = 64, 6, 401
 
 
 class SurfaceError(ValueError):
-    """A triangulation that encloses no body; says where and why."""
+    """Error for a triangulation that does not enclose a body; gives the position and the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClosedSurface:
-    """A watertight, outward oriented triangulation in the joint's own frame.
+    """Watertight, outward oriented triangulation in the joint's own frame.
 
-    ``points`` (n, 3) [m], ``triangles`` (t, 3), ``boundary`` (t,): FREE, BOARD_PAD or PACKAGE_PAD.
+    Attributes:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Vertex numbers of the triangles, shape (t, 3).
+        boundary: Label of each triangle, FREE, BOARD_PAD or PACKAGE_PAD, shape (t,).
     """
 
     points: np.ndarray
@@ -36,7 +39,7 @@ class ClosedSurface:
 def close_surface(
     points: np.ndarray, triangles: np.ndarray, ring_board: np.ndarray, ring_package: np.ndarray
 ) -> ClosedSurface:
-    """Close the free surface of one joint with a disc on each pad; arguments and errors as ``close_rings``."""
+    """Close the free surface of one joint with a disc on each pad; arguments and errors as in ``close_rings``."""
     return close_rings(points, triangles, (ring_board, ring_package))
 
 
@@ -44,12 +47,12 @@ def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.nd
     """Close a free surface with a disc in each of its contact lines.
 
     Args:
-        points: (n, 3) vertices [m]; others than those of the triangles are dropped.
-        triangles: (t, 3) free surface, outward oriented, open along the rings.
-        rings: vertices along each contact line, in order; those in the lower half are the board's.
+        points: Vertices, shape (n, 3) [m]; vertices without a triangle are dropped.
+        triangles: Triangles of the free surface, outward oriented, open along the rings, shape (t, 3).
+        rings: Vertices along each contact line, in order; contact lines in the lower half belong to the board.
 
     Raises:
-        SurfaceError: the result is not watertight, not outward oriented, or has a degenerate triangle.
+        SurfaceError: The result is not watertight, not outward oriented, or has a degenerate triangle.
     """
     heights = np.array([points[ring, 2].mean() for ring in rings])
     upper = heights > 0.5 * (heights.min() + heights.max())
@@ -85,32 +88,32 @@ def check_surface(surface: ClosedSurface) -> None:
 
 
 def edge_numbers(edges: np.ndarray) -> np.ndarray:
-    """Return one number for each edge (e, 2), the same for the same two vertices in the same order."""
+    """Return an integer key for each directed edge (e, 2), equal for equal edges, shape (e,)."""
     return (edges[:, 0].astype(np.int64) << 32) + edges[:, 1]
 
 
 def enclosed_volume(surface: ClosedSurface) -> float:
-    """Volume enclosed by the surface [m^3]."""
+    """Return the volume enclosed by the surface [m^3]."""
     return volume_of(surface.points, surface.triangles)
 
 
 def volume_of(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume [m^3] that outward oriented triangles (t, 3) enclose (divergence theorem)."""
+    """Return the volume [m^3] that outward oriented triangles (t, 3) enclose (divergence theorem)."""
     first, second, third = np.moveaxis(points[triangles], 1, 0)
     return float(np.einsum("ij,ij->", first, np.cross(second, third))) / 6.0
 
 
 def pad_planes(surface: ClosedSurface) -> PadPlanes:
-    """Find the plane of the package's pad, or pads."""
+    """Fit the plane of the package's pad, or pads."""
     return PadPlanes.fit(surface.points, surface.triangles[surface.boundary == PACKAGE_PAD])
 
 
 def measure(surface: ClosedSurface) -> dict[str, float]:
-    """Measure a closed surface.
+    """Measure volume, standoff, width, contact radii and contact angles of a joint.
 
-    Width and angles are those of the disc of equal area at every height of the joint made straight, a polynomial fitted
-    to the areas A(z) of sections: vertices lie outside the smooth shape and chords inside it, but the integral of A is
-    the volume.
+    Width and angles belong to the body of revolution whose sections have the areas A(z) of the straightened joint; a
+    polynomial is fitted to A(z). Areas are more accurate than distances, because vertices lie outside the smooth shape
+    and chords inside it, while the integral of A is the volume.
 
     Returns:
         volume [m^3], standoff [m], max_width [m], contact_radius_board and _package [m], contact_angle_board and
@@ -136,25 +139,30 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
 
 
 def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray]:
-    """Return the triangles (t, 3) of each connected piece of a surface, or of its pads of one side, largest first."""
+    """Return the triangles (t, 3) of each connected piece of a surface, largest first.
+
+    Args:
+        surface: Closed surface.
+        pad: BOARD_PAD or PACKAGE_PAD to consider the triangles on the pads of that side only.
+    """
     triangles = surface.triangles if pad is None else surface.triangles[surface.boundary == pad]
     return [triangles[rows] for rows in pieces(triangles)]
 
 
 def write_surface(path: Path, surface: ClosedSurface) -> None:
-    """Write the surface with its boundary labels, in the format of the file's suffix (.vtu; .stl drops the labels)."""
+    """Write the surface with its boundary labels as ``.vtu``, or without labels as ``.stl``, by the suffix."""
     labels = {} if path.suffix == ".stl" else {"boundary": [surface.boundary]}
     meshio.write(path, meshio.Mesh(surface.points, [("triangle", surface.triangles)], cell_data=labels))
 
 
 def read_surface(path: Path) -> ClosedSurface:
-    """Read a surface written by ``write_surface`` as VTU."""
+    """Read a surface that ``write_surface`` wrote as ``.vtu``."""
     mesh = meshio.read(path)
     return ClosedSurface(mesh.points, mesh.cells[0].data.astype(np.int32), mesh.cell_data["boundary"][0])
 
 
 def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Fan of triangles around the ring's mean point; it faces upward or downward."""
+    """Return centre and triangles of a fan around the mean point of a ring, facing upward or downward."""
     x, y = points[ring, 0], points[ring, 1]
     counter_clockwise = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0.0
     first, second = (ring, np.roll(ring, -1)) if counter_clockwise == upward else (np.roll(ring, -1), ring)
@@ -162,11 +170,11 @@ def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: bool) -> tup
 
 
 def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area vectors of triangles (t, 3) [m^2]."""
+    """Return the area vectors of triangles (t, 3), shape (t, 3) [m^2]."""
     first, second, third = np.moveaxis(points[triangles], 1, 0)
     return 0.5 * np.cross(second - first, third - first)
 
 
 def pad_area(surface: ClosedSurface, pad: int) -> float:
-    """Wetted area of all pads of a side, BOARD_PAD or PACKAGE_PAD [m^2]."""
+    """Return the wetted area [m^2] of all pads of a side, BOARD_PAD or PACKAGE_PAD."""
     return float(np.linalg.norm(area_vectors(surface.points, surface.triangles[surface.boundary == pad]), axis=1).sum())

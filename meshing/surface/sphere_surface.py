@@ -7,21 +7,21 @@ import numpy as np
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, close_surface
 from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
-AROUND, LEVELS = 96, 97  # vertices of a circle, circles
+AROUND, LEVELS = 96, 97  # vertices per circle, number of circles
 
 
 def sphere_surface(sphere: TruncatedSphere, around: int = AROUND, levels: int = LEVELS) -> ClosedSurface:
-    """Triangulate a truncated sphere in the joint's own frame; each section has the area of its circle.
+    """Triangulate a truncated sphere in the joint's own frame; the section at each level has the area of its circle.
 
     Args:
-        sphere: the body.
-        around: vertices of a section.
-        levels: sections, equal steps of height apart.
+        sphere: Truncated sphere.
+        around: Number of vertices per section.
+        levels: Number of sections at equal distances in height.
     """
     heights = np.linspace(0.0, sphere.height, levels)
     angles = 2.0 * math.pi * np.arange(around) / around
-    of_area = math.sqrt(angles[1] / math.sin(angles[1]))  # a polygon inscribed in a circle encloses less than it
-    radii = of_area * np.sqrt(sphere.radius**2 - (heights - sphere.centre) ** 2)
+    circumradius = math.sqrt(angles[1] / math.sin(angles[1]))  # of a polygon with the area of the unit circle
+    radii = circumradius * np.sqrt(sphere.radius**2 - (heights - sphere.centre) ** 2)
     x, y = radii[:, None] * np.cos(angles), radii[:, None] * np.sin(angles)
     points = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], axis=-1).reshape(-1, 3)
     ring = np.arange(around)

@@ -1,4 +1,4 @@
-"""The truncated sphere: a joint between coaxial discs on which the package neither weighs nor pulls."""
+"""Truncated sphere: equilibrium shape of a joint between coaxial discs that carries no axial load."""
 
 import math
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class TruncatedSphere:
-    """A zone of a sphere that stands on z = 0, its axis the z axis; in metres.
+    """Zone of a sphere on the plane z = 0, with the z axis as its axis.
 
     Attributes:
-        height: of its upper disc over the lower one.
-        radius_board: of the lower disc.
-        radius_package: of the upper disc.
+        height: Distance between both discs [m].
+        radius_board: Radius of the lower disc [m].
+        radius_package: Radius of the upper disc [m].
     """
 
     height: float
@@ -23,9 +23,10 @@ class TruncatedSphere:
 
     @classmethod
     def of_volume(cls, volume: float, radius_board: float, radius_package: float) -> "TruncatedSphere":
-        """Return the zone of a volume [m^3] between two discs.
+        """Return the zone with a given volume [m^3] between two discs of given radii [m].
 
-        V = pi H (3 a^2 + 3 b^2 + H^2) / 6 is a cubic equation of H with one real root, by hyperbolic sines.
+        V = pi H (3 a^2 + 3 b^2 + H^2) / 6 is a cubic equation for the height H with one real root, which follows from
+        hyperbolic sines.
         """
         squares = radius_board**2 + radius_package**2
         turn = math.asinh(3.0 * volume / (math.pi * squares**1.5)) / 3.0
@@ -49,7 +50,7 @@ class TruncatedSphere:
         return math.hypot(self.radius_board, self.centre)
 
     def signed_distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how far points ``(n, 3)`` [m] are from the free surface, ``(n,)`` [m]; inside the body negative."""
+        """Return the signed distance of points (n, 3) [m] to the free surface, negative inside, shape (n,) [m]."""
         axial, radial = points[:, 2], np.hypot(points[:, 0], points[:, 1])
         above = axial - self.centre
         from_centre = np.hypot(radial, above)

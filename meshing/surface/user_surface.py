@@ -1,4 +1,4 @@
-"""Surfaces of joints from elsewhere, as X-ray tomography: read, checked, laid between their pads."""
+"""Surfaces of joints from user files, for example X-ray tomography: read, checked, and fitted between their pads."""
 
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -23,25 +23,25 @@ from reflowshock.meshing.surface.closed_surface import (
     check_surface,
     volume_of,
 )
-from reflowshock.meshing.surface.surface_faults import check_triangulation
+from reflowshock.meshing.surface.surface_checks import check_triangulation
 
 Unit = Literal["um", "mm", "m"]
 UNITS: dict[Unit, float] = {"um": 1.0e-6, "mm": 1.0e-3, "m": 1.0}
-LARGEST = 1.0  # [m] of a vertex from the middle of all
-MOST_TRIANGLES = 200_000  # checked in about ten seconds
+LARGEST = 1.0  # m: largest distance of a vertex from the median of all
+MOST_TRIANGLES = 200_000  # which take about ten seconds to check
 SUFFIXES = (".stl", ".ply", ".vtu")
-CELLS = 1_000_002  # along the largest extent, in which vertices are one
-WELD = 1.0e-6  # of the largest extent: vertices nearer than this are one
+CELLS = 1_000_002  # grid cells along the largest extent; vertices in one cell are merged
+WELD = 1.0e-6  # of the largest extent: size of these cells
 LEVEL = np.cos(np.radians(20.0))  # a pad's triangles face within 20 degrees of its normal
 FLAT = 0.02  # of the height: how far from its plane a pad's vertices may lie
 FITS = 4
 SMALLEST_PAD = 0.3  # of the wetted radius of the site
-GAP_RANGE = 0.1  # of the site's gap: how far the surface's may differ
+GAP_RANGE = 0.1  # of the site's gap: largest difference of the surface's height
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """A flat end: outward unit normal, a point of its plane, and its triangles (rows)."""
+    """Flat end of a surface: outward unit normal, a point of its plane, and row numbers of its triangles."""
 
     normal: np.ndarray
     point: np.ndarray
@@ -49,18 +49,20 @@ class _End:
 
 
 def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
-    """Read a closed surface, find its pads and lay it between those of its site.
+    """Read a closed surface, find its flat ends and fit it between the pads of its site.
 
-    Its z axis points roughly from the board to the package, x and y are the board's. The lower flat end comes to z = 0,
-    its centre on the axis; where the upper end is not the site's plane, heights are stretched to it.
+    The z axis of the file points roughly from the board to the package, x and y are the board's. The lower flat end is
+    moved to z = 0 with its centre on the axis; heights are stretched so that the upper end lies in the plane of the
+    package's pad.
 
     Args:
         path: STL, PLY or VTU file of triangles.
-        unit: of its coordinates.
-        site: where the joint sits.
+        unit: Unit of the coordinates in the file.
+        site: Site of the joint.
 
     Raises:
-        SurfaceError: the file, what is wrong with it, where in its own coordinates, and what is allowed.
+        SurfaceError: The file is damaged or its triangles do not enclose a joint; the message gives the file, the
+            fault, its position in the coordinates of the file, and the allowed range.
     """
     try:
         points, triangles = closed_triangles(path, unit)
@@ -71,29 +73,29 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
 
 
 def file_volume(path: Path, unit: Unit) -> float:
-    """Return the volume [m^3] that a file that ``load_surface`` took encloses before its heights are stretched."""
+    """Return the volume [m^3] that the surface in a file encloses, before its heights are stretched."""
     return volume_of(*closed_triangles(path, unit))
 
 
 def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices [m] and triangles of a file that enclose a body, wherever that is; errors as ``load_surface``."""
+    """Read and check vertices (n, 3) [m] and triangles (t, 3) of a file; errors as in ``load_surface``."""
     if path.suffix.lower() not in SUFFIXES:
         raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError) as error:
         raise SurfaceError("no such file") from error
-    read = _read_version(path, unit, (found.st_mtime_ns, found.st_size, found.st_ino))
-    if isinstance(read, SurfaceError):
-        raise read
-    return read
+    result = _read_version(path, unit, (status.st_mtime_ns, status.st_size, status.st_ino))
+    if isinstance(result, SurfaceError):
+        raise result
+    return result
 
 
 @lru_cache(maxsize=8)
 def _read_version(
     path: Path, unit: Unit, version: tuple[int, int, int]
 ) -> tuple[np.ndarray, np.ndarray] | SurfaceError:
-    """Read and check a version of a file, which several joints may name; or return what is wrong with it."""
+    """Read and check one version of a file, cached because several joints may use it; return an error as a value."""
     try:
         points, triangles = _welded(*_read(path, UNITS[unit]))
         check_triangulation(points, triangles, UNITS[unit])
@@ -119,7 +121,7 @@ def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_numbers(points: np.ndarray, triangles: np.ndarray) -> None:
-    """Refuse vertices that are no points, and triangles of vertices that are not there."""
+    """Raise SurfaceError for vertices that are not finite points and triangles whose vertices do not exist."""
     if points.ndim != 2 or points.shape[1] < 3:
         raise SurfaceError("has vertices without three coordinates")
     if len(triangles) > MOST_TRIANGLES:
@@ -135,7 +137,7 @@ def _check_numbers(points: np.ndarray, triangles: np.ndarray) -> None:
 
 
 def _check_extent(points: np.ndarray) -> None:
-    """Refuse vertices (n, 3) [m] far away from all others, beside which these would be one point."""
+    """Raise SurfaceError if a vertex (n, 3) [m] is so far away that all others would be merged into one point."""
     distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
     if distance.max() > LARGEST:
         message = f"vertex {int(distance.argmax())} lies {distance.max():.3g} m away from the others"
@@ -143,7 +145,7 @@ def _check_extent(points: np.ndarray) -> None:
 
 
 def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Make vertices that lie together one, and drop triangles that thereby vanish."""
+    """Merge vertices in the same grid cell and drop triangles that vanish thereby."""
     extent = float(np.ptp(points[np.unique(triangles)], axis=0).max())
     if extent == 0.0:
         raise SurfaceError("all its vertices are one point")
@@ -159,7 +161,7 @@ def _welded(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _check_height(points: np.ndarray, unit: Unit, site: PadSite) -> None:
-    """Refuse a height that is no gap in this unit, and say in which it would be."""
+    """Raise SurfaceError if the height is implausible in this unit, and suggest a unit in which it would fit."""
     height, (least, most) = float(np.ptp(points[:, 2])), (0.5 * site.gap, 2.0 * site.gap)
     if least < height < most:
         return
@@ -169,7 +171,7 @@ def _check_height(points: np.ndarray, unit: Unit, site: PadSite) -> None:
 
 
 def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> ClosedSurface:
-    """Turn the lower end into z = 0, flatten both ends and stretch heights to the site's upper plane."""
+    """Rotate the lower end into z = 0, flatten both ends and stretch heights to the plane of the package's pad."""
     lower = _flat_end(points, triangles, -1.0, site.wetted_radius_board)
     points = (points - lower.point) @ _upright(-lower.normal).T
     upper = _flat_end(points, triangles, 1.0, site.wetted_radius_package)
@@ -191,7 +193,7 @@ def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> C
 
 
 def site_slope(site: PadSite) -> np.ndarray:
-    """Return the rise along x and y (2,) of a plane that was turned by the site's tilt."""
+    """Return the slopes along x and y of a plane rotated by the tilt of a site, shape (2,)."""
     turn_x, turn_y = site.tilt
     angle = float(np.hypot(turn_x, turn_y))
     steep = np.tan(angle) / angle if angle else 1.0
@@ -199,9 +201,10 @@ def site_slope(site: PadSite) -> np.ndarray:
 
 
 def _flat_end(points: np.ndarray, triangles: np.ndarray, upward: float, wetted_radius: float) -> _End:
-    """Find the flat end that faces up (1) or down (-1): a plane through what faces this way at the very end.
+    """Find the flat end that faces up (1) or down (-1).
 
-    The plane is fitted again to the triangles in it, whose largest connected piece is the end.
+    A plane is fitted to the triangles near the end that face this way, then repeatedly to the triangles in that plane;
+    the largest connected piece of these is the flat end.
     """
     areas = area_vectors(points, triangles)
     sizes = np.linalg.norm(areas, axis=1)

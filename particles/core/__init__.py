@@ -1,1 +1,1 @@
-"""What every particle method shares: clouds, neighbours, plates, tetrahedra, checkpoints; start with `body.py`."""
+"""Base of all particle methods: cells, neighbours, grid, clouds, plates, checkpoints; start with `body.py`."""

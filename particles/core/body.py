@@ -17,14 +17,14 @@ class Body:
     """State of a liquid body.
 
     Attributes:
-        cloud: the initial cloud; its rings, walls and counts hold throughout.
-        points: `(n, 3)` [m].
-        velocity: `(n, 3)` [m/s].
-        pressure: `(n,)` above the ambient pressure [Pa].
-        surface_pressure: pressure that carries the volume constraint [Pa].
-        triangles: `(t, 3)` current free surface.
-        volumes: `(n,)` share of each particle in the volume [m^3].
-        plates: the plates under the contact lines, where they are now.
+        cloud: Initial cloud; its rings, walls and counts stay valid.
+        points: Positions, shape (n, 3) [m].
+        velocity: Velocities, shape (n, 3) [m/s].
+        pressure: Pressure above the ambient pressure, shape (n,) [Pa].
+        surface_pressure: Lagrange multiplier of the volume constraint [Pa].
+        triangles: Current triangles of the free surface, shape (t, 3).
+        volumes: Share of each particle in the volume, shape (n,) [m^3].
+        plates: Plates under the contact lines at their current positions.
     """
 
     cloud: Cloud
@@ -38,7 +38,7 @@ class Body:
 
     @classmethod
     def at_rest(cls, cloud: Cloud) -> "Body":
-        """Start a body at rest from its initial cloud."""
+        """Create a body at rest from its initial cloud."""
         count = len(cloud.points)
         body = cls(
             cloud=cloud,
@@ -55,51 +55,59 @@ class Body:
 
     @property
     def interior(self) -> Indices:
-        """The particles below the free surface, those on the walls included, `(m,)`."""
+        """Particles below the free surface, those on walls included, shape (m,)."""
         return np.arange(self.cloud.surface_count, len(self.points), dtype=np.int32)
 
     def move(self, time_step: float, velocity: Floats, twists: dict[int, Floats]) -> None:
-        """Displace particles by a velocity `(n, 3)` [m/s], plates by their twists `(6,)` with what they carry."""
-        ways = {wall: time_step * twist for wall, twist in twists.items()}
-        placed = self.placed(self.points + time_step * velocity, ways)
-        self.points, self.plates = placed.points, placed.plates
-
-    def placed(self, points: Floats, ways: Mapping[int, Floats]) -> "Body":
-        """The body with its particles at points `(n, 3)` [m], those on plates that have moved on their planes.
+        """Move particles and plates over a time step.
 
         Args:
-            points: where the particles have gone.
-            ways: `(6,)` displacement and rotation of plates, by their index [m, rad].
+            time_step: Time step [s].
+            velocity: Velocities of the particles, shape (n, 3) [m/s].
+            twists: Velocity and angular velocity of plates by their index, shape (6,) [m/s, rad/s].
+        """
+        displacements = {wall: time_step * twist for wall, twist in twists.items()}
+        placed = self.placed(self.points + time_step * velocity, displacements)
+        self.points, self.plates = placed.points, placed.plates
+
+    def placed(self, points: Floats, displacements: Mapping[int, Floats]) -> "Body":
+        """Return the body with its particles at new positions and its plates moved.
+
+        Particles on moved plates are projected onto the planes of these plates.
+
+        Args:
+            points: New positions of the particles, shape (n, 3) [m].
+            displacements: Displacement and rotation vector of plates by their index, shape (6,) [m, rad].
         """
         points, plates = points.copy(), list(self.plates)
-        for wall, way in ways.items():
-            plate, plates[wall] = plates[wall], plates[wall].moved(way)
+        for wall, displacement in displacements.items():
+            plate, plates[wall] = plates[wall], plates[wall].moved(displacement)
             on_plate = self.cloud.wall == wall
-            local = plate.local(points[on_plate] - plate.rigid_velocity(way, self.points[on_plate]))
+            local = plate.local(points[on_plate] - plate.rigid_velocity(displacement, self.points[on_plate]))
             points[on_plate] = plates[wall].place(local * np.array([1.0, 1.0, 0.0]))
         return replace(self, points=points, plates=tuple(plates))
 
     def surface(self) -> "Body":
-        """The free surface alone: a body without the particles below it."""
+        """Return the free surface as a body without the particles below it."""
         count = self.cloud.surface_count
         cloud = replace(self.cloud, points=self.cloud.points[:count], wall=self.cloud.wall[:count])
         parts = (self.points[:count], self.velocity[:count], self.pressure[:count])
         return Body(cloud, *parts, self.surface_pressure, self.triangles, self.volumes[:count], self.plates)
 
     def moments(self) -> tuple[float, Floats, Floats] | None:
-        """Integrals of 1, x `(3,)` and x x `(3, 3)` over the liquid, where triangles do not tell them."""
+        """Return the integrals of 1, x (3,) and x x (3, 3) over the liquid, or None if the triangles determine them."""
         return None
 
     def whole(self) -> "Body":
-        """The body with its triangles, as products have it: itself, where it is not a section of one."""
+        """Return the body with all its triangles; a section returns the body of which it is a part."""
         return self
 
     def enclosing(self) -> "Body":
-        """The body with triangles around all of it, walls and planes of symmetry besides."""
+        """Return the body with triangles around all of it except walls and planes of symmetry."""
         return self
 
     def span(self) -> tuple[float, float]:
-        """Heights [m] between which horizontal sections cut the surface, but no plate, tilted ones neither."""
+        """Return the lowest and highest height of horizontal sections that cut the surface but no plate [m]."""
         z, rings = self.points[: self.cloud.surface_count, 2], self.cloud.rings
         sides = [(plate.side, z[ring]) for plate, ring in zip(self.plates, rings, strict=True)]
         low = max((float(line.max()) for side, line in sides if side < 0.0), default=float(z.min()))
@@ -107,12 +115,15 @@ class Body:
         return low, high
 
     def volume(self) -> tuple[float, Floats]:
-        """Enclosed volume [m^3] and its gradient `(n, 3)` [m^2]."""
+        """Return the enclosed volume [m^3] and its gradient, shape (n, 3) [m^2]."""
         return volume_and_gradient(self.points, self.triangles, self.cloud.rings, self.plates)
 
 
 def particle_volumes(cloud: Cloud, volume: float) -> Floats:
-    """Shares of the volume: a whole cell inside, half a cell on a surface or wall, a quarter on a contact line."""
+    """Return each particle's share of a volume [m^3], shape (n,).
+
+    A particle inside has a whole cell, one on the surface or a wall half a cell, one on a contact line a quarter.
+    """
     on_surface = np.arange(len(cloud.points)) < cloud.surface_count
     part = symmetry.share(cloud) * np.where(on_surface, 0.5, 1.0) * np.where(cloud.wall >= 0, 0.5, 1.0)
     return part * (volume / part.sum())

@@ -1,7 +1,7 @@
-"""Checkpoint of a run in one file: written at once or not at all, read only if it belongs to the same inputs and code.
+"""Checkpoint of a run in one file: written atomically, and read only if it belongs to the same inputs and code.
 
-A state is data (`data_file.py`): what has one says of which arrays, numbers and records it consists, and how it is made
-of them again, so that the run continues to the last bit. Nothing in a file is executed, whoever has written it.
+A state consists of plain data (`data_file.py`): arrays, numbers and records, from which the run continues with
+identical bits. No content of a file is executed.
 """
 
 import hashlib
@@ -18,6 +18,7 @@ from reflowshock.sources import MATERIALS, digest_of_sources
 
 logger = logging.getLogger(__name__)
 
+# Wall time between two checkpoints [s].
 INTERVAL = 1.0
 LIBRARIES = ("numpy", "scipy", "numba", "petsc4py")
 
@@ -26,26 +27,26 @@ class Checkpoint:
     """The checkpoint file of one run.
 
     Attributes:
-        continued: whether the run continued from this file.
+        continued: Whether the run continued from this file.
     """
 
     def __init__(self, path: Path, inputs: Sequence[object], interval: float = INTERVAL) -> None:
-        """Name the file and what it belongs to.
+        """Set the file and the inputs to which it belongs.
 
         Args:
-            path: file; its folder is made when it is first written.
-            inputs: all that the run depends on; plain data, whose `repr` tells all of it.
-            interval: wall time between two checkpoints [s].
+            path: File; its folder is created with the first checkpoint.
+            inputs: All inputs of the run; plain data with a complete `repr`.
+            interval: Wall time between two checkpoints [s].
         """
         self.path, self.interval, self.continued = path, interval, False
         self._owner = hashlib.sha256(repr(inputs).encode() + _code()).hexdigest()
         self._written = monotonic()
 
     def read(self, records: Collection[type] = ()) -> Any | None:
-        """Return the state; None where there is none, or, with a warning, where it is broken or of another run.
+        """Return the state, or None if there is none; a damaged or foreign file is ignored with a warning.
 
         Args:
-            records: dataclasses that it may consist of; no others are made.
+            records: Dataclasses that the state may contain; no others are created.
         """
         if not self.path.exists():
             return None
@@ -53,26 +54,28 @@ class Checkpoint:
             owner = read_header(self.path).get("owner")
             state = read_data(self.path, records) if owner == self._owner else None
         except NotData as error:
-            logger.warning("%s: the run starts anew", error)
+            logger.warning("%s: the run starts from the beginning", error)
             return None
         if owner != self._owner:
-            logger.warning("%s belongs to other inputs or another version: the run starts anew", self.path)
+            logger.warning(
+                "%s belongs to other inputs or another version: the run starts from the beginning", self.path
+            )
             return None
         self.continued = True
         return state
 
     def is_due(self) -> bool:
-        """Whether the interval has passed."""
+        """Return whether the interval has passed."""
         return monotonic() - self._written >= self.interval
 
     def write(self, state: object) -> None:
-        """Replace the file by a state that is data; a kill at any moment leaves the old one or the new one."""
+        """Replace the file atomically: an interrupt leaves either the old or the new checkpoint."""
         write_data(self.path, {"owner": self._owner}, state)
         self._written = monotonic()
 
 
 @cache
 def _code() -> bytes:
-    """Digest of this package's source and of the libraries: other code would read or continue a state differently."""
+    """Return a digest of this package's source and of the library versions, with which results may differ."""
     libraries = " ".join(version(name) for name in LIBRARIES)
     return libraries.encode() + digest_of_sources(Path(__file__).parents[1], MATERIALS)

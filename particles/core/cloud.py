@@ -1,4 +1,4 @@
-"""Body-fitted initial clouds: particles of which the first ones are the vertices of a triangulated free surface."""
+"""Body-fitted initial particle clouds, in which the first particles are the vertices of a triangulated free surface."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -13,11 +13,12 @@ from reflowshock.particles.core.plate import Plate, joint_plates
 from reflowshock.particles.core.surface_measure import enclosed_volume
 
 Lengths = TypeVar("Lengths", float, Floats)
-LARGEST_BULGE = 0.5 * np.sqrt(3.0)  # of a double cone beyond its discs, over the gap
+# Largest bulge of a double cone beyond its discs, over the gap.
+LARGEST_BULGE = 0.5 * np.sqrt(3.0)
 
 
 class TooLittleSolder(ValueError):
-    """No body of this volume reaches from one disc to the other."""
+    """The solder volume is too small for a body that reaches from one disc to the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +26,16 @@ class Cloud:
     """Particles that fill a liquid body, its free surface and its contact lines.
 
     Attributes:
-        points: `(n, 3)` [m]; the first `surface_count` are the vertices of the free surface.
-        surface_count: number of surface particles, rings included.
-        triangles: `(t, 3)` free surface, outward oriented, open at the walls.
-        rings: one or two contact lines, each `(k,)` ordered counter-clockwise seen from +z.
-        plates: the plate under each ring, at the start.
-        wall: `(n,)` index of the wall that a particle slides on, -1 off the walls (rings are on their wall).
-        spacing: mean distance of neighbours [m].
-        symmetry: axes of the planes of symmetry through the origin, 0 for x = 0 and 1 for y = 0; the cloud is that part
-            of the body where these coordinates are not negative, and contact lines are arcs from plane to plane.
+        points: Positions, shape (n, 3) [m]; the first `surface_count` are the vertices of the free surface.
+        surface_count: Number of surface particles, rings included.
+        triangles: Triangles of the free surface, outward oriented, open at the walls, shape (t, 3).
+        rings: Contact lines, each of shape (k,), counter-clockwise seen from +z.
+        plates: Plate under each ring at the start.
+        wall: Index of the wall on which a particle slides, -1 off the walls, shape (n,); rings are on their wall.
+        spacing: Mean distance of neighbours [m].
+        symmetry: Axes of the planes of symmetry through the origin, 0 for x = 0 and 1 for y = 0. The cloud is the part
+            of
+            the body where these coordinates are not negative; contact lines are arcs from plane to plane.
     """
 
     points: Floats
@@ -47,29 +49,34 @@ class Cloud:
 
     @property
     def parts(self) -> int:
-        """Of how many such parts the body consists."""
+        """Number of such parts in the whole body."""
         return 2 ** len(self.symmetry)
 
 
 def equal_area_radius(radius: Lengths, corners: Lengths) -> Lengths:
-    """Radius of the corners of a regular polygon that has the area of the disc [m]; of several, given arrays."""
+    """Return the circumradius of a regular polygon with the area of a disc, elementwise [m].
+
+    Args:
+        radius: Radius of the disc [m].
+        corners: Number of corners of the polygon.
+    """
     return radius / np.sqrt(np.sinc(2.0 / corners))
 
 
 def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud:
     """Fill a double cone of a given volume between two discs.
 
-    The radius changes linearly from the board's disc to the middle and on to the package's disc: a shape that
-    meets both contact lines and has the right volume, but is no equilibrium. It is not steeper than 60 degrees off the
-    vertical, where its surface would pass through the plates as it rounds off: more solder starts on the mask.
+    The radius changes linearly from the board's disc to the middle and on to the package's disc. The shape meets both
+    contact lines and has the right volume but is not in equilibrium. It is at most 60 degrees off the vertical, since
+    its surface would pass through the plates while it becomes round; the rest of the solder starts on the mask.
 
     Args:
-        geometry: gap and radii of the wetted discs.
-        volume: volume of the polyhedron that the surface and the walls enclose [m^3].
-        spacing: particle spacing [m].
+        geometry: Gap and radii of the wetted discs.
+        volume: Volume of the polyhedron enclosed by the surface and the walls [m^3].
+        spacing: Particle spacing [m].
 
     Raises:
-        TooLittleSolder: the volume is too small for a double cone that does not rupture.
+        TooLittleSolder: The volume is too small for a double cone without rupture.
     """
     ring_count, layer_count = joint_counts(geometry, volume, spacing)
     steepest = LARGEST_BULGE * geometry.gap
@@ -78,14 +85,16 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
         beyond = max(0.0, bulge - steepest)
         board, package = geometry.radius_board + beyond, geometry.radius_package + beyond
         wetted = replace(geometry, radius_board=board, radius_package=package)
-        return _stack(wetted, (ring_count, layer_count), bulge - beyond, spacing)
+        return _stack(wetted, ring_count, layer_count, bulge - beyond, spacing)
 
     def excess(bulge: float) -> float:
         return _volume(place(bulge)) - volume
 
     lowest = -0.95 * min(geometry.radius_board, geometry.radius_package)
     if excess(lowest) > 0.0:
-        raise TooLittleSolder(f"solder.volume = {volume:.4g} m^3 spans no gap of {geometry.gap:.4g} m: it ruptures")
+        raise TooLittleSolder(
+            f"solder.volume = {volume:.4g} m^3 ruptures in a gap of {geometry.gap:.4g} m; use more solder"
+        )
     highest = np.sqrt(3.0 * volume / (np.pi * geometry.gap)) * 2.0
     from scipy.optimize import brentq  # drops start without it
 
@@ -96,9 +105,8 @@ def _volume(cloud: Cloud) -> float:
     return enclosed_volume(cloud.points, cloud.triangles, cloud.rings, cloud.plates)
 
 
-def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spacing: float) -> Cloud:
-    """Stack layers of concentric rings; ring j of a layer has 6 j particles, odd layers are turned by half a step."""
-    ring_count, layer_count = counts
+def _stack(geometry: JointGeometry, ring_count: int, layer_count: int, bulge: float, spacing: float) -> Cloud:
+    """Stack layers of concentric rings; ring j has 6 j particles, and odd layers are rotated by half a step."""
     corners = 6 * ring_count
     height = np.linspace(0.0, geometry.gap, layer_count)
     fraction = height / geometry.gap
@@ -107,9 +115,9 @@ def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spaci
     shells: list[Floats] = []
     interior: list[Floats] = []
     for layer in range(layer_count):
-        turn = np.pi / corners * (layer % 2)
+        rotation = np.pi / corners * (layer % 2)
         for ring in range(ring_count, -1, -1):
-            points = _circle(radius[layer] * ring / ring_count, height[layer], 6 * ring, turn)
+            points = _circle(radius[layer] * ring / ring_count, height[layer], 6 * ring, rotation)
             (shells if ring == ring_count else interior).append(points)
     points = np.concatenate(shells + interior)
     surface_count = corners * layer_count
@@ -124,20 +132,21 @@ def _stack(geometry: JointGeometry, counts: tuple[int, int], bulge: float, spaci
 
 
 def _lean(points: Floats, package: Plate) -> Floats:
-    """Move upright layers, the more the higher, so that the uppermost lies on the package's plate."""
+    """Move layers in proportion to their height, so that the uppermost lies on the package's plate."""
     flat = points * np.array([1.0, 1.0, 0.0])
     height = package.origin[2]
     upright = flat + np.array([0.0, 0.0, height])
     return points + points[:, 2:3] / height * (package.place(flat) - upright)
 
 
-def _circle(radius: float, height: float, count: int, turn: float) -> Floats:
-    angle = turn + 2.0 * np.pi * np.arange(max(count, 1)) / max(count, 1)
+def _circle(radius: float, height: float, count: int, rotation: float) -> Floats:
+    """Return points on a horizontal circle, shape (max(count, 1), 3) [m]."""
+    angle = rotation + 2.0 * np.pi * np.arange(max(count, 1)) / max(count, 1)
     return np.column_stack((radius * np.cos(angle), radius * np.sin(angle), np.full(len(angle), height)))
 
 
 def _band_triangles(corners: int, layers: int) -> Indices:
-    """Triangles between stacked rings, of which the odd ones are turned by half a step; outward oriented."""
+    """Return outward oriented triangles between stacked rings, of which the odd ones are rotated by half a step."""
     k = np.arange(corners)
     after = (k + 1) % corners
     triangles = []
@@ -156,8 +165,8 @@ def box_cloud(edge: float, count: int) -> Cloud:
     """Fill a cube that stands on the wall z = 0 with a lattice (Hu et al., section 4.1).
 
     Args:
-        edge: length of an edge [m].
-        count: particles along an edge.
+        edge: Length of an edge [m].
+        count: Number of particles along an edge.
     """
     axis = np.arange(count)
     lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -177,11 +186,11 @@ def box_cloud(edge: float, count: int) -> Cloud:
 
 
 def free_box_cloud(edge: float, count: int) -> Cloud:
-    """Fill a cube about the origin with a lattice; no wall touches it.
+    """Fill a cube about the origin with a lattice; it touches no wall.
 
     Args:
-        edge: length of an edge [m].
-        count: particles along an edge.
+        edge: Length of an edge [m].
+        count: Number of particles along an edge.
     """
     axis, last = np.arange(count), count - 1
     lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -197,7 +206,7 @@ def free_box_cloud(edge: float, count: int) -> Cloud:
 
 
 def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Split the quadrilaterals of a sheet of vertex numbers, with alternating diagonals; normal = axis 0 x axis 1."""
+    """Split the quadrilaterals of a sheet of vertices with alternating diagonals; the normal is axis 0 x axis 1."""
     a, b = sheet[:-1, :-1], sheet[1:, :-1]
     c, d = sheet[1:, 1:], sheet[:-1, 1:]
     even = (np.add.outer(np.arange(a.shape[0]), np.arange(a.shape[1])) % 2 == 0)[..., None]
@@ -209,12 +218,12 @@ def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:
 def sphere_cloud(volume: float, shells: int) -> Cloud:
     """Fill a ball with geodesic spheres about a particle at the centre.
 
-    Shell k has 10 k^2 + 2 particles: the k-fold subdivision of the icosahedron's faces. The second mode has the same
-    frequency about every axis of this symmetry.
+    Shell k has 10 k^2 + 2 particles, the k-fold subdivision of the faces of an icosahedron. With this symmetry the
+    second mode has the same frequency about every axis.
 
     Args:
-        volume: of the polyhedron of the surface [m^3].
-        shells: number of spheres, at least 2.
+        volume: Volume of the polyhedron of the surface [m^3].
+        shells: Number of spheres, at least 2.
     """
     layers = [geodesic_sphere(k) * (k / shells) for k in range(shells, 0, -1)]
     points = np.concatenate([*layers, np.zeros((1, 3))])
@@ -233,9 +242,9 @@ def sphere_cloud(volume: float, shells: int) -> Cloud:
 
 
 def geodesic_sphere(frequency: int) -> Floats:
-    """Vertices of the subdivided icosahedron on the unit sphere, `(10 frequency^2 + 2, 3)`."""
+    """Return the vertices of the subdivided icosahedron on the unit sphere, shape (10 frequency^2 + 2, 3)."""
     golden = 0.5 * (1.0 + np.sqrt(5.0))
-    corner = np.array([[0.0, one, two * golden] for one in (1, -1) for two in (1, -1)])
+    corner = np.array([[0.0, first, second * golden] for first in (1, -1) for second in (1, -1)])
     corners = np.concatenate([np.roll(corner, shift, axis=1) for shift in range(3)]) / np.hypot(1.0, golden)
     faces = corners[ConvexHull(corners).simplices]
     arc = np.arctan(2.0)
@@ -249,7 +258,7 @@ def geodesic_sphere(frequency: int) -> Floats:
 
 
 def _outward(points: Floats, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Turn the triangles of a convex surface about the origin outward."""
+    """Orient the triangles of a convex surface about the origin outward, in place, and return them."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     inward = (np.cross(b - a, c - a) * a).sum(axis=1) < 0.0
     triangles[inward] = triangles[inward][:, ::-1]

@@ -1,22 +1,22 @@
-"""Geometry of one joint: two wetted discs a gap apart, and the counts of its particle cloud. Plain data."""
+"""Geometry of one solder joint, two wetted discs with a gap between them, and the resolution of its particle cloud."""
 
 from dataclasses import dataclass
 from math import ceil, pi, sqrt
 
-# What offset and tilt may change of a joint's width: above it the coaxial joint is no reference to judge it to 1 %.
+# Largest relative change of a joint's width by offset and tilt for which the coaxial joint is a reference to 1 %.
 LARGEST_WIDTH_CHANGE = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
 class JointGeometry:
-    """Two wetted discs: the board's at z = 0 around the z axis, the package's a gap above.
+    """Two wetted discs: the board's at z = 0 around the z axis, the package's above it.
 
     Attributes:
-        gap: height of the centre of the package's disc [m].
-        radius_board: radius of the disc that solder wets on the board [m].
-        radius_package: the same on the package [m].
+        gap: Height of the centre of the package's disc [m].
+        radius_board: Radius of the wetted disc on the board [m].
+        radius_package: Radius of the wetted disc on the package [m].
         offset: x and y of the centre of the package's disc [m].
-        tilt: rotation of the package about its disc's centre: turns about the x and the y axis [rad].
+        tilt: Rotations of the package's disc about the x and the y axis through its centre [rad].
     """
 
     gap: float
@@ -27,19 +27,19 @@ class JointGeometry:
 
     @property
     def is_coaxial(self) -> bool:
-        """Whether both discs are horizontal and centred on the z axis: the joint is a body of revolution."""
+        """Whether both discs are horizontal and centred on the z axis, so that the joint is a body of revolution."""
         return self.offset == self.tilt == (0.0, 0.0)
 
 
 def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:
-    """Concentric rings in a layer and layers of a joint's cloud.
+    """Return the number of concentric rings in a layer of a joint's cloud and the number of layers.
 
     Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
 
     Args:
-        geometry: gap and radii.
-        volume: [m^3].
-        spacing: particle spacing [m].
+        geometry: Gap and radii.
+        volume: Solder volume [m^3].
+        spacing: Particle spacing [m].
     """
     mean_radius = sqrt(volume / (pi * geometry.gap))
     rings = max(3, ceil(mean_radius / spacing))

@@ -1,4 +1,4 @@
-"""Rigid plates: the planes that bound a liquid body, with the centre of a pad, and how they are placed and moved."""
+"""Rigid plates, the planes that bound a liquid body: pads on them, local coordinates and rigid motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +17,8 @@ class Pad:
 
     Attributes:
         centre: x and y in the frame of the plate [m].
-        radius: of its edge [m]; infinite where it covers the whole plate.
-        angle: contact angle on it [rad].
+        radius: Radius of the pad [m]; infinite if it covers the whole plate.
+        angle: Contact angle on the pad [rad].
     """
 
     centre: tuple[float, float]
@@ -26,19 +26,19 @@ class Pad:
     angle: float
 
     def corners(self, spacing: float) -> float:
-        """Vertices a spacing [m] apart around its edge, no whole number."""
+        """Return the circumference over a spacing [m]: the number of vertices around the edge, not rounded."""
         return 2.0 * np.pi * self.radius / spacing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plate:
-    """A rigid plate: solder mask with pads.
+    """A rigid plate of solder mask with pads.
 
     Attributes:
-        origin: `(3,)` centre of the pad [m].
-        frame: `(3, 3)` orthonormal rows: two tangents and the normal, which is +z where the plate is horizontal.
+        origin: Centre of the pad, shape (3,) [m].
+        frame: Orthonormal rows, two tangents and the normal, which is +z for a horizontal plate, shape (3, 3).
         side: +1 if the normal points out of the liquid, as on the package, -1 if into it, as on the board.
-        pads: the pads on it, where a scene has several; that of a single joint or drop is at the origin.
+        pads: Pads, if a scene has several; that of a single joint or drop is at the origin.
     """
 
     origin: Floats
@@ -48,58 +48,67 @@ class Plate:
 
     @classmethod
     def horizontal(cls, height: float, centre: tuple[float, float] = (0.0, 0.0), side: float = -1.0) -> "Plate":
-        """Place a plate at z = height."""
+        """Create a horizontal plate at a height [m], with its pad centred at x, y [m]."""
         return cls(np.array([*centre, height]), np.eye(3), side)
 
     @property
     def normal(self) -> Floats:
-        """Unit normal `(3,)`."""
+        """Unit normal, shape (3,)."""
         return self.frame[2]
 
     def local(self, points: Floats) -> Floats:
-        """Coordinates in the plate's frame of points `(k, 3)` [m]; the third is the height above the plate."""
+        """Return points (k, 3) [m] in the plate's frame; the third coordinate is the height above the plate."""
         return (points - self.origin) @ self.frame.T
 
     def place(self, local: Floats) -> Floats:
-        """Points `(k, 3)` [m] of coordinates in the plate's frame."""
+        """Return points given in the plate's frame (k, 3) in global coordinates [m]; the inverse of `local`."""
         return self.origin + local @ self.frame
 
     def rigid_velocity(self, twist: Floats, points: Floats) -> Floats:
-        """Velocity `(k, 3)` [m/s] that a twist of the plate gives to points.
+        """Return the velocities of points that move with the plate, shape (k, 3) [m/s].
 
         Args:
-            twist: `(6,)` velocity of the origin [m/s] and angular velocity [rad/s].
-            points: `(k, 3)` [m].
+            twist: Velocity of the origin and angular velocity, shape (6,) [m/s, rad/s].
+            points: Points, shape (k, 3) [m].
         """
         return twist[:3] + np.cross(twist[3:], points - self.origin)
 
     def moved(self, motion: Floats) -> "Plate":
-        """This plate displaced by `motion[:3]` [m] and turned about its origin by the rotation vector `motion[3:]`."""
-        turn = Rotation.from_rotvec(motion[3:]).as_matrix()
-        return replace(self, origin=self.origin + motion[:3], frame=self.frame @ turn.T)
+        """Return the plate displaced by `motion[:3]` [m] and rotated about its origin by `motion[3:]` [rad]."""
+        rotation = Rotation.from_rotvec(motion[3:]).as_matrix()
+        return replace(self, origin=self.origin + motion[:3], frame=self.frame @ rotation.T)
 
     def motion_to(self, other: "Plate") -> Floats:
-        """Displacement and rotation vector `(6,)` with which `moved` leads to another plate."""
-        turn = Rotation.from_matrix(other.frame.T @ self.frame).as_rotvec()
-        return np.concatenate((other.origin - self.origin, turn))
+        """Return the motion (6,) [m, rad] for which `moved` returns the other plate."""
+        rotation = Rotation.from_matrix(other.frame.T @ self.frame).as_rotvec()
+        return np.concatenate((other.origin - self.origin, rotation))
 
 
 def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
-    """Place the plates of a joint: the board's at z = 0, the package's with its offset and tilt."""
+    """Return the board's plate at z = 0 and the package's plate with its offset and tilt."""
     package = Plate.horizontal(geometry.gap, geometry.offset, side=1.0)
     return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
 
 
 def placed_geometry(geometry: JointGeometry, plates: Sequence[Plate]) -> JointGeometry:
-    """The geometry of a joint whose plates have moved, seen from the board's plate."""
+    """Return the geometry of a joint whose plates have moved, in the frame of the board's plate."""
     board, package = plates
     x, y, gap = map(float, board.local(package.origin[None])[0])
-    turn = Rotation.from_matrix(board.frame @ package.frame.T).as_rotvec()
-    return replace(geometry, gap=gap, offset=(x, y), tilt=(float(turn[0]), float(turn[1])))
+    rotation = Rotation.from_matrix(board.frame @ package.frame.T).as_rotvec()
+    return replace(geometry, gap=gap, offset=(x, y), tilt=(float(rotation[0]), float(rotation[1])))
 
 
 def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Floats:
-    """The part of a vector field `(k, 3)` along the plates; `wall (k,)` names the plate of a vector, -1 for none."""
+    """Remove the normal component of vectors at particles on plates.
+
+    Args:
+        plates: Plates.
+        wall: Index of the plate of each vector, -1 for none, shape (k,).
+        field: Vectors, shape (k, 3).
+
+    Returns:
+        Tangential vectors, shape (k, 3).
+    """
     result = field.copy()
     for number, plate in enumerate(plates):
         on_plate = wall == number

@@ -14,13 +14,13 @@ from scipy import sparse
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.plate import Plate
 
-# Share of the stiffness in all directions in `area_stiffness`.
+# Share of the isotropic stiffness in `area_stiffness`.
 ALL_WAYS = 0.7
 
 
 @njit(cache=True)
 def area_vector(points, i, j, k):
-    """Normal of a triangle, of twice its area [m^2]."""
+    """Return the normal of a triangle, with twice its area as length [m^2]."""
     ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
     vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -28,7 +28,7 @@ def area_vector(points, i, j, k):
 
 @njit(cache=True)
 def surface_area(points, triangles):
-    """Area of the triangles [m^2]; `points (n, 3)`, `triangles (t, 3)`."""
+    """Return the total area of triangles (t, 3) of points (n, 3) [m^2]."""
     total = 0.0
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -38,7 +38,7 @@ def surface_area(points, triangles):
 
 @njit(cache=True)
 def triangle_areas(points, triangles):
-    """Area of each triangle, `(t,)` [m^2]."""
+    """Return the area of each triangle, shape (t,) [m^2]."""
     result = np.empty(triangles.shape[0])
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -47,10 +47,10 @@ def triangle_areas(points, triangles):
 
 
 def area_gradient(points: Floats, triangles: Indices, weights: Floats | None = None) -> Floats:
-    """Gradient of `surface_area` with respect to each point, `(n, 3)` [m]; triangles without area have none.
+    """Return the gradient of `surface_area` with respect to each point, shape (n, 3) [m].
 
-    It is K x with the stiffness of `cotangent_laplacian`, of which nothing is kept. ``weights`` `(t,)` multiply the
-    areas of triangles.
+    It equals K x with the stiffness matrix of `cotangent_laplacian`; degenerate triangles contribute nothing.
+    ``weights`` (t,) multiply the areas of triangles.
     """
     return _area_gradient(points, triangles, np.ones(len(triangles)) if weights is None else weights)
 
@@ -112,28 +112,28 @@ def _wall_volume_and_gradient(points, ring, sixth, gradient):
 
 
 def ahead(values: NDArray[Any]) -> NDArray[Any]:
-    """The values of the next vertices of a closed line, `(k, ...)`: np.roll by -1, which takes five times as long."""
+    """Return the values at the next vertices of a closed line, shape (k, ...); five times as fast as ``np.roll``."""
     return np.concatenate((values[1:], values[:1]))
 
 
 def behind(values: NDArray[Any]) -> NDArray[Any]:
-    """The values of the vertices before those of a closed line, `(k, ...)`."""
+    """Return the values at the previous vertices of a closed line, shape (k, ...)."""
     return np.concatenate((values[-1:], values[:-1]))
 
 
 def _area_vector(points: Floats, ring: Indices) -> Floats:
-    """Normal of the polygon of a contact line times its area, `(3,)` [m^2] (shoelace formula in space)."""
+    """Return the area vector of the polygon of a contact line, shape (3,) [m^2] (shoelace formula in space)."""
     x = points[ring] - points[ring].mean(axis=0)
     return 0.5 * np.cross(x, ahead(x)).sum(axis=0)
 
 
 def ring_area(points: Floats, ring: Indices) -> float:
-    """Area of the plane polygon of a contact line [m^2]."""
+    """Return the area of the plane polygon of a contact line [m^2]."""
     return float(np.linalg.norm(_area_vector(points, ring)))
 
 
 def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
-    """Gradient of `ring_area` with respect to the vertices of the ring, `(k, 3)` [m]."""
+    """Return the gradient of `ring_area` with respect to the vertices of the ring, shape (k, 3) [m]."""
     x, normal = points[ring], _area_vector(points, ring)
     normal /= np.linalg.norm(normal)
     return 0.5 * np.cross(ahead(x) - behind(x), normal)

@@ -1,10 +1,8 @@
-"""Planes of symmetry x = 0 and y = 0: the part of a body where x >= 0, y >= 0 stands for the whole.
+"""Planes of symmetry x = 0 and y = 0: only the part of a body with x >= 0 and y >= 0 is computed.
 
-Such a plane is a wall that is slid on freely and wetted at 90 degrees, where adhesion gives no force. It goes through
-the origin, so that its part of the volume integral of x . n vanishes.
-
-Clouds are cut there, what is on a plane stays on it, and contact lines are completed by their images. Results are those
-of the whole body.
+A plane of symmetry is a free-slip wall with a contact angle of 90 degrees, where adhesion gives no force. It contains
+the origin, so its contribution to the volume integral of x . n vanishes. Clouds are cut at the planes, particles on a
+plane stay on it, and contact lines are completed by their mirror images. Results are those of the whole body.
 """
 
 from collections.abc import Sequence
@@ -23,46 +21,46 @@ def cut(cloud: Cloud, axes: Sequence[int]) -> Cloud:
     """Keep the part of a cloud where the coordinates of some axes are not negative.
 
     Args:
-        cloud: with one contact line or none; particles where the planes are, and no triangle across one.
-        axes: 0 for the plane x = 0, 1 for y = 0; both in this order; none leave the cloud whole.
+        cloud: Cloud with at most one contact line, with particles on the planes and no triangle across one.
+        axes: 0 for the plane x = 0, 1 for y = 0, or both in this order; without axes the cloud is returned whole.
     """
     if not axes:
         return cloud
-    kept = (cloud.points[:, list(axes)] >= 0.0).all(axis=1)
-    number = np.cumsum(kept, dtype=np.int32) - np.int32(1)
-    triangles = cloud.triangles[kept[cloud.triangles].all(axis=1)]
-    rings = tuple(number[_arc(ring, kept)] for ring in cloud.rings)
+    is_inside = (cloud.points[:, list(axes)] >= 0.0).all(axis=1)
+    number = np.cumsum(is_inside, dtype=np.int32) - np.int32(1)
+    triangles = cloud.triangles[is_inside[cloud.triangles].all(axis=1)]
+    rings = tuple(number[_arc(ring, is_inside)] for ring in cloud.rings)
     return replace(
         cloud,
-        points=cloud.points[kept],
-        surface_count=int(kept[: cloud.surface_count].sum()),
+        points=cloud.points[is_inside],
+        surface_count=int(is_inside[: cloud.surface_count].sum()),
         triangles=number[triangles],
         rings=rings,
-        wall=cloud.wall[kept],
+        wall=cloud.wall[is_inside],
         symmetry=tuple(axes),
     )
 
 
-def _arc(ring: NDArray[np.int32], kept: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """The kept vertices of a closed line, from end to end."""
-    inside = kept[ring]
+def _arc(ring: NDArray[np.int32], is_inside: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the vertices of a closed line on the positive side of the planes, from end to end."""
+    inside = is_inside[ring]
     first = int(np.flatnonzero(inside & ~np.roll(inside, 1))[0])
     return np.roll(ring, -first)[np.roll(inside, -first)]
 
 
 def on_plane(cloud: Cloud, axis: int) -> NDArray[np.bool_]:
-    """The particles on a plane of symmetry `(n,)`: they stay there exactly."""
+    """Return whether each particle is on a plane of symmetry, shape (n,); it then stays there exactly."""
     return cloud.points[:, axis] == 0.0
 
 
 def surface_planes(cloud: Cloud) -> list[tuple[int, NDArray[np.int32]]]:
-    """Axis of each plane of symmetry, and the vertices of the free surface on it."""
+    """Return the axis of each plane of symmetry and the vertices of the free surface on it."""
     surface = {axis: on_plane(cloud, axis)[: cloud.surface_count] for axis in cloud.symmetry}
     return [(axis, np.flatnonzero(on).astype(np.int32)) for axis, on in surface.items()]
 
 
 def share(cloud: Cloud) -> Floats:
-    """How much of each particle belongs to the part `(n,)`: half of one on a plane, a quarter of one on both."""
+    """Return the share of each particle in the computed part: 1/2 on a plane, 1/4 on both, else 1; shape (n,)."""
     result = np.ones(len(cloud.points))
     for axis in cloud.symmetry:
         result[on_plane(cloud, axis)] *= 0.5
@@ -70,7 +68,13 @@ def share(cloud: Cloud) -> Floats:
 
 
 def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
-    """The part of a vector field `(k, 3)` along the planes of symmetry; it begins at a particle `first`."""
+    """Remove the normal component of vectors at particles on planes of symmetry.
+
+    Args:
+        cloud: Cloud of the computed part.
+        field: Vectors at consecutive particles, shape (k, 3).
+        first: Particle of the first vector.
+    """
     result = field.copy()
     for axis in cloud.symmetry:
         result[on_plane(cloud, axis)[first : first + len(field)], axis] = 0.0
@@ -78,16 +82,16 @@ def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
 
 
 def unit(field: Floats) -> Floats:
-    """Vectors `(k, 3)` of length one."""
+    """Return vectors (k, 3) normalised to unit length."""
     return field / np.linalg.norm(field, axis=1)[:, None]
 
 
 def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indices]:
-    """The contact line of a wall around the whole body, and which vertex of the part each of its points is an image of.
+    """Return the points of the contact line of a wall around the whole body, and the vertex of each.
 
     Args:
-        cloud: of the part.
-        points: `(n, 3)` where its particles are [m].
+        cloud: Cloud of the computed part.
+        points: Positions of its particles, shape (n, 3) [m].
         wall: index of the contact line.
     """
     ring = cloud.rings[wall]
@@ -96,11 +100,11 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
 
 
 def whole_line(cloud: Cloud, count: int) -> tuple[Indices, Floats]:
-    """The closed contact line around the whole body, of which the part has an arc of `count` vertices.
+    """Return the closed contact line around the whole body as images of an arc with ``count`` vertices.
 
     Returns:
-        For each of its vertices the one of the arc that it is or is an image of, `(m,)`, and the signs `(m, 3)` of the
-        coordinates. The arc comes first.
+        Vertex of the arc for each vertex of the line, shape (m,), the arc first, and the signs of its coordinates,
+        shape (m, 3).
     """
     index, signs = np.arange(count), np.ones((count, 3))
     for number, axis in enumerate(cloud.symmetry):

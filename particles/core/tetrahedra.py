@@ -6,21 +6,24 @@ from scipy.spatial import Delaunay
 
 from reflowshock.arrays import Floats, Indices
 
+# Random displacement of the particles before tetrahedralisation, in spacings.
 JITTER = 1e-5
-# Flat tetrahedra have no gradient worth the name.
+# Volume over the mean volume below which a tetrahedron is too flat for a gradient.
 SMALLEST_VOLUME = 0.1
+# Faces of a tetrahedron, outward oriented.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def tetrahedralise(points: Floats, spacing: float) -> Indices:
-    """Delaunay tetrahedra of a convex cloud, `(t, 4)`, positively oriented.
+    """Return the Delaunay tetrahedra of a convex cloud, positively oriented, shape (t, 4).
 
-    Regular clouds hold cospherical particles, whose flat tetrahedra have no orientation of their own; a jitter that is
-    forgotten afterwards gives them one that fits their neighbours', so that inner faces cancel.
+    Regular clouds contain cospherical particles, whose flat tetrahedra have no orientation. Points are displaced at
+    random for the tetrahedralisation only, which orients flat tetrahedra consistently with their neighbours, so that
+    inner faces cancel.
 
     Args:
-        points: `(n, 3)` [m].
-        spacing: mean distance of neighbours [m].
+        points: Points, shape (n, 3) [m].
+        spacing: Mean distance of neighbours [m].
     """
     shift = np.random.default_rng(0).uniform(-JITTER * spacing, JITTER * spacing, points.shape)
     cells = Delaunay(points + shift).simplices.astype(np.int32)
@@ -30,25 +33,28 @@ def tetrahedralise(points: Floats, spacing: float) -> Indices:
 
 
 def boundary_triangles(cells: Indices) -> Indices:
-    """Faces that belong to one tetrahedron only, `(f, 3)`, outward oriented."""
+    """Return the faces of tetrahedra (t, 4) that belong to one tetrahedron only, outward oriented, shape (f, 3)."""
     faces = cells[:, FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]
 
 
 def cell_volumes(points: Floats, cells: Indices) -> Floats:
-    """Signed volumes of the tetrahedra, `(t,)` [m^3]."""
+    """Return the signed volumes of tetrahedra (t, 4) with corners among points (n, 3) [m], shape (t,) [m^3]."""
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     return np.einsum("td,td->t", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0
 
 
 def volume_gradients(points: Floats, cells: Indices) -> Floats:
-    """Gradients of the volumes with respect to the corners, `(t, 4, 3)` [m^2]: volume times shape gradient."""
+    """Return the gradients of the volumes of tetrahedra with respect to their corners, shape (t, 4, 3) [m^2].
+
+    They are the volume times the gradients of the linear shape functions.
+    """
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     inner = np.cross(np.roll(edges, -1, axis=1), np.roll(edges, -2, axis=1)) / 6.0
     return np.concatenate((-inner.sum(axis=1, keepdims=True), inner), axis=1)
 
 
 def thick_cells(volumes: Floats) -> NDArray[np.int64]:
-    """The tetrahedra, by their volumes `(t,)`, in which a gradient can be taken."""
+    """Return the tetrahedra whose volumes (t,) are large enough for a gradient."""
     return np.flatnonzero(volumes > SMALLEST_VOLUME * volumes.mean())

@@ -12,10 +12,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from reflowshock.arrays import Indices
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volumes, tetrahedralise, thick_cells
-from reflowshock.particles.core.windings import winding_numbers
 
 Mask = NDArray[np.bool_]
 
@@ -51,7 +51,7 @@ def _inside(body: Body, cells: Indices) -> Mask:
     walls = [wall_corners(points, *on_wall) for on_wall in zip(cloud.rings, body.plates, strict=True)]
     corners = np.concatenate([points[body.triangles], *walls])
     inside = loose
-    inside[doubtful] = winding_numbers(points[cells[doubtful]].mean(axis=1), corners) > 0.5
+    inside[doubtful] = winding_numbers.at_points(points[cells[doubtful]].mean(axis=1), corners) > 0.5
     return inside
 
 

@@ -1,4 +1,4 @@
-"""Scene of a channel: liquid between two plates is set in motion by a body force (Morris et al. 1997)."""
+"""Start-up of plane Poiseuille flow between two plates under a body force (Morris et al. 1997)."""
 
 from typing import Annotated
 
@@ -14,9 +14,9 @@ from reflowshock.quantity import Quantity
 
 
 class Poiseuille(PlaneFlow):
-    """Liquid between two plates, periodic along them and at rest at the start, that a body force sets in motion.
+    """Liquid between two plates, periodic along them, accelerated from rest by a body force.
 
-    The speed is the steady speed in the middle; the duration is in w^2 / nu, in which the flow develops.
+    The speed is the steady speed on the centre line. The duration is in units of w^2 / nu, the viscous time.
     """
 
     width: Annotated[float, Quantity("mm")] = Field(gt=0)
@@ -25,17 +25,17 @@ class Poiseuille(PlaneFlow):
 
     @property
     def length(self) -> float:
-        """The channel's width [m]."""
+        """Width of the channel [m]."""
         return self.width
 
     @property
     def fastest(self) -> float:
-        """Speed of the middle [m/s]."""
+        """Steady speed on the centre line [m/s]."""
         return self.speed
 
     @property
     def force(self) -> float:
-        """Acceleration along the channel [m/s^2]."""
+        """Body force per unit mass along the channel [m/s^2]."""
         if self.rheology is not None:
             rate = self.rate_at_wall
             return 2.0 * self.rheology.viscosity(rate, self.viscosity) * rate / (self.density * self.width)
@@ -43,18 +43,18 @@ class Poiseuille(PlaneFlow):
 
     @property
     def rate_at_wall(self) -> float:
-        """Rate of shear at the plates in steady flow with a rheology [1/s]."""
+        """Shear rate at the plates in steady flow with a rheology [1/s]."""
         assert self.rheology is not None
         return rate_at_wall(self.rheology, self.viscosity, self.speed, self.width)
 
     @property
     def columns(self) -> int:
-        """Particles along a period of the channel."""
+        """Number of particles along one period of the channel."""
         return max(10, self.numerics.particles_across // 2)
 
     @property
     def particles(self) -> int:
-        """Particles of the liquid."""
+        """Number of liquid particles."""
         return self.columns * self.numerics.particles_across
 
     @property
@@ -64,23 +64,29 @@ class Poiseuille(PlaneFlow):
 
 
 def channel_points(scene: Poiseuille) -> Floats:
-    """Return the particles of the liquid at the start, shape (3, n) [m]."""
+    """Return the initial positions of the liquid particles, shape (3, n) [m]."""
     return lattice(np.arange(scene.columns), np.arange(scene.numerics.particles_across), scene.spacing)
 
 
 def plate_points(scene: Poiseuille, layers: int) -> Floats:
-    """Return the wall particles of both plates, shape (3, m) [m].
+    """Return the positions of the wall particles of both plates, shape (3, m) [m].
 
     Args:
         scene: Channel.
-        layers: Number of particles across a plate.
+        layers: Number of particle layers in each plate.
     """
     across, layer = scene.numerics.particles_across, np.arange(layers)
     return lattice(np.arange(scene.columns), np.concatenate((-1 - layer, across + layer)), scene.spacing)
 
 
 def exact_speeds(height: Floats, time: float, scene: Poiseuille) -> Floats:
-    """Return the exact speeds [m/s] at heights, shape (n,) [m], and a time [s]; with a rheology, of steady flow."""
+    """Return the exact speed profile of the channel, shape (n,) [m/s].
+
+    Args:
+        height: Heights above the lower plate, shape (n,) [m].
+        time: Time since the start [s]; ignored with a rheology, where the steady profile is returned.
+        scene: Channel.
+    """
     if scene.rheology is None:
         return exact.starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)
     law = scene.rheology

@@ -1,4 +1,4 @@
-"""Scene of a dam break: a column of liquid in the corner of a tank is released (Buchner 2002)."""
+"""Dam break: a column of liquid collapses in the corner of a tank (Buchner 2002)."""
 
 from math import sqrt
 from typing import Annotated
@@ -12,19 +12,19 @@ from reflowshock.particles.flows.lattice import lattice
 from reflowshock.particles.flows.result import Metrics
 from reflowshock.quantity import Quantity
 
-# Pressure at the sensor, in rho g H, above which the wave has reached it.
+# Sensor pressure, in rho g H, above which the wave counts as arrived.
 REACHED = 0.05
-# In sqrt(H / g): the plateau behind the impact, and when the wave that falls back strikes.
+# Time intervals in sqrt(H / g): the pressure plateau after the impact, and the second impact by the returning wave.
 PLATEAU, SECOND = (3.5, 5.0), (5.2, 7.0)
-# In sqrt(H / g): pressures are averaged over it before the second rise is sought.
+# Width of the moving average that smooths the pressure before the second rise is located, in sqrt(H / g).
 WINDOW = 0.1
 
 
 class DamBreak(PlaneFlow):
-    """Column of liquid in the corner of a tank that is released; a sensor in the opposite wall measures pressure.
+    """Column of liquid released in the corner of a tank, with a pressure sensor in the opposite wall.
 
-    Walls are smooth: liquid slides along them. Pressures are reported in rho g H, times in sqrt(H / g), with the
-    height H of the column.
+    The walls are smooth (free slip). Pressures are reported in rho g H and times in sqrt(H / g), where H is the height
+    of the column.
     """
 
     has_free_surface = True
@@ -38,27 +38,27 @@ class DamBreak(PlaneFlow):
 
     @property
     def length(self) -> float:
-        """The column's height [m]."""
+        """Height of the column [m]."""
         return self.height
 
     @property
     def fastest(self) -> float:
-        """Speed of a fall over the column's height, sqrt(2 g H) [m/s]."""
+        """Free-fall speed over the height of the column, sqrt(2 g H) [m/s]."""
         return sqrt(2.0 * self.gravity * self.height)
 
     @property
     def unit_of_time(self) -> float:
-        """sqrt(H / g) [s]."""
+        """Time unit sqrt(H / g) [s]."""
         return sqrt(self.height / self.gravity)
 
     @property
     def columns(self) -> int:
-        """Particles along the column's width."""
+        """Number of particles across the width of the column."""
         return max(1, round(self.width / self.spacing))
 
     @property
     def particles(self) -> int:
-        """Particles of the liquid."""
+        """Number of liquid particles."""
         return self.columns * self.numerics.particles_across
 
     @property
@@ -68,16 +68,16 @@ class DamBreak(PlaneFlow):
 
 
 def column_points(scene: DamBreak) -> Floats:
-    """Return the particles of the column at the start, shape (3, n) [m]."""
+    """Return the initial positions of the particles of the column, shape (3, n) [m]."""
     return lattice(np.arange(scene.columns), np.arange(scene.numerics.particles_across), scene.spacing)
 
 
 def tank_points(scene: DamBreak, layers: int) -> Floats:
-    """Return the wall particles of a tank without a lid, 4 columns high, shape (3, m) [m].
+    """Return the wall particles of an open tank, four times as high as the column, shape (3, m) [m].
 
     Args:
         scene: Dam break.
-        layers: Number of particles across a wall.
+        layers: Number of particle layers in each wall.
     """
     spacing, length = scene.spacing, tank_columns(scene)
     rows = np.arange(-layers, 4 * scene.numerics.particles_across)
@@ -92,7 +92,15 @@ def tank_columns(scene: DamBreak) -> int:
 
 
 def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
-    """Return arrivals and pressure of the wave and the rise of energy; nan for what lies after the end of the run."""
+    """Compute the metrics of a dam break: wave arrival, plateau pressure, second rise, and rise of the energy.
+
+    Args:
+        scene: Dam break.
+        history: Column name -> samples over time, SI values.
+
+    Returns:
+        Metric name -> (value, unit); nan for events after the end of the run.
+    """
     time = history["time"] / scene.unit_of_time
     pressure = history["sensor_pressure"] / (scene.density * scene.gravity * scene.height)
     reached = pressure > REACHED
@@ -108,14 +116,14 @@ def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
 
 
 def second_rise(time: Floats, pressure: Floats) -> float:
-    """Return the time of the second rise: midway from the plateau to the largest window mean after it.
+    """Return the time of the second pressure rise: halfway from the plateau to the largest smoothed pressure after it.
 
     Args:
         time: Times, shape (n,) [sqrt(H / g)].
         pressure: Pressure at the sensor, shape (n,) [rho g H].
 
     Returns:
-        Time in sqrt(H / g); nan where the history ends before.
+        Time in sqrt(H / g); nan if the history ends before.
     """
     if time[-1] < SECOND[1]:
         return float("nan")

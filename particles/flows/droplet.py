@@ -1,4 +1,4 @@
-"""Droplets by delta-SPH in space, their parameters in SI floats: free, at rest on a wall, or striking it."""
+"""Parameters (SI) of three-dimensional droplets for delta-SPH: free, at rest on a wall, or striking a wall."""
 
 from math import cos, pi, sin, sqrt
 from typing import Annotated, Literal
@@ -13,41 +13,40 @@ from reflowshock.quantity import Quantity
 
 RIGHT_ANGLE = 0.5 * pi
 PARTICLES_PER_DIAMETER = 16.0
-# Over the largest speed expected: less, and densities change by more than about 2 % as the drop strikes.
+# Smallest ratio of sound speed to largest expected speed; below it, densities change by more than 2 % at the impact.
 LEAST_SOUND_SPEED = 8.0
-# Followed where no duration is given. An impact: past its largest width, reached before 4 D / U up to a Weber number of
-# 300, into the recoil. Else five of Rayleigh's periods, 0.785 sqrt(rho D^3 / gamma) each.
+# Default durations in units of time. Impact: until the recoil; up to a Weber number of 300 the largest width is reached
+# before 4 D / U. Otherwise: five Rayleigh periods of 0.785 sqrt(rho D^3 / gamma) each.
 FOLLOWED_IMPACT, FOLLOWED_REST = 6.0, 4.0
 
 WallAngle = Annotated[float | None, Quantity("deg"), Field(ge=pi / 6.0 - 1e-9, le=5.0 * pi / 6.0 + 1e-9)]
 
-
-# 1 / sqrt(We): with less, surface tension changes the spread of an impact by less than that.
+# Threshold of 1 / sqrt(We): below it, surface tension changes the spread of an impact by less than 1 %.
 LITTLE_TENSION = 0.01
 
 
 class DropletNumerics(MethodNumerics):
-    """How a droplet is computed: with particles a spacing apart at the start, or so many across the diameter."""
+    """Numerical parameters of a droplet; the resolution is a spacing or a number of particles across the diameter."""
 
     spacing: Annotated[float | None, Quantity("um")] = Field(None, gt=0)
     particles_per_diameter: float | None = Field(None, ge=8, le=200)
 
 
 class DropletEffects(FlowSwitches):
-    """What acts besides pressure: decided from Reynolds, Weber and Bond number (auto), or by the user."""
+    """Switches of the effects on a droplet: decided from Reynolds, Weber and Bond number (auto), or set by the user."""
 
     surface_tension: Switch = "auto"
     gravity: Switch = "auto"
 
 
 class Droplet(FlowScene):
-    """A droplet.
+    """A droplet: striking a wall, at rest on a wall, or free.
 
-    With a speed, or with Weber and Reynolds number, it strikes a wall, as a sphere that just touches it; then the
-    contact angle is 90 degrees where none is given. With a contact angle alone it starts as a half sphere on the wall
-    and comes to rest. With neither it is free, and starts as a sphere or a cube. Speed and viscosity may follow from
-    the Weber number rho U^2 D / gamma and the Reynolds number rho U D / mu. Between receding and advancing angle the
-    wall holds the contact line; where one of them is not given it is the contact angle.
+    With a speed, or with Weber and Reynolds number, the droplet strikes a wall; it starts as a sphere that just touches
+    the wall, and the default contact angle is 90 degrees. With only a contact angle, it starts as a half sphere on the
+    wall and comes to rest. With neither, it is free and starts as a sphere or a cube. The Weber number
+    rho U^2 D / gamma may replace the speed, and the Reynolds number rho U D / mu the viscosity. The contact line is
+    pinned between the receding and the advancing angle; each of them defaults to the contact angle.
     """
 
     dimension = 3
@@ -69,7 +68,7 @@ class Droplet(FlowScene):
 
     @property
     def impact_speed(self) -> float:
-        """With which it strikes [m/s]; 0 where it does not."""
+        """Speed of the impact [m/s]; 0 without an impact."""
         if self.weber is not None:
             return sqrt(self.weber * self.surface_tension / (self.density * self.diameter))
         return self.speed or 0.0
@@ -81,29 +80,29 @@ class Droplet(FlowScene):
 
     @property
     def liquid_viscosity(self) -> float:
-        """As given, or of the Reynolds number [Pa s]."""
+        """Viscosity as specified, or from the Reynolds number [Pa s]."""
         if self.reynolds is None:
             return self.viscosity
         return self.density * self.impact_speed * self.diameter / self.reynolds
 
     @property
     def has_wall(self) -> bool:
-        """Whether it meets one."""
+        """Whether the droplet touches a wall."""
         return self.contact_angle is not None or self.impact_speed > 0.0
 
     @property
     def angle(self) -> float:
-        """The contact angle [rad]."""
+        """Contact angle [rad]."""
         return RIGHT_ANGLE if self.contact_angle is None else self.contact_angle
 
     @property
     def advancing(self) -> float:
-        """The contact angle where the contact line advances [rad]."""
+        """Advancing contact angle [rad]."""
         return self.angle if self.advancing_angle is None else self.advancing_angle
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """Cosines of the advancing and the receding angle; None where the contact angle is one."""
+        """Cosines of the advancing and the receding angle; None without hysteresis."""
         if self.advancing_angle is None and self.receding_angle is None:
             return None
         receding = self.angle if self.receding_angle is None else self.receding_angle
@@ -111,48 +110,48 @@ class Droplet(FlowScene):
 
     @property
     def length(self) -> float:
-        """The diameter [m]."""
+        """Diameter [m]."""
         return self.diameter
 
     @property
     def volume(self) -> float:
-        """Of the droplet [m^3]."""
+        """Volume of the droplet [m^3]."""
         return pi * self.diameter**3 / 6.0
 
     @property
     def fastest(self) -> float:
-        """Of the impact, or that of waves of surface tension, sqrt(2 gamma / (rho R)) [m/s]."""
+        """Larger of the impact speed and the capillary wave speed sqrt(2 gamma / (rho R)) [m/s]."""
         return max(self.impact_speed, sqrt(4.0 * self.surface_tension / (self.density * self.diameter)))
 
     @property
     def spacing(self) -> float:
-        """Of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         if self.numerics.spacing is not None:
             return self.numerics.spacing
         return self.diameter / (self.numerics.particles_per_diameter or PARTICLES_PER_DIAMETER)
 
     @property
     def particles(self) -> int:
-        """Particles of the liquid, nearly."""
+        """Approximate number of liquid particles."""
         return max(1, round(self.volume / self.spacing**3))
 
     @property
     def until(self) -> float:
-        """How long it is followed [s]."""
+        """Duration of the simulation [s]."""
         if self.duration is not None:
             return self.duration
         return (FOLLOWED_IMPACT if self.impact_speed else FOLLOWED_REST) * self.unit_of_time
 
     @property
     def unit_of_time(self) -> float:
-        """D / U of an impact, else sqrt(rho D^3 / gamma) [s]."""
+        """Time unit: D / U for an impact, otherwise sqrt(rho D^3 / gamma) [s]."""
         if self.impact_speed:
             return self.diameter / self.impact_speed
         return sqrt(self.density * self.diameter**3 / self.surface_tension)
 
     @property
     def laplace_pressure(self) -> float:
-        """Of the sphere, 4 gamma / D [Pa]."""
+        """Laplace pressure of the sphere, 4 gamma / D [Pa]."""
         return 4.0 * self.surface_tension / self.diameter
 
     @property
@@ -180,7 +179,7 @@ class DropletTension(Effect[Droplet]):
 
     name = "droplet_tension"
     stage = "particles"
-    adds = "-d(gamma (A_free - cos(theta) A_wet))/dx, shared among the particles beside the surface"
+    adds = "-d(gamma (A_free - cos(theta) A_wet))/dx, distributed to the particles next to the surface"
     number = "1 / sqrt(We), We = rho U^2 D / gamma: square root of surface energy over kinetic energy"
     threshold = LITTLE_TENSION
     influence = "the number, for the spread of an impact; without an impact nothing else acts"
@@ -189,7 +188,7 @@ class DropletTension(Effect[Droplet]):
     source = "Pasandideh-Fard et al. 1996: D_max / D = sqrt((We + 12) / (3 (1 - cos theta) + 4 We / sqrt(Re)))"
 
     def decide(self, scene: Droplet) -> Decision:
-        """By the Weber number, or as the user says."""
+        """Decide by the Weber number, unless the user sets the switch."""
         number = min(1.0 / sqrt(scene.weber_number), 1.0) if scene.weber_number else 1.0
         why = f"Weber number {scene.weber_number:.3g}" if scene.impact_speed else "nothing else moves the drop"
         switch = scene.effects.surface_tension
@@ -212,7 +211,7 @@ class DropletGravity(Effect[Droplet]):
     source = "Bashforth & Adams 1883, tables"
 
     def decide(self, scene: Droplet) -> Decision:
-        """By the Bond number, or as the user says; a free drop would only fall."""
+        """Decide by the Bond number, unless the user sets the switch; off for a free drop, which would only fall."""
         bond, switch = scene.bond, scene.effects.gravity
         if not scene.has_wall:
             return decision(False, "no wall: the drop would fall as a whole", 0.0)
@@ -226,6 +225,10 @@ DROPLET_EFFECTS = (DropletTension(), DropletGravity())
 
 
 def cap(angle: float) -> tuple[float, float]:
-    """Return base and height of a spherical cap over the diameter of the sphere of its volume."""
+    """Return base diameter and height of a spherical cap, divided by the diameter of the sphere of equal volume.
+
+    Args:
+        angle: Contact angle [rad].
+    """
     radius = 0.5 * (4.0 / ((2.0 + cos(angle)) * (1.0 - cos(angle)) ** 2)) ** (1.0 / 3.0)
     return 2.0 * radius * sin(angle), radius * (1.0 - cos(angle))

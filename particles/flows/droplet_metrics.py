@@ -11,26 +11,27 @@ from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.flows.result import Metrics
 from reflowshock.particles.reference.impact_spread import of_measured, wildeman
 
-# In spacings, and over the height: where the profile of a drop on a wall is read. Next to the wall it is rounded.
+# Range of the profile that is fitted: from this many spacings above the wall, where the profile is rounded, to this
+# fraction of the height.
 FOOT, SHOULDER = 1.5, 0.7
 FEWEST = 12
-# Over the diameter, times Re^(2/5): thickness of the film that an impact leaves (Roisman 2009).
+# Residual film thickness of an impact over the diameter, times Re^(2/5) (Roisman 2009).
 RESIDUAL_FILM = 0.79
 
 
 def impact_texts(scene: Droplet, history: Mapping[str, Floats]) -> dict[str, str]:
-    """Return texts on an impact: its outcome, the thickness of its film, and the expected spread if known."""
+    """Describe an impact: name -> text on its outcome, the film thickness, and the expected spread if known."""
     return {"outcome": outcome(history), "film": _film_text(scene)} | _expected_texts(scene)
 
 
 def _film_text(scene: Droplet) -> str:
-    """Return a text on the thickness of the film of an impact and the particles that resolve it."""
+    """Describe the film thickness of an impact and the resolution that it requires."""
     film = RESIDUAL_FILM / scene.reynolds_number**0.4
     return f"{film:.2g} D thick; {2.0 / film:.0f} particles a diameter put two across it"
 
 
 def _expected_texts(scene: Droplet) -> dict[str, str]:
-    """Return a text on the spread of measured and of computed drops; empty where no correlation holds."""
+    """Describe the spread predicted by correlations; empty if no correlation applies."""
     numbers = scene.weber_number, scene.reynolds_number, scene.advancing
     if not (between := of_measured(*numbers)):
         return {}
@@ -39,14 +40,23 @@ def _expected_texts(scene: Droplet) -> dict[str, str]:
 
 
 def drop_height(scene: Droplet, points: Floats) -> float:
-    """Return the height of a surface, shape (m, 3), above the wall, or of a free drop from end to end [m]."""
+    """Return the height of a drop above the wall, or the extent of a free drop along z [m].
+
+    Args:
+        scene: Droplet.
+        points: Vertices of the surface, shape (m, 3) [m].
+    """
     return float(points[:, 2].max() if scene.has_wall else np.ptp(points[:, 2]))
 
 
 def base_width(points: Floats, spacing: float) -> float:
-    """Return the width of a drop on the wall [m]: its squared radius, a parabola in height for a cap, at the wall.
+    """Return the base diameter of a drop [m], extrapolated to the wall; nan if the profile has too few points.
 
-    The width is nan where too few points of the profile are available.
+    The squared radius of a spherical cap is a parabola in height, which is fitted to the profile.
+
+    Args:
+        points: Vertices of the surface, shape (m, 3) [m].
+        spacing: Spacing of the particles [m].
     """
     height = points[:, 2]
     read = (height > FOOT * spacing) & (height < SHOULDER * height.max())
@@ -70,7 +80,7 @@ def outcome(history: Mapping[str, Floats]) -> str:
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
-    """Return the metrics whose values at rest are known: of a free sphere, of a cap of one angle without weight."""
+    """Return the names of the metrics with an exact value at rest, for a free sphere or a weightless spherical cap."""
     if not scene.has_wall:
         return ("pressure_error", "roundness")
     weighs = decide_flow(scene)["droplet_gravity"]["on"]
@@ -78,7 +88,7 @@ def rest_metrics(scene: Droplet) -> tuple[str, ...]:
 
 
 def droplet_metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
-    """Return the metrics of a droplet: means over the last tenth of the time, in which it should be at rest.
+    """Compute the metrics of a droplet; values at rest are means over the last tenth of the simulated time.
 
     ``surface_volume_drift`` is the largest change of the enclosed volume, with the spray, at any sample: mesh
     smoothing, every few steps, resets it to the volume of the particles. ``parts_shed`` counts events in which one or

@@ -1,4 +1,4 @@
-"""Start of a droplet: particles of a cubic lattice in the surface of a sphere, a cube or a half sphere."""
+"""Initial shape of a droplet: a cubic lattice of particles inside a triangulated sphere, cube or half sphere."""
 
 from math import pi, sqrt
 
@@ -13,11 +13,15 @@ from reflowshock.particles.surface.level_set import LevelSet, extract_surface, r
 
 
 def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indices], float]:
-    """Return the particles of a droplet, shape (3, n) [m], its surface, and the spacing of its volume [m].
+    """Create the particles and the surface of a droplet.
 
     Args:
         scene: Droplet.
-        edge: Edge of the triangles in spacings.
+        edge: Edge length of the triangles in spacings.
+
+    Returns:
+        Positions of the particles, shape (3, n) [m]; vertices, shape (m, 3) [m], and triangles of the surface; and the
+        spacing at which the particles have the volume of the droplet [m].
     """
     radius, side = 0.5 * scene.diameter, scene.volume ** (1.0 / 3.0)
     across = int(np.ceil(2.0 * scene.diameter / scene.spacing)) + 1
@@ -45,7 +49,7 @@ def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indi
 
 
 def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
-    """Return a triangulated sphere: the hull of points on a spiral, scaled to the volume of the sphere."""
+    """Triangulate a sphere: the convex hull of points on a spiral, scaled to the exact volume."""
     count = int(4.0 * pi * radius**2 / (0.5 * sqrt(3.0) * edge**2))
     turn, height = pi * (1.0 + sqrt(5.0)) * (np.arange(count) + 0.5), 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     across = np.sqrt(1.0 - height**2)
@@ -59,7 +63,7 @@ def _sphere(radius: float, edge: float) -> tuple[Floats, Indices]:
 
 
 def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
-    """Return a triangulated cube with rounded edges."""
+    """Triangulate a cube with rounded edges."""
     grid = Grid.around(width * np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), edge)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     level = LevelSet(grid, np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z)) - 0.5 * width)
@@ -67,7 +71,7 @@ def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
 
 
 def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indices]:
-    """Return the upper half of a triangulated sphere, its edge on the wall."""
+    """Return the upper half of a triangulated sphere, with its boundary on the wall."""
     radius = float(np.linalg.norm(points, axis=1).mean())
     low = np.abs(points[:, 2]) < 0.4 * edge
     points[low, 2] = 0.0
@@ -75,7 +79,7 @@ def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indi
     upper = triangles[(points[triangles, 2] >= 0.0).all(axis=1)]
     used, numbers = np.unique(upper, return_inverse=True)
     points, triangles = points[used], numbers.reshape(-1, 3).astype(np.int32)
-    for ring in boundary_loops(triangles):  # of some triangles all corners are too high to be on it by now
+    for ring in boundary_loops(triangles):  # some boundary vertices are still above the wall
         points[ring, 2] = 0.0
         points[ring] *= radius / np.linalg.norm(points[ring], axis=1)[:, None]
     return points, triangles

@@ -1,4 +1,4 @@
-"""Base of the scenes of flowing liquids: density, viscosity, size, largest speed, duration and resolution."""
+"""Base classes of SPH scenes: density, viscosity, size, largest speed, duration and resolution."""
 
 from abc import abstractmethod
 from typing import Annotated, ClassVar
@@ -13,13 +13,13 @@ from reflowshock.quantity import Quantity
 
 
 class FlowSwitches(Parameters):
-    """Switches of effects besides pressure: decided from the Reynolds number (auto), or by the user."""
+    """Switches of the optional effects: decided from the Reynolds number (auto), or set by the user."""
 
     viscosity: Switch = "auto"
 
 
 class FlowScene(Parameters):
-    """Base of all flows: a liquid, and how it is computed; its viscosity may depend on the rate of shear.
+    """Base of all flows: liquid properties, effects and numerical parameters.
 
     Attributes:
         dimension: Dimension of the flow, 2 or 3.
@@ -38,17 +38,17 @@ class FlowScene(Parameters):
     @property
     @abstractmethod
     def length(self) -> float:
-        """Length that the particles across divide [m]."""
+        """Characteristic length [m]."""
 
     @property
     @abstractmethod
     def fastest(self) -> float:
-        """Largest speed expected [m/s]."""
+        """Largest expected speed [m/s]."""
 
     @property
     @abstractmethod
     def particles(self) -> int:
-        """Particles of the liquid."""
+        """Number of liquid particles."""
 
     @property
     @abstractmethod
@@ -58,15 +58,15 @@ class FlowScene(Parameters):
     @property
     @abstractmethod
     def spacing(self) -> float:
-        """Spacing of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
 
     @property
     def unit_scene(self) -> "FlowScene":
-        """Scene whose numbers decide on the effects of every flow."""
+        """Scene whose dimensionless numbers decide on the common effects."""
         return self
 
     def decide_own_effects(self) -> dict[str, Decision]:
-        """Decide on the effects that only this kind of flow has."""
+        """Decide on the effects that only this kind of flow has: name -> decision."""
         return {}
 
     @property
@@ -76,28 +76,28 @@ class FlowScene(Parameters):
 
     @property
     def reynolds_number(self) -> float:
-        """Reynolds number of length and largest speed."""
+        """Reynolds number from the characteristic length and the largest speed."""
         return self.density * self.fastest * self.length / self.liquid_viscosity
 
     @property
     def tension(self) -> float:
-        """Surface tension that acts on the liquid [N/m]; 0 where none does."""
+        """Surface tension of the liquid [N/m]; 0 if it is neglected."""
         return 0.0
 
     @property
     def liquid_viscosity(self) -> float:
-        """Viscosity of the liquid [Pa s]; with a rheology, the viscosity in its law."""
+        """Viscosity of the liquid [Pa s]; with a rheology, the reference viscosity of its law."""
         return self.viscosity
 
     @property
     def largest_viscosity(self) -> float:
-        """Largest viscosity from rest up to the rate of shear of the largest speed over a spacing [Pa s]."""
+        """Largest viscosity at shear rates between zero and the largest speed over a spacing [Pa s]."""
         if self.rheology is None:
             return self.liquid_viscosity
         return self.rheology.largest(self.liquid_viscosity, self.fastest / self.spacing)
 
     def expected_time_step(self, is_viscous: bool) -> float:
-        """Return the time step [s] that the flow is expected to take, with or without viscosity."""
+        """Return the expected time step [s], with or without viscosity."""
         length, viscosity = self.numerics.smoothing_length * self.spacing, 0.0
         if is_viscous:
             viscosity = self.largest_viscosity * (CENTRAL if self.has_free_surface else 1.0)
@@ -105,7 +105,7 @@ class FlowScene(Parameters):
 
 
 class PlaneFlow(FlowScene):
-    """Flow in a plane, with a number of particles across it."""
+    """Two-dimensional flow, resolved by a number of particles across its characteristic length."""
 
     dimension = 2
 
@@ -113,5 +113,5 @@ class PlaneFlow(FlowScene):
 
     @property
     def spacing(self) -> float:
-        """Spacing of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         return self.length / self.numerics.particles_across

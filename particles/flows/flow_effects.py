@@ -1,4 +1,4 @@
-"""The effects of flows by delta-SPH, decided from their Reynolds number. No numerical library is loaded here."""
+"""Effects of delta-SPH flows, decided from the Reynolds number; loads no numerical library."""
 
 from abc import abstractmethod
 from math import sqrt
@@ -9,7 +9,7 @@ from reflowshock.parameters import changed
 from reflowshock.particles.flows.flow import FlowScene
 from reflowshock.particles.flows.sph_numerics import ARTIFICIAL_VISCOSITY
 
-# Thickness of a boundary layer, over the length of the flow: with less, viscosity is left out where walls are smooth.
+# Boundary layer thickness over the length of the flow, below which viscosity is neglected.
 THIN_LAYER = 0.01
 
 
@@ -20,7 +20,7 @@ class FlowEffect(Effect[FlowScene]):
 
     @abstractmethod
     def decide(self, scene: FlowScene) -> Decision:
-        """Decide from the flow's numbers, or as the user says."""
+        """Decide by the dimensionless numbers of the flow, unless the user sets the switch."""
 
 
 class FlowViscosity(FlowEffect):
@@ -36,7 +36,7 @@ class FlowViscosity(FlowEffect):
     source = "Morris et al. 1997; Cleary 1998"
 
     def decide(self, scene: FlowScene) -> Decision:
-        """By the boundary layer, or as the user says."""
+        """Decide by the boundary layer thickness, unless the user sets the switch."""
         layer = 1.0 / sqrt(scene.reynolds_number)
         why = f"Reynolds number {scene.reynolds_number:.3g}: layers of {100.0 * layer:.2g} % of the length"
         switch = scene.effects.viscosity
@@ -46,7 +46,7 @@ class FlowViscosity(FlowEffect):
 
 
 class ArtificialViscosity(FlowEffect):
-    """Viscosity of the method, which smooths shocks of liquid that has none of its own."""
+    """Artificial viscosity, which stabilises the flow of an inviscid liquid."""
 
     name = "artificial_viscosity"
     adds = "alpha h c0 (rho_0 / rho) sum pi_ij grad W V: nu = alpha h c0 / 8 in a plane"
@@ -57,18 +57,18 @@ class ArtificialViscosity(FlowEffect):
     source = "Monaghan 1992; Antuono et al. 2012"
 
     def decide(self, scene: FlowScene) -> Decision:
-        """Where viscosity does not act, or as the user says."""
-        given, viscous = scene.numerics.artificial_viscosity, FlowViscosity().decide(scene)["on"]
+        """Enable it where viscosity is off, unless the user sets alpha."""
+        user_alpha, viscous = scene.numerics.artificial_viscosity, FlowViscosity().decide(scene)["on"]
         alpha = artificial_viscosity(scene)
-        own = scene.numerics.smoothing_length * scene.spacing * scene.sound * alpha / 8.0
-        influence = min(own * scene.until / scene.length**2, 1.0)
-        if given is not None:
-            return decision(given > 0.0, f"numerics.artificial_viscosity = {given:g}", influence)
+        kinematic_viscosity = scene.numerics.smoothing_length * scene.spacing * scene.sound * alpha / 8.0
+        influence = min(kinematic_viscosity * scene.until / scene.length**2, 1.0)
+        if user_alpha is not None:
+            return decision(user_alpha > 0.0, f"numerics.artificial_viscosity = {user_alpha:g}", influence)
         return decision(not viscous, "viscosity acts" if viscous else f"no viscosity acts: {alpha:g}", influence)
 
 
 class ShearDependence(FlowEffect):
-    """Viscosity that depends on the rate of shear."""
+    """Shear-rate dependent viscosity."""
 
     name = "shear_dependent_viscosity"
     adds = "mu(sqrt(2 D : D)) in place of mu: power law or Carreau"
@@ -78,15 +78,15 @@ class ShearDependence(FlowEffect):
     source = "Carreau 1972; Bird, Armstrong, Hassager 1987"
 
     def decide(self, scene: FlowScene) -> Decision:
-        """Where the case gives a rheology, and viscosity acts."""
-        given, viscous = scene.rheology, FlowViscosity().decide(scene)["on"]
-        if given is None:
+        """Enable it where the case specifies a rheology and viscosity is on."""
+        rheology, viscous = scene.rheology, FlowViscosity().decide(scene)["on"]
+        if rheology is None:
             return decision(False, "viscosity is constant: no rheology is given")
-        why = f"{given.law.replace('_', ' ')}, exponent {given.exponent:g}"
+        why = f"{rheology.law.replace('_', ' ')}, exponent {rheology.exponent:g}"
         return decision(viscous, why if viscous else f"{why}, but viscosity does not act")
 
     def other_way(self, case: Any, acts: bool) -> Any | None:
-        """Return a case of constant viscosity; where the case gives no rheology, none is known."""
+        """Return the case with constant viscosity; None if the effect is off, since no rheology is specified."""
         return changed(case, f"{case.kind}.rheology", None) if acts else None
 
 
@@ -94,13 +94,13 @@ FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 
 
 def artificial_viscosity(scene: FlowScene) -> float:
-    """Return alpha."""
-    given = scene.numerics.artificial_viscosity
-    if given is not None:
-        return given
+    """Return the coefficient alpha of the artificial viscosity: set by the user, or the default."""
+    user_alpha = scene.numerics.artificial_viscosity
+    if user_alpha is not None:
+        return user_alpha
     return 0.0 if FlowViscosity().decide(scene)["on"] else ARTIFICIAL_VISCOSITY
 
 
 def decide_flow(scene: FlowScene) -> dict[str, Decision]:
-    """Decide on all effects of a flow: those of every flow, then those of its kind."""
+    """Decide on all effects of a flow, the common and the specific ones: name -> decision."""
     return decided(FLOW_EFFECTS, scene.unit_scene) | scene.decide_own_effects()

@@ -1,4 +1,4 @@
-"""Freezing of liquid on a cold plate: its parameters in SI units, and the exact growth of a frozen layer (Neumann)."""
+"""Freezing of liquid on a cold plate: parameters (SI) and Neumann's exact growth of the frozen layer."""
 
 from math import erf, erfc, exp, inf, pi, sqrt
 from typing import Annotated
@@ -13,11 +13,11 @@ HALVINGS = 60
 
 
 class Freezing(Parameters):
-    """Liquid that freezes on a cold plate: a particle stands still once half of its latent heat is gone.
+    """Liquid that freezes on a cold plate; a particle becomes immobile once it has lost half of its latent heat.
 
-    Drops land with `temperature`. The plate keeps its own where the liquid touches it: that of a contact with a plate
-    that conducts badly lies between the two. Liquid and solid conduct and hold heat alike, and none is lost to the
-    air. What has frozen does not melt again.
+    Drops land with ``temperature``. The plate stays at ``substrate_temperature``; for a poorly conducting plate, use
+    the contact temperature, which lies between the two. Liquid and solid have equal conductivity and heat capacity.
+    Heat loss to the air and remelting are neglected.
     """
 
     melting_point: Temperature = Field(gt=0)
@@ -28,7 +28,7 @@ class Freezing(Parameters):
     conductivity: Annotated[float, Quantity("W/m/K")] = Field(gt=0)
 
     def diffusivity(self, density: float) -> float:
-        """Of heat, k / (rho c) [m^2/s]."""
+        """Return the thermal diffusivity k / (rho c) [m^2/s] at a density [kg/m^3]."""
         return self.conductivity / (density * self.heat_capacity)
 
     @property
@@ -38,21 +38,21 @@ class Freezing(Parameters):
 
     @property
     def growth(self) -> float:
-        """Lambda of a frozen layer that is 2 lambda sqrt(a t) thick on a plate below much liquid; 0 where none grows.
+        """Coefficient lambda of the frozen layer, 2 lambda sqrt(a t) thick below deep liquid; 0 if none grows.
 
-        Neumann's solution, with a the diffusivity of heat: St / (exp(l^2) erf l) = sqrt(pi) l + S / (exp(l^2) erfc l),
-        S = c (T - T_m) / L of the liquid.
+        Neumann's solution, with the thermal diffusivity a: St / (exp(l^2) erf l) = sqrt(pi) l + S / (exp(l^2) erfc l),
+        where S = c (T - T_m) / L of the liquid.
         """
         excess = self.heat_capacity * (self.temperature - self.melting_point) / self.latent_heat
         low, high = 0.0, 5.0
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            steep = exp(-(middle**2))
-            grows = self.stefan * steep / erf(middle) > sqrt(pi) * middle + excess * steep / erfc(middle)
+            decay = exp(-(middle**2))
+            grows = self.stefan * decay / erf(middle) > sqrt(pi) * middle + excess * decay / erfc(middle)
             low, high = (middle, high) if grows else (low, middle)
         return low if self.stefan > 0.0 else 0.0
 
     def time_for(self, thickness: float, density: float) -> float:
-        """Time in which a layer of a thickness [m] freezes below much liquid [s]; inf where none does."""
+        """Return the time in which a layer of a thickness [m] freezes below deep liquid [s]; inf if none freezes."""
         growth = self.growth
         return thickness**2 / (4.0 * growth**2 * self.diffusivity(density)) if growth else inf

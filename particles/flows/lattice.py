@@ -7,12 +7,12 @@ from reflowshock.arrays import Floats
 
 
 def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: float) -> Floats:
-    """Return the points of a square lattice in the plane of x and z, shape (3, n) [m].
+    """Return the points of a square lattice in the xz plane, shape (3, n) [m].
 
     Args:
         columns: Indices along x.
         rows: Indices along z.
-        spacing: Distance of neighbouring points [m].
+        spacing: Distance between neighbouring points [m].
     """
     x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")
     return spacing * np.stack((x.ravel(), np.zeros(x.size), z.ravel()))

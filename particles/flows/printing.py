@@ -1,4 +1,4 @@
-"""Parameters of a printed part in SI floats: drops, one after the other, layer on layer, that cure or freeze."""
+"""Parameters (SI) of drop-on-demand printing: drops deposited one by one in layers, which cure or freeze."""
 
 from functools import lru_cache
 from math import cos, inf, pi, sin, sqrt
@@ -13,18 +13,18 @@ from reflowshock.particles.flows.flow import FlowScene
 from reflowshock.particles.flows.freezing import Freezing
 from reflowshock.quantity import Quantity
 
-# sqrt(rho D^3 / gamma) that a drop is followed at most after it has landed, if it does not cure before.
+# Longest simulated time after a drop has landed, in sqrt(rho D^3 / gamma), if it does not cure earlier.
 SETTLING = 2.0
-# Beside liquid, in diameters: how far it may get before the next drop lands or cures.
+# Margin around the liquid in diameters: how far it may spread before the next drop lands or cures.
 WITHIN_REACH = 1.0
-# Share of the height of a drop that freezes before the next one lands: with less freezing is left out.
+# Fraction of the height of a drop that freezes before the next one lands, below which freezing is neglected.
 LITTLE_FROZEN = 0.01
 
 
 class Cure(Parameters):
-    """Light that cures the ink from above, all the time: a particle is solid once it has got the dose.
+    """Continuous light from above that cures the ink; a particle is solid once it has received the dose.
 
-    Within the ink the light dies out over the depth (Beer and Lambert); without one it reaches all of it alike.
+    The light decays in the ink over the depth (Beer-Lambert law); without a depth, the intensity is uniform.
     """
 
     intensity: Annotated[float, Quantity("W/m^2")] = Field(1.0e5, gt=0)
@@ -33,27 +33,27 @@ class Cure(Parameters):
 
 
 class PrintingEffects(DropletEffects):
-    """What acts besides pressure, and whether drops freeze: decided from how much of one freezes, or by the user."""
+    """Switches of the effects on printed drops, freezing included: decided automatically (auto), or set by the user."""
 
     freezing: Switch = "auto"
 
 
 class PrintingNumerics(DropletNumerics):
-    """How a printed part is computed: as droplets are; and for how long liquid is followed after the last drop.
+    """Numerical parameters of a printed part: those for droplets, and the simulated time after the last drop.
 
-    `settling` is in sqrt(rho D^3 / gamma). What is then liquid is taken to rest until it cures or a drop lands.
+    ``settling`` is in sqrt(rho D^3 / gamma). Afterwards, liquid is assumed to rest until it cures or a drop lands.
     """
 
     settling: float = Field(SETTLING, ge=0.5, le=100)
 
 
 class Printing(FlowScene):
-    """Drops of ink that are printed on a plate and on each other: columns along x, rows along y, layers upwards.
+    """Drops of ink printed on a plate and on each other: columns along x, rows along y, layers upwards.
 
-    Drops of a layer are printed row by row; "serpentine" turns at the end of each, "interleaved" takes every other
-    place first. The plate is tilted about y by `substrate_angle`: drops come down aslant. The contact angle is that on
-    the plate and on cured ink alike. Light cures the drops, or they freeze; then one is followed until it is solid, and
-    cools down to the plate before the next one lands.
+    The drops of a layer are printed row by row; "serpentine" reverses every second row, and "interleaved" prints every
+    second position first. The plate is tilted about y by ``substrate_angle``, so drops arrive obliquely. The contact
+    angle is the same on the plate and on cured ink. The drops are cured by light, or they freeze; a freezing drop is
+    simulated until it is solid, and cools to the temperature of the plate before the next drop lands.
     """
 
     dimension = 3
@@ -83,58 +83,58 @@ class Printing(FlowScene):
 
     @property
     def light(self) -> Cure:
-        """What cures drops that do not freeze."""
+        """Light that cures drops that do not freeze."""
         return self.cure or Cure()
 
     @property
     def drop(self) -> Droplet:
-        """One of its drops, as if it were alone."""
+        """A single isolated drop."""
         return _drop_of(self)
 
     @property
     def drops(self) -> int:
-        """Their number."""
+        """Total number of drops."""
         return self.columns * self.rows * self.layers
 
     @property
     def drops_of_layer(self) -> int:
-        """Drops in a layer."""
+        """Number of drops in a layer."""
         return self.columns * self.rows
 
     @property
     def velocity(self) -> tuple[float, float, float]:
-        """With which drops land [m/s]."""
+        """Velocity of the drops when they land, (x, y, z) [m/s]."""
         return self.speed * sin(self.substrate_angle), 0.0, -self.speed * cos(self.substrate_angle)
 
     @property
     def base(self) -> float:
-        """Width on the plate of one drop at rest [m]."""
+        """Base diameter of one drop at rest on the plate [m]."""
         return cap(self.contact_angle)[0] * self.length
 
     @property
     def cure_time(self) -> float:
-        """In which ink at the light cures, or in which a drop freezes, the mean over the layers [s]."""
+        """Time in which ink at the surface cures, or mean time in which one layer freezes [s]."""
         if self.freezes and self.freezing is not None:
             return self.freezing.time_for(self._height, self.density) / self.layers
         return self.light.dose / self.light.intensity
 
     @property
     def share_frozen(self) -> float:
-        """How much of the height of a drop freezes before the next one lands, 0 to 1."""
+        """Fraction of the height of a drop that freezes before the next one lands, 0 to 1."""
         if self.freezing is None:
             return 0.0
         return min(1.0, sqrt(self.delay / self.freezing.time_for(self._height / self.layers, self.density)))
 
     @property
     def freezes(self) -> bool:
-        """Whether drops freeze, and no light cures them."""
+        """Whether drops freeze instead of being cured by light."""
         if self.freezing is None or self.effects.freezing != "auto":
             return self.freezing is not None and self.effects.freezing == "on"
         return self.share_frozen > LITTLE_FROZEN
 
     @property
     def cooling_time(self) -> float:
-        """In which a drop on top freezes and cools down to the plate, nearly [s]."""
+        """Approximate time in which a drop of the top layer freezes and cools to the plate temperature [s]."""
         if self.freezing is None:
             return inf
         diffusion = self._height**2 / self.freezing.diffusivity(self.density)
@@ -142,18 +142,18 @@ class Printing(FlowScene):
 
     @property
     def _height(self) -> float:
-        """Of all layers, were their drops caps [m]."""
+        """Height of all layers if each drop were a spherical cap [m]."""
         return self.layers * cap(self.contact_angle)[1] * self.length
 
     @property
     def settling_time(self) -> float:
-        """For which liquid is followed after the last drop [s]."""
+        """Simulated time after the last drop [s]."""
         drop = self.drop
         return self.numerics.settling * (drop.density * drop.diameter**3 / drop.surface_tension) ** 0.5
 
     @property
     def followed(self) -> float:
-        """For how long at most one drop is followed [s]."""
+        """Longest simulated time of one drop [s]."""
         if self.freezes:
             return self.cure_time
         return min(self.settling_time, self.cure_time, self.delay if self.cure_time > self.delay else self.cure_time)
@@ -165,37 +165,37 @@ class Printing(FlowScene):
 
     @property
     def fastest(self) -> float:
-        """As of one drop [m/s]."""
+        """Largest expected speed of one drop [m/s]."""
         return self.drop.fastest
 
     @property
     def spacing(self) -> float:
-        """Of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         return self.drop.spacing
 
     @property
     def particles(self) -> int:
-        """Particles of all drops, nearly."""
+        """Approximate number of particles of all drops."""
         return self.drops * self.drop.particles
 
     @property
     def until(self) -> float:
-        """All the time in which drops are followed [s]."""
+        """Total simulated time of all drops [s]."""
         return self.drops * self.followed
 
     def places(self) -> list[tuple[float, float]]:
-        """Where the drops of a layer land, in their order: x and y [m], their mean in the origin."""
+        """Return x and y [m] of the drops of a layer in the order of printing, centred about the origin."""
         grid = [(column, row) for row in range(self.rows) for column in range(self.columns)]
         if self.order == "serpentine":
             grid = [(self.columns - 1 - column if row % 2 else column, row) for column, row in grid]
         if self.order == "interleaved":
-            grid.sort(key=lambda place: (place[0] + place[1]) % 2)
+            grid.sort(key=lambda position: (position[0] + position[1]) % 2)
         middle = 0.5 * (self.columns - 1), 0.5 * (self.rows - 1)
         return [((column - middle[0]) * self.pitch, (row - middle[1]) * self.pitch) for column, row in grid]
 
     @property
     def unit_scene(self) -> Droplet:
-        """One drop, whose numbers decide on the effects of every flow."""
+        """A single drop, whose dimensionless numbers decide on the common effects."""
         return self.drop
 
     def decide_own_effects(self) -> dict[str, Decision]:
@@ -203,7 +203,7 @@ class Printing(FlowScene):
         return self.drop.decide_own_effects() | decided(PRINTING_EFFECTS, self)
 
 
-@lru_cache(maxsize=8)  # asked for in every step
+@lru_cache(maxsize=8)  # read in every step
 def _drop_of(scene: Printing) -> Droplet:
     return Droplet(
         diameter=(6.0 * scene.drop_volume / pi) ** (1.0 / 3.0), density=scene.density, viscosity=scene.viscosity,
@@ -231,7 +231,7 @@ class InkFreezing(Effect[Printing]):
     source = "Neumann's solution, as in Carslaw & Jaeger 1959; Cleary & Monaghan 1999; Voller & Prakash 1987"
 
     def decide(self, scene: Printing) -> Decision:
-        """By the share that freezes, or as the user says."""
+        """Decide by the fraction that freezes, unless the user sets the switch."""
         freezing, switch = scene.freezing, scene.effects.freezing
         if freezing is None:
             return decision(False, "no freezing is given: light cures the drops")
@@ -243,7 +243,7 @@ class InkFreezing(Effect[Printing]):
         return decision(scene.freezes, why, scene.share_frozen)
 
     def other_way(self, case: Any, acts: bool) -> Any | None:
-        """Return a case whose drops are cured by light; where the case gives no freezing, none is known."""
+        """Return the case with drops cured by light; None if the effect is off."""
         return changed(case, f"{case.kind}.freezing", None) if acts else None
 
 

@@ -1,4 +1,4 @@
-"""Result of a flow: pictures of the particles, histories and metrics."""
+"""Result of a flow: snapshots of the particles, history and metrics."""
 
 from dataclasses import dataclass, field
 
@@ -9,11 +9,11 @@ Metrics = dict[str, tuple[float, str]]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """State of the liquid at a time.
+    """Snapshot of the liquid at one time.
 
     Attributes:
         time: Time [s].
-        points: Points of the particles, shape (n, 3) [m].
+        points: Positions of the particles, shape (n, 3) [m].
         velocity: Velocities, shape (n, 3) [m/s].
         pressure: Pressures, shape (n,) [Pa].
     """
@@ -29,11 +29,11 @@ class FlowResult:
     """Result of a flow.
 
     Attributes:
-        pictures: States in the order of time; the last is the end.
-        walls: Wall particles, shape (m, 3) [m].
-        history: Name -> column, all of one length; the first column is time [s].
-        metrics: Name -> value and unit.
-        words: Name -> text.
+        pictures: Snapshots in order of time; the last one is the final state.
+        walls: Positions of the wall particles, shape (m, 3) [m].
+        history: Column name -> samples, all of equal length; the first column is time [s].
+        metrics: Metric name -> (value, unit).
+        words: Name -> text of the report.
     """
 
     pictures: list[Picture]

@@ -1,4 +1,4 @@
-"""How the viscosity of a liquid depends on the rate of shear: power law, Carreau. Formulas; no numerical library."""
+"""Shear-rate dependent viscosity: power law and Carreau model; loads no numerical library."""
 
 from typing import Annotated, Literal
 
@@ -7,16 +7,17 @@ from pydantic import Field
 from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
-SUM_STEPS = 400  # of Simpson's rule, even
+SUM_STEPS = 400  # intervals of Simpson's rule, even
 HALVINGS = 80
 
 
 class Rheology(Parameters):
-    """A viscosity that depends on the rate of shear, sqrt(2 D : D).
+    """Generalised Newtonian liquid: viscosity as a function of the shear rate sqrt(2 D : D).
 
-    "power_law": mu = viscosity (rate / shear_rate)^(exponent - 1), at most `bound` times the viscosity and at least it
-    over `bound`, since the law itself has no limit. "carreau": mu = mu_inf + (viscosity - mu_inf) (1 + (rate /
-    shear_rate)^2)^((exponent - 1) / 2), mu_inf = `viscosity_at_infinity` (Carreau 1972).
+    "power_law": mu = viscosity (rate / shear_rate)^(exponent - 1), limited to the range from viscosity / ``bound`` to
+    viscosity * ``bound``, since the power law itself is unbounded. "carreau":
+    mu = mu_inf + (viscosity - mu_inf) (1 + (rate / shear_rate)^2)^((exponent - 1) / 2), where mu_inf is
+    ``viscosity_at_infinity`` (Carreau 1972).
     """
 
     law: Literal["power_law", "carreau"]
@@ -26,7 +27,7 @@ class Rheology(Parameters):
     bound: float = Field(10.0, gt=1, le=1000)
 
     def viscosity(self, rate: float, viscosity: float) -> float:
-        """Return the viscosity [Pa s] at a rate of shear [1/s]; ``viscosity`` is the liquid's in the law [Pa s]."""
+        """Return the viscosity [Pa s] at a shear rate [1/s]; ``viscosity`` is the reference viscosity [Pa s]."""
         ratio = rate / self.shear_rate
         if self.law == "carreau":
             share = (1.0 + ratio * ratio) ** (0.5 * (self.exponent - 1.0))
@@ -35,12 +36,12 @@ class Rheology(Parameters):
         return viscosity * min(max(ratio, low), high) ** (self.exponent - 1.0)
 
     def largest(self, viscosity: float, rate: float) -> float:
-        """Return the largest viscosity up to a rate of shear [Pa s]: at rest, or at that rate."""
+        """Return the largest viscosity at shear rates from zero to ``rate`` [Pa s]."""
         return max(self.viscosity(0.0, viscosity), self.viscosity(rate, viscosity))
 
 
 def _ends(exponent: float) -> tuple[float, float]:
-    """Powers of the bound: rates over that of the law between which a power law is not bounded."""
+    """Return the exponents of the bound between whose powers of the relative shear rate the power law applies."""
     if exponent == 1.0:
         return 0.0, 0.0
     reach = 1.0 / abs(exponent - 1.0)
@@ -48,16 +49,17 @@ def _ends(exponent: float) -> tuple[float, float]:
 
 
 def rate_at_wall(rheology: Rheology, viscosity: float, speed: float, width: float) -> float:
-    """Return the rate of shear at the plates of a channel [1/s] in whose middle liquid flows at a speed at last.
+    """Return the shear rate at the plates of a channel in steady flow [1/s], from the speed on the centre line.
 
-    The stress grows linearly from the middle, so that a rate r is at the distance z(r) = w mu(r) r / (2 mu(R) R) from
-    it, R being that at the plates; the speed of the middle is the integral of r over z, R w / 2 - integral of z dr.
+    The stress grows linearly from the centre line, so the shear rate r occurs at the distance
+    z(r) = w mu(r) r / (2 mu(R) R) from it, where R is the rate at the plates. The speed on the centre line is the
+    integral of r over z, R w / 2 - integral of z dr (Simpson's rule); R is found by bisection.
 
     Args:
-        rheology: of the liquid.
-        viscosity: in its law [Pa s].
-        speed: of the middle [m/s].
-        width: of the channel [m].
+        rheology: Viscosity law of the liquid.
+        viscosity: Reference viscosity of the law [Pa s].
+        speed: Speed on the centre line [m/s].
+        width: Width of the channel [m].
     """
 
     def middle(largest: float) -> float:

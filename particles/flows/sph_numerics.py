@@ -1,4 +1,4 @@
-"""Numerical parameters of delta-SPH, and its largest stable time step."""
+"""Numerical parameters of delta-SPH and its largest stable time step."""
 
 from math import pi, sqrt
 from typing import Literal
@@ -7,25 +7,24 @@ from pydantic import Field
 
 from reflowshock.parameters import Parameters
 
-# Alpha of liquid without viscosity of its own: as in dam breaks of Marrone et al. 2011.
+# Default alpha of an inviscid liquid, as in the dam breaks of Marrone et al. 2011.
 ARTIFICIAL_VISCOSITY = 0.02
-# Of the time step: in which sound crosses a smoothing length, velocity diffuses over one (Monaghan 1992), and the
-# shortest waves of surface tension pass (Brackbill et al. 1992).
+# Safety factors of the time step limits: acoustic and viscous (Monaghan 1992), capillary (Brackbill et al. 1992).
 COURANT, DIFFUSIVE, CAPILLARY = 0.25, 0.125, 0.25
-# Viscosity along the line of two particles, as where there is a free surface, slows the shortest waves down twice as
-# fast as viscosity along their velocities: so many times it bounds the step. Without, stiff drops flew apart.
+# The central viscous force, used with a free surface, damps the shortest waves twice as fast as the shear form, so the
+# viscous limit is halved; without this factor stiff drops are unstable.
 CENTRAL = 2.0
 
 
 class MethodNumerics(Parameters):
-    """How a flow is computed, whatever its particles stand along.
+    """Numerical parameters of delta-SPH, apart from the resolution.
 
-    The smoothing length is over the spacing of the particles, the speed of sound over the largest speed expected;
-    density diffusion is delta, artificial viscosity alpha (by default 0.02 where viscosity does not act, else none).
-    The density diffuses along its gradient: "renormalised" by a 3 x 3 matrix, or "reproducing", the slope of the linear
-    function next to the neighbours, from a 4 x 4 matrix (Belytschko et al. 1998).
-    XSPH lets particles move with a velocity that is smoothed by so much: 0.5 is usual, none is needed with viscosity.
-    Particles are on threads of the processor, or on a GPU (cuda); a surface that is tracked stays with the processor.
+    The smoothing length is relative to the particle spacing, the speed of sound to the largest expected speed. The
+    density diffusion is delta; the artificial viscosity is alpha (default 0.02 if viscosity is off, otherwise 0).
+    The density gradient of the diffusion is "renormalised" by a 3 x 3 matrix, or "reproducing" linear functions by a
+    4 x 4 matrix (Belytschko et al. 1998). The XSPH factor smooths the velocity that moves the particles; 0.5 is usual,
+    and viscous flows need none. The particles are computed on processor threads (cpu) or on a GPU (cuda); a tracked
+    surface is always computed on the processor.
     """
 
     device: Literal["cpu", "cuda"] = "cpu"
@@ -39,10 +38,9 @@ class MethodNumerics(Parameters):
 
 
 class SphNumerics(MethodNumerics):
-    """How a flow is computed that its particles stand across.
+    """Numerical parameters of a plane flow, resolved by a number of particles across its characteristic length.
 
-    They stand along the length of the scene: the height of the dam, the width of the channel, the side of the box of
-    vortices.
+    The length is the height of the dam, the width of the channel, or the side of the box of vortices.
     """
 
     particles_across: int = Field(40, ge=8, le=1000)
@@ -52,11 +50,11 @@ def largest_time_step(length: float, speed: float, density: float, viscosity: fl
     """Return the largest stable time step [s].
 
     Args:
-        length: smoothing length [m].
-        speed: of sound, and the largest of the liquid added [m/s].
-        density: [kg/m^3].
-        viscosity: [Pa s], `CENTRAL` times it where there is a free surface; 0 where none acts.
-        tension: surface tension [N/m]; 0 where none acts.
+        length: Smoothing length [m].
+        speed: Speed of sound plus the largest speed of the liquid [m/s].
+        density: Density [kg/m^3].
+        viscosity: Viscosity [Pa s], multiplied by ``CENTRAL`` with a free surface; 0 without viscosity.
+        tension: Surface tension [N/m]; 0 without surface tension.
     """
     steps = [COURANT * length / speed]
     if viscosity > 0.0:

@@ -1,4 +1,4 @@
-"""Scene of decaying vortices in a periodic box (Taylor & Green 1937)."""
+"""Decaying Taylor-Green vortices in a periodic box (Taylor & Green 1937)."""
 
 from typing import Annotated
 
@@ -14,7 +14,7 @@ from reflowshock.quantity import Quantity
 class TaylorGreen(PlaneFlow):
     """Four vortices in a periodic box that decay by viscosity.
 
-    The duration is in side / speed, the speed the largest one at the start.
+    The speed is the largest initial speed; the duration is in units of side / speed.
     """
 
     side: Annotated[float, Quantity("mm")] = Field(gt=0)
@@ -23,17 +23,17 @@ class TaylorGreen(PlaneFlow):
 
     @property
     def length(self) -> float:
-        """The box's side [m]."""
+        """Side of the box [m]."""
         return self.side
 
     @property
     def fastest(self) -> float:
-        """The largest speed at the start [m/s]."""
+        """Largest initial speed [m/s]."""
         return self.speed
 
     @property
     def particles(self) -> int:
-        """Particles of the liquid."""
+        """Number of liquid particles."""
         return self.numerics.particles_across**2
 
     @property
@@ -43,6 +43,6 @@ class TaylorGreen(PlaneFlow):
 
 
 def box_points(scene: TaylorGreen) -> Floats:
-    """Return the particles of the box at the start, shape (3, n) [m]."""
+    """Return the initial positions of the particles in the box, shape (3, n) [m]."""
     indices = np.arange(scene.numerics.particles_across)
     return lattice(indices, indices, scene.spacing)

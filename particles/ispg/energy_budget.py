@@ -9,7 +9,7 @@ from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.wall_forces import StepSolution, WallForces
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.one_leg import OneLeg
-from reflowshock.particles.surface.contact_line import RubbingLine
+from reflowshock.particles.surface.contact_line import FrictionLine
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class EnergyBudget:
         losses: EnergyLosses,
         velocity: Floats,
         potential: float,
-        hysteresis_lines: Sequence[RubbingLine],
+        hysteresis_lines: Sequence[FrictionLine],
         surface_tension: float,
     ) -> tuple[EnergyLosses, float]:
         """Add the losses of the step and compute the mean force on plates with prescribed motion.
@@ -127,7 +127,7 @@ class EnergyBudget:
         work, (plate_work, plate_force) = self._work(), self._plate_work()
         if self.prescribed:
             work += time_step * self._forces().power(self.predicted, self.prescribed) - plate_work
-        friction = (line.rubbed(self.predicted, self._work_velocity()) for line in hysteresis_lines)
+        friction = (line.friction_power(self.predicted, self._work_velocity()) for line in hysteresis_lines)
         slid = time_step * surface_tension * sum(friction)
         integration = losses.integration + potential - self.end.potential - work - slid
         plates, line = losses.plates - plate_work, losses.line + slid

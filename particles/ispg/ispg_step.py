@@ -50,7 +50,7 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
-from reflowshock.particles.surface.contact_line import RubbingLine
+from reflowshock.particles.surface.contact_line import FrictionLine
 
 SUPPORT = 1.5
 # Age, in steps, of the velocity that predicts the forces: with newer ones, modes that resist less than their stiffness
@@ -161,7 +161,7 @@ class PreparedIspgStep:
             DegenerateStencil: A particle has too few neighbours.
             NoNodalVolumes: No positive nodal volumes match the volume and the centre of the body.
         """
-        lines, releases = [line for line in self.physics.lines if isinstance(line, RubbingLine)], True
+        lines, releases = [line for line in self.physics.lines if isinstance(line, FrictionLine)], True
         while True:
             motion = (self._pinned() if lines else self)._attempt(time_step, volume, lines, releases)
             if motion is not None:
@@ -179,7 +179,7 @@ class PreparedIspgStep:
             admitted=admitted_motions(self.body.points, projections),
         )
 
-    def _attempt(self, time_step: float, volume: float, lines: Sequence[RubbingLine], releases: bool) -> Motion | None:
+    def _attempt(self, time_step: float, volume: float, lines: Sequence[FrictionLine], releases: bool) -> Motion | None:
         """Return the motion with the pinned vertices as they are, or None if contact-line friction changes their set.
 
         Args:
@@ -193,7 +193,7 @@ class PreparedIspgStep:
         if start.prescribed or lines:
             walls = WallForces.of(start.equations, solution)
             pull = walls.on_particles / self.tension
-            changed = [line.settle(start.body, solution.mean, pull, releases) for line in lines]
+            changed = [line.update_states(start.body, solution.mean, pull, releases) for line in lines]
             if any(changed):
                 return None
         end = self._end(start, solution, time_step)

@@ -1,1 +1,1 @@
-"""What a case says of the solder and its scene, which effects that calls for, what it will cost. No numba, no PETSc."""
+"""Parameters of solder and scenes, their checks, active effects and cost estimates; loads neither numba nor PETSc."""

@@ -1,4 +1,4 @@
-"""Parameters of the solder that are each allowed but make no joint together. Loads neither numba nor PETSc."""
+"""Checks of solder parameters in combination; loads neither numba nor PETSc."""
 
 from collections.abc import Mapping
 from math import degrees, pi
@@ -18,38 +18,45 @@ ROUNDING = 1e-9
 
 
 def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: float) -> list[Problem]:
-    """Find what cannot work before anything runs.
+    """Find problems of the solder of an array before anything runs.
 
-    Joints thin with their gap: of joints with equal discs only the smallest and the largest gap are examined.
+    Joints become thinner with a larger gap, so only the smallest and the largest gap of joints with equal discs are
+    checked.
 
     Args:
-        solder: the solder.
-        geometries: joint name to geometry.
-        pitch: distance of neighbouring joints [m].
+        solder: Solder of each joint.
+        geometries: Joint name -> geometry.
+        pitch: Distance between neighbouring joints [m].
     """
     effects = decide_effects(next(iter(geometries.values())), solder)
-    found = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
-    if found:
-        return found
+    solder_problems = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)
+    if solder_problems:
+        return solder_problems
+    joint_problems: list[Problem] = []
     by_discs: dict[tuple[float, float], list[str]] = {}
     for name, geometry in geometries.items():
         by_discs.setdefault((geometry.radius_board, geometry.radius_package), []).append(name)
     for names in by_discs.values():
         names.sort(key=lambda name: geometries[name].gap)
         low, high = names[0], names[-1]
-        found += _spacing_problems(solder, low, geometries[low])
-        found += _too_much(solder, low, geometries[low], pitch)
-        found += _too_thin(solder, high, geometries[high])
-    return list({problem.key: problem for problem in found}.values())
+        joint_problems += _spacing_problems(solder, low, geometries[low])
+        joint_problems += _too_much(solder, low, geometries[low], pitch)
+        joint_problems += _too_thin(solder, high, geometries[high])
+    return list({problem.key: problem for problem in joint_problems}.values())
 
 
 def scheme_problems(solder: Solder) -> list[Problem]:
-    """Find a time step, a basis or a wall that the scheme cannot take, and a wall that is not fully given."""
+    """Find an unsupported time step, basis or wall of the scheme, and an incomplete wall condition."""
     return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
 
 
 def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
-    """Find the scheme ispg at a place where it does not hold, or is not verified; empty for others, or no place."""
+    """Find the use of the scheme ispg where it is not verified.
+
+    Args:
+        solder: Solder with the selected scheme.
+        place: Unverified feature of the scene; None if the scheme is verified for it.
+    """
     if solder.numerics.scheme != "ispg" or place is None:
         return []
     message = f'the scheme "ispg" is for drops and joints, with inertia; it is not verified for {place}'
@@ -57,7 +64,7 @@ def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
 
 
 def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
-    """Find solder that never comes to rest, since without surface tension nothing gives it a shape."""
+    """Find solder that never comes to rest because neither surface tension nor inertia acts."""
     tension = effects["surface_tension"]
     if tension["on"] or effects["inertia"]["on"]:
         return []
@@ -115,7 +122,7 @@ def _spacing_problems(solder: Solder, name: str, geometry: JointGeometry) -> lis
 
 
 def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) -> list[Problem]:
-    """More solder than there is room between the plates; less may still touch the neighbour, which the flow decides."""
+    """Find solder that does not fit between the plates; bridging of smaller volumes is found by the flow."""
     limit = pitch**2 * geometry.gap
     if solder.volume < limit:
         return []
@@ -124,7 +131,7 @@ def _too_much(solder: Solder, name: str, geometry: JointGeometry, pitch: float) 
 
 
 def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Problem]:
-    """A neck too thin for the particles. Where no neck spans the gap at all, the flow says that the joint is open."""
+    """Find a neck too thin for the particles; the flow reports joints without any neck as open."""
     spacing, full = (
         solder.numerics.spacing,
         pi * geometry.gap * max(geometry.radius_board, geometry.radius_package) ** 2,
@@ -138,7 +145,7 @@ def _too_thin(solder: Solder, name: str, geometry: JointGeometry) -> list[Proble
 
 
 def _waist(solder: Solder, geometry: JointGeometry) -> float | None:
-    """Smallest diameter of the Young-Laplace joint [m]; none without equilibrium."""
+    """Return the smallest diameter of the Young-Laplace joint [m]; None without equilibrium."""
     discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
     weight = acting_weight(solder, decide_effects(geometry, solder))
@@ -149,32 +156,38 @@ def _waist(solder: Solder, geometry: JointGeometry) -> float | None:
 
 
 def mm(length: float) -> str:
-    """Write a length [m]."""
+    """Format a length [m] in mm."""
     return f"{1e3 * length:.4g} mm"
 
 
 def mm3(volume: float) -> str:
-    """Write a volume [m^3]."""
+    """Format a volume [m^3] in mm^3."""
     return f"{1e9 * volume:.3g} mm^3"
 
 
 def mn(force: float) -> str:
-    """Write a force [N]."""
+    """Format a force [N] in mN."""
     return f"{1e3 * force:.4g} mN"
 
 
 def deg(angle: float) -> str:
-    """Write an angle [rad]."""
+    """Format an angle [rad] in deg."""
     return f"{degrees(angle):.4g} deg"
 
 
 def mm_per_s(speed: float) -> str:
-    """Write a speed [m/s]."""
+    """Format a speed [m/s] in mm/s."""
     return f"{1e3 * speed:.4g} mm/s"
 
 
 def too_many(scene: str, spacing: float, count: int) -> list[Problem]:
-    """Find a scene of so many particles at a spacing [m] that no memory holds them."""
+    """Find a scene with too many particles for the memory.
+
+    Args:
+        scene: Table of the scene in the case file.
+        spacing: Spacing of the particles [m].
+        count: Number of particles.
+    """
     if count <= MOST_PARTICLES:
         return []
     limit = spacing * (count / MOST_PARTICLES) ** (1.0 / 3.0)

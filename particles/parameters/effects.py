@@ -1,4 +1,4 @@
-"""The effects of a reflow, decided from dimensionless numbers. No numerical library is loaded here."""
+"""Effects of a reflow, decided from dimensionless numbers; loads no numerical library."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -9,13 +9,13 @@ from reflowshock.effect import Decision, Effect, decided, decision
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder
 
-# Height of a drop changes by 0.08, 0.13, 0.19 Bo at contact angles of 60, 120, 148 deg (Bashforth-Adams table); what
-# changes less than 0.1 % of the shape is left out.
+# The height of a drop changes by 0.08, 0.13, 0.19 Bo at contact angles of 60, 120, 148 deg (Bashforth-Adams table);
+# effects that change the shape by less than 0.1 % are neglected.
 SHAPE_CHANGE_BY_BOND = 0.2
 NEGLIGIBLE_SHAPE_CHANGE = 1e-3
-# A motion has died out when the process is so many times longer than its slowest time.
+# Ratio of process time to slowest time above which a motion has decayed.
 PROCESS_TIME_RATIO = 20.0
-# Below this Bond number surface tension decides the shape; above 100 it is a boundary layer of gravity.
+# Largest Bond number at which surface tension determines the shape.
 LARGEST_BOND = 100.0
 
 
@@ -37,18 +37,18 @@ class Numbers:
 
 
 def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
-    """Numbers of a joint; L is the radius of a cylinder of the joint's volume and gap, H the gap."""
+    """Compute the numbers of a joint; H is the gap and L the radius of a cylinder of equal volume and height H."""
     length = sqrt(solder.volume / (pi * geometry.gap))
     return _numbers(solder, length, length * geometry.gap)
 
 
 def drop_numbers(solder: Solder) -> Numbers:
-    """Numbers of a drop: its Bond number with V^(1/3), times and Ohnesorge number with the radius of its sphere."""
+    """Compute the numbers of a drop: Bond number from V^(1/3), others from the radius of a sphere of equal volume."""
     return _numbers(solder, (0.75 * solder.volume / pi) ** (1.0 / 3.0), solder.volume ** (2.0 / 3.0))
 
 
 def _numbers(solder: Solder, length: float, area: float) -> Numbers:
-    """Numbers from the length that times are made of [m] and the area of the Bond number [m^2]."""
+    """Compute the numbers from the length of the time scales [m] and the area of the Bond number [m^2]."""
     density, tension = solder.density, solder.surface_tension
     return Numbers(
         bond=density * solder.gravity * area / tension,
@@ -60,13 +60,13 @@ def _numbers(solder: Solder, length: float, area: float) -> Numbers:
 
 @dataclass(frozen=True, slots=True)
 class LiquidScene:
-    """Solder in a scene.
+    """Liquid solder in a scene.
 
     Attributes:
-        numbers: its dimensionless numbers.
-        solder: its properties and process.
-        has_wall: whether it touches one.
-        swings: whether it is a drop that oscillates.
+        numbers: Dimensionless numbers.
+        solder: Properties and process.
+        has_wall: Whether the solder touches a wall.
+        swings: Whether the solder is an oscillating drop.
     """
 
     numbers: Numbers
@@ -76,31 +76,31 @@ class LiquidScene:
 
     @property
     def rival(self) -> float:
-        """Bond number of the weight that rivals surface tension: none where the liquid falls as a whole."""
+        """Bond number of the weight that competes with surface tension; 0 for a free drop or without gravity."""
         return self.numbers.bond if self.has_wall and self.solder.effects.gravity != "off" else 0.0
 
     @property
     def shaped(self) -> float:
-        """Share of the size that surface tension shapes: gravity makes a puddle as deep as the capillary length."""
+        """Fraction of the shape determined by surface tension: capillary length over size, 1 / sqrt(1 + Bo)."""
         return 1.0 / sqrt(1.0 + self.rival)
 
     @property
     def slowest_time(self) -> float:
-        """Time [s] in which the slowest motion dies out."""
+        """Time in which the slowest motion decays [s]."""
         return max(self.numbers.capillary_time, self.numbers.viscous_time)
 
     @property
     def is_transient(self) -> bool:
-        """Whether the process ends before the motion has died out."""
+        """Whether the process ends before the motion has decayed."""
         return self.solder.process_time / self.slowest_time < PROCESS_TIME_RATIO
 
 
 class LiquidEffect(Effect[LiquidScene]):
-    """An effect of the reflow; its `place` is an `Acting` of `physics/physics.py`, its switch in `SolderEffects`.
+    """Effect of a reflow: ``place`` names its ``Acting`` class, and ``SolderEffects`` holds its switch.
 
     Attributes:
-        of_motion: whether it does nothing at rest.
-        is_measured: whether `benchmarks/effects.py` measures what a step costs with it and without it.
+        of_motion: Whether the effect vanishes at rest.
+        is_measured: Whether ``benchmarks/effects.py`` measures the cost of the effect per step.
     """
 
     stage = "reflow"
@@ -109,10 +109,10 @@ class LiquidEffect(Effect[LiquidScene]):
 
     @abstractmethod
     def auto(self, liquid: LiquidScene) -> Decision:
-        """Decide from the numbers alone."""
+        """Decide by the dimensionless numbers alone."""
 
     def decide(self, liquid: LiquidScene) -> Decision:
-        """Follow the user's switch, else the numbers."""
+        """Decide by the user's switch, otherwise by the dimensionless numbers."""
         auto, switch = self.auto(liquid), getattr(liquid.solder.effects, self.name)
         if switch == "auto":
             return auto
@@ -120,7 +120,7 @@ class LiquidEffect(Effect[LiquidScene]):
 
 
 class GravityEffect(LiquidEffect):
-    """Weight, which flattens what rests on a wall."""
+    """Gravity, which flattens bodies on a wall."""
 
     name = "gravity"
     adds = "f = -rho g z dV/dx on the free surface"
@@ -133,20 +133,20 @@ class GravityEffect(LiquidEffect):
     is_measured = True
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """By the change of the height."""
+        """Decide by the relative change of the height."""
         change = SHAPE_CHANGE_BY_BOND * liquid.numbers.bond
         why = f"Bond number {liquid.numbers.bond:.3g}: changes the shape by about {100 * change:.3g} %"
         return decision(change > NEGLIGIBLE_SHAPE_CHANGE, why, min(change, 1.0))
 
     def decide(self, liquid: LiquidScene) -> Decision:
-        """Nothing without a wall, whatever the switch."""
+        """Return off without a wall, regardless of the switch."""
         if not liquid.has_wall:
             return decision(False, "no wall: the drop falls as a whole, which does not change its shape")
         return super().decide(liquid)
 
 
 class MotionEffect(LiquidEffect):
-    """An effect of the motion, which matters where the process is short."""
+    """Effect of the motion, which matters in short processes."""
 
     threshold = PROCESS_TIME_RATIO
     acts = "below"
@@ -154,7 +154,7 @@ class MotionEffect(LiquidEffect):
     is_measured = True
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """By process time over slowest time."""
+        """Decide by the ratio of process time to slowest time."""
         ratio = liquid.solder.process_time / liquid.slowest_time
         times = f"process time {liquid.solder.process_time:.3g} s is {ratio:.3g} times the slowest time"
         rest = "the motion matters" if liquid.is_transient else "quasi-static, only the shape at rest matters"
@@ -162,7 +162,7 @@ class MotionEffect(LiquidEffect):
 
 
 class InertiaEffect(MotionEffect):
-    """Momentum of the liquid."""
+    """Inertia of the liquid."""
 
     name = "inertia"
     adds = "rho Dv/Dt"
@@ -173,12 +173,12 @@ class InertiaEffect(MotionEffect):
     source = "Lamb 1932, art. 355, decay of mode 2"
 
     def decide(self, liquid: LiquidScene) -> Decision:
-        """Always where a drop swings."""
+        """Return on for an oscillating drop, otherwise decide as usual."""
         return decision(True, "a drop swings by its inertia") if liquid.swings else super().decide(liquid)
 
 
 class ViscosityEffect(MotionEffect):
-    """Newtonian viscosity, and what walls do by it."""
+    """Newtonian viscosity, including wall friction."""
 
     name = "viscosity"
     adds = "-div(2 mu D(v))"
@@ -189,21 +189,21 @@ class ViscosityEffect(MotionEffect):
     source = "Lamb 1932, art. 355"
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """As all motion, with its own number; where inertia is asked for, nothing else brings the liquid to rest."""
-        found = super().auto(liquid)
+        """Decide as for inertia; always on if the user enables inertia, since only viscosity damps the motion."""
+        outcome = super().auto(liquid)
         if liquid.solder.effects.inertia == "on":
-            found = found | decision(True, "inertia is on: only viscosity brings the liquid to rest")
-        return found | decision(found["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}; {found['why']}")
+            outcome = outcome | decision(True, "inertia is on: only viscosity brings the liquid to rest")
+        return outcome | decision(outcome["on"], f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}; {outcome['why']}")
 
     def decide(self, liquid: LiquidScene) -> Decision:
-        """Always where a drop swings."""
+        """Return on for an oscillating drop, otherwise decide as usual."""
         if liquid.swings:
             return decision(True, f"Ohnesorge number {liquid.numbers.ohnesorge:.3g}: the swing decays")
         return super().decide(liquid)
 
 
 class SurfaceTensionEffect(LiquidEffect):
-    """Tension of the free surface."""
+    """Surface tension of the free surface."""
 
     name = "surface_tension"
     adds = "f = -gamma dA/dx, implicit: dt gamma K v"
@@ -216,7 +216,7 @@ class SurfaceTensionEffect(LiquidEffect):
     source = "de Gennes, Brochard-Wyart & Quere 2004, 2.1"
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """By the Bond number of the weight that acts."""
+        """Decide by the Bond number of the acting weight."""
         rival = liquid.rival
         why = f"Bond number {rival:.3g} (off above {LARGEST_BOND:g})" if rival > 0.0 else "no gravity rivals it"
         return decision(rival < LARGEST_BOND, why, liquid.shaped)
@@ -236,16 +236,16 @@ class WallAdhesionEffect(LiquidEffect):
     source = "Young 1805; Brakke 1992"
 
     def auto(self, liquid: LiquidScene) -> Decision:
-        """As surface tension."""
+        """Decide as for surface tension."""
         why = "contact angles of pad and mask hold or move the contact lines wherever surface tension acts"
         return decision(liquid.rival < LARGEST_BOND, why, liquid.shaped)
 
     def decide(self, liquid: LiquidScene) -> Decision:
-        """Nothing without a wall, whatever the switch."""
+        """Return off without a wall, regardless of the switch."""
         return super().decide(liquid) if liquid.has_wall else decision(False, "no wall")
 
 
-# In the order in which they join what acts: wall adhesion needs all other forces on the surface.
+# In the order in which they are added to the physics: wall adhesion needs all other surface forces.
 LIQUID_EFFECTS: tuple[LiquidEffect, ...] = (
     SurfaceTensionEffect(),
     GravityEffect(),
@@ -259,30 +259,30 @@ AT_REST = {
 
 
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a reflow; return name to on or off, and the reason with its number."""
+    """Decide on each effect of a reflow: name -> decision with its reason."""
     return decided(LIQUID_EFFECTS, LiquidScene(numbers, solder))
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a joint's reflow."""
+    """Decide on each effect of the reflow of a joint: name -> decision."""
     return decide(dimensionless_numbers(geometry, solder), solder)
 
 
 def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
-    """Decide each effect of a drop; what needs a wall is off where a drop is free."""
+    """Decide on each effect of a drop: name -> decision; wall effects are off for a free drop."""
     return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
 
 
 def decide_oscillation(solder: Solder) -> dict[str, Decision]:
-    """Decide each effect of a free drop that swings."""
+    """Decide on each effect of a free oscillating drop: name -> decision."""
     return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
 
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
-    """Which effects act: name to on or off."""
+    """Return which effects are on: name -> bool."""
     return {name: decision["on"] for name, decision in effects.items()}
 
 
 def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
-    """Weight of the unit volume that acts [N/m^3]."""
+    """Return the acting specific weight rho g [N/m^3]; 0 if gravity is off."""
     return solder.density * solder.gravity if effects["gravity"]["on"] else 0.0

@@ -16,7 +16,7 @@ INERTIAL_COST_EXPONENT = 1.5
 # Steps of the scheme ispg; measured by benchmarks/bench_ispg.py with 141 to 1385 particles on a slow machine.
 SECONDS_PER_ISPG_STEP = 0.005
 SECONDS_PER_ISPG_STEP_AND_PARTICLE = 4e-5
-# Steps of that scheme until a joint is at rest: 26 to 318, most with fine particles and tilted plates.
+# Steps of the scheme ispg until a joint is at rest: 26 to 318, most for fine particles and tilted plates.
 ISPG_STEPS_OF_JOINT = 250
 # Steps of a section, whose pressures have dense matrices; measured with 121 to 1681 particles.
 SECONDS_PER_SECTION_STEP, SECONDS_PER_SECTION_STEP_AND_PARTICLE = 0.008, 3e-5
@@ -24,13 +24,13 @@ SECONDS_PER_SECTION_STEP_AND_PAIR = 2.3e-8
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
-    """Number of particles of a joint: layers of concentric rings of 6 j particles."""
+    """Return the number of particles of a joint: layers of concentric rings of 6 j particles."""
     rings, layers = joint_counts(geometry, solder.volume, solder.numerics.spacing)
     return layers * (1 + 3 * rings * (rings + 1))
 
 
 def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
-    """Expected time of `solve_joint` on one core [s], from the measured cost of a step."""
+    """Estimate the time of ``solve_joint`` on one core [s], from the measured cost of a step."""
     particles = particle_count(solder, geometry)
     if solder.numerics.scheme == "ispg":
         return ispg_seconds(particles, ISPG_STEPS_OF_JOINT)
@@ -38,23 +38,23 @@ def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
 
 
 def drop_seconds(particles: int) -> float:
-    """Expected time to bring a drop to rest on one core [s]."""
+    """Estimate the time to bring a drop to rest on one core [s]."""
     return TYPICAL_STEPS_OF_DROP * _seconds_per_step(particles)
 
 
 def inertial_seconds(particles: int, steps: int) -> float:
-    """Expected time of steps with inertia or viscosity on one core [s]."""
+    """Estimate the time of steps with inertia or viscosity on one core [s]."""
     growing = SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
     return steps * (SECONDS_PER_INERTIAL_STEP + growing)
 
 
 def ispg_seconds(particles: int, steps: int) -> float:
-    """Expected time of steps of the scheme ispg on one core [s]."""
+    """Estimate the time of steps of the scheme ispg on one core [s]."""
     return steps * (SECONDS_PER_ISPG_STEP + SECONDS_PER_ISPG_STEP_AND_PARTICLE * particles)
 
 
 def section_seconds(particles: int, steps: int) -> float:
-    """Expected time of steps of a section on one core [s]."""
+    """Estimate the time of steps of a section on one core [s]."""
     of_matrices = SECONDS_PER_SECTION_STEP_AND_PAIR * particles**2
     return steps * (SECONDS_PER_SECTION_STEP + SECONDS_PER_SECTION_STEP_AND_PARTICLE * particles + of_matrices)
 

@@ -1,4 +1,4 @@
-"""Parameters of one joint that are each allowed but make no joint together. Loads neither numba nor PETSc."""
+"""Checks of the parameters of one joint in combination; loads neither numba nor PETSc."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -15,7 +15,7 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import NoMeridian, joint_meridian
 from reflowshock.problem import Problem
 
-OVERFLOWS = 1e-3  # of its pad's radius: a contact line that is on the mask
+OVERFLOWS = 1e-3  # relative excess over the pad radius beyond which a contact line counts as on the mask
 KEYS = {
     "solder.volume": "joint.volume",
     "solder.pad_contact_angle": "joint.pad_contact_angle",
@@ -24,40 +24,41 @@ KEYS = {
 
 
 def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find what cannot work before a joint runs: those of an array without neighbours, under the joint's own keys."""
+    """Find problems of a joint before it runs: the checks of an array without neighbours, under the keys of a joint."""
     if joint.offset >= joint.pad_bottom + joint.pad_top:
         allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
         return [Problem("joint.offset", "the pads do not overlap", mm(joint.offset), allowed)]
-    found = checks.problems(solder, {"of the case": joint.geometry}, inf)
-    if found:
-        return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in found]
-    found = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
-    found = found or _motion_problems(joint, solder) or checks.ispg_problems(solder, unverified_joint(joint, solder))
-    found = found or _load_problems(joint, solder)
-    return found or too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
+    array_problems = checks.problems(solder, {"of the case": joint.geometry}, inf)
+    if array_problems:
+        return [replace(problem, key=KEYS.get(problem.key, problem.key)) for problem in array_problems]
+    problems = _tilt_problems(joint) or _path_problems(joint) or _package_problems(joint)
+    problems = problems or _motion_problems(joint, solder)
+    problems = problems or checks.ispg_problems(solder, unverified_joint(joint, solder))
+    problems = problems or _load_problems(joint, solder)
+    return problems or too_many("joint", joint.spacing, particle_count(solder, joint.geometry))
 
 
 def unverified_joint(joint: Joint, solder: Solder) -> str | None:
-    """What of a joint the scheme ispg is not verified for; None where it is."""
+    """Return the feature of a joint for which the scheme ispg is not verified; None if it is verified."""
     if joint.package is not None and solder.wall != "free-slip":
         return "packages that float, on walls with friction"
     return _without_inertia(joint.geometry, solder)
 
 
 def unverified_joints(geometries: Collection[JointGeometry], solder: Solder, lowest: float = 0.0) -> str | None:
-    """What of the joints of a package, each by itself, the scheme ispg is not verified for; None where it is.
+    """Return the feature of the joints of a package for which the scheme ispg is not verified; None if it is verified.
 
     Args:
-        geometries: as drawn.
-        solder: of each.
-        lowest: displacement of the package where it is lowest, upwards [m]; one without room for solder is not judged.
+        geometries: Joints as drawn.
+        solder: Solder of each joint.
+        lowest: Upward displacement of the package at its lowest position [m]; ignored where no gap remains.
     """
-    found = next(filter(None, (_without_inertia(geometry, solder) for geometry in geometries)), None)
+    feature = next(filter(None, (_without_inertia(geometry, solder) for geometry in geometries)), None)
     drawn = min(geometries, key=lambda geometry: geometry.gap)
-    for place in (drawn, replace(drawn, gap=drawn.gap + lowest)):
-        if found is None and place.gap > 0.0 and _overflows(place, solder):
-            return f"joints that overflow both pads, where no edge holds them (gap of {mm(place.gap)})"
-    return found
+    for geometry in (drawn, replace(drawn, gap=drawn.gap + lowest)):
+        if feature is None and geometry.gap > 0.0 and _overflows(geometry, solder):
+            return f"joints that overflow both pads, where no edge holds them (gap of {mm(geometry.gap)})"
+    return feature
 
 
 def _without_inertia(geometry: JointGeometry, solder: Solder) -> str | None:
@@ -66,24 +67,24 @@ def _without_inertia(geometry: JointGeometry, solder: Solder) -> str | None:
 
 
 def _overflows(geometry: JointGeometry, solder: Solder) -> bool:
-    """Whether the solder is beyond both pads where the plates are level."""
+    """Return whether the solder overflows both pads of level plates."""
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
     weight = acting_weight(solder, decide_effects(geometry, solder))
     discs = (geometry.radius_board, geometry.radius_package, geometry.gap)
     try:
         line = joint_meridian(solder.volume, *discs, solder.surface_tension, weight, angle_limits=limits).r
-    except NoMeridian:  # of flat joints it is not always found
+    except NoMeridian:  # the solver may fail for flat joints
         return solder.volume > 2.0 * pi * max(geometry.radius_board, geometry.radius_package) ** 2 * geometry.gap
     ends = ((line[0], geometry.radius_board), (line[-1], geometry.radius_package))
     return all(rim > (1.0 + OVERFLOWS) * radius for rim, radius in ends)
 
 
 def _tilt_problems(joint: Joint) -> list[Problem]:
-    """The edge of the tilted pad must stay above the lower plate, by a spacing at least."""
-    for key, place in (("joint.tilt", joint.geometry), *(("joint.path", place) for place in joint.places)):
-        drop, tilt, room = joint.pad_top * sin(abs(place.tilt[1])), place.tilt[1], place.gap - joint.spacing
+    """Find a tilted pad whose edge is less than a spacing above the lower plate."""
+    for key, geometry in (("joint.tilt", joint.geometry), *(("joint.path", target) for target in joint.places)):
+        drop, tilt, room = joint.pad_top * sin(abs(geometry.tilt[1])), geometry.tilt[1], geometry.gap - joint.spacing
         if tilt and drop >= room:
-            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(place.gap)}"
+            message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(geometry.gap)}"
             return [Problem(key, message, deg(tilt), f"< {deg(asin(min(1.0, max(0.0, room / joint.pad_top))))}")]
     return []
 
@@ -115,7 +116,7 @@ def _package_problems(joint: Joint) -> list[Problem]:
 
 
 def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """The solder must bear the package at a gap that particles can fill."""
+    """Find a load that presses the package down to a gap that particles cannot fill."""
     if joint.package is None or "lift" not in joint.package.free:
         return []
     lowest, limits = checks.SPACINGS_IN_GAP * joint.spacing, (joint.pad_contact_angle, joint.mask_contact_angle)
@@ -127,16 +128,16 @@ def _load_problems(joint: Joint, solder: Solder) -> list[Problem]:
         return []
     if joint.package.load < largest:
         return []
-    place = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
+    too_low = f"the package down to {mm(lowest)}, too low for particles {mm(joint.spacing)} apart"
     if largest <= 0.0:
         allowed = "more solder, or a smaller joint.spacing"
-        return [Problem("joint.volume", f"the solder alone pulls {place}", mm3(joint.volume), allowed)]
-    message = f"presses {place}"
+        return [Problem("joint.volume", f"the solder alone pulls {too_low}", mm3(joint.volume), allowed)]
+    message = f"presses {too_low}"
     return [Problem("joint.package.load", message, mn(joint.package.load), f"< {mn(largest)}")]
 
 
 def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find what does not go with a package that moves."""
+    """Find a scheme or a speed that does not support a moving package."""
     if joint.package is None and joint.path is None:
         return []
     scheme = solder.numerics.scheme
@@ -146,7 +147,7 @@ def _motion_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 
 def _speed_problems(joint: Joint, path: PackagePath, solder: Solder) -> list[Problem]:
-    """Find a package that is moved with inertia at no speed, or at one that means nothing."""
+    """Find a path with inertia but no speed, or with an unsupported speed."""
     inertia = decide_effects(joint.geometry, solder)["inertia"]
     key, speed = "joint.path.speed", path.speed
     if speed is None and inertia["on"]:

@@ -1,4 +1,4 @@
-"""Parameters of a scene that are each allowed but make no drops together. Loads neither numba nor PETSc."""
+"""Checks of the parameters of drop scenes in combination; loads neither numba nor PETSc."""
 
 from math import degrees, pi, radians
 from typing import Protocol
@@ -17,12 +17,12 @@ from reflowshock.problem import Problem
 FEWEST_PER_EDGE = 5
 SPACINGS_IN_PAD = 2.0
 ISPG_ANGLES = (radians(30.0), radians(148.0))
-# Of whole drops on uniform walls with free slip: in a quarter particles on the axis, each with a pressure, are locked.
+# For whole drops on uniform free-slip walls only: in a quarter, the particles on the axis lock.
 FILM_ANGLE, FILM_EDGES = radians(15.0), (5, 7)
-# In a plane the face of a cube spreads 2.7 times too far on a wall of 30 degrees: its middle is half a spacing thick.
+# In a plane, a drop spreads 2.7 times too far at 30 degrees, where its middle is half a spacing thick.
 PLANE_ANGLE = radians(60.0)
-ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with hysteresis
-# 5 an edge at 30 degrees without slip was not at rest after 1600 steps; more than 12 were not all run.
+ISPG_EDGES, HELD_EDGES, SECTION_EDGES = (5, 15), (6, 9), (8, 21)  # HELD: with contact angle hysteresis
+# With 5 particles per edge at 30 degrees and no slip, no rest after 1600 steps; above 12, not all cases were run.
 FRICTION_EDGES, FRICTION_PAD_EDGES = (6, 12), (7, 9)
 ISPG_PAD_EDGE = 11
 FREE_EDGES = (7, 11)
@@ -31,76 +31,82 @@ ISPG_PAIR = 2000
 
 
 class HasWall(Protocol):
-    """A scene that may stand on a wall."""
+    """Scene that may include a wall."""
 
     @property
     def is_free(self) -> bool:
-        """Whether there is no wall."""
+        """Whether the scene is free of walls."""
 
 
 def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tuple[Solder, str]:
-    """The solder of a scene with the scheme asked for, and why it has it; no words but where that is auto.
+    """Return the solder with the scheme of a scene, and the reason for an automatic choice (otherwise "").
 
-    Auto stands for ispg where it is verified or no other scheme computes the scene, else for energy.
+    Auto selects ispg where it is verified or where no other scheme supports the scene, and energy otherwise.
+
+    Args:
+        scene: Drop, joint or pair of drops.
+        solder: Solder of the scene.
+        asked: Scheme of the case file, or "auto".
     """
     if asked != "auto":
         return solder, ""
     ispg = changed(solder, "numerics.scheme", "ispg")
     if isinstance(scene, Drop):
-        place = _unverified_drop(scene, solder)
+        feature = _unverified_drop(scene, solder)
         alone = scene.section != "none" or scene.speed is not None
     elif isinstance(scene, Joint):
-        place = unverified_joint(scene, solder)
+        feature = unverified_joint(scene, solder)
         alone = scene.path is not None and scene.path.speed is not None
     else:
-        place, alone = _unverified_pair(scene, solder), False
+        feature, alone = _unverified_pair(scene, solder), False
     if alone:
         return ispg, "no other scheme computes it"
-    return (ispg, "with inertia it costs less than tetrahedra") if place is None else (solder, f"not ISPG: {place}")
+    return (ispg, "with inertia it costs less than tetrahedra") if feature is None else (solder, f"not ISPG: {feature}")
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find what cannot work before a drop runs."""
-    found = _flow_problems(drop, solder) or _pad_problems(drop) or _section_problems(drop, solder)
-    found = found or checks.ispg_problems(solder, _unverified_drop(drop, solder)) or _impact_problems(drop, solder)
-    found = found or _resolution_problems(drop) or _symmetry_problems(drop, solder)
-    return found or _wall_problems(drop) or free_problems(drop, solder)
+    """Find problems of a drop before it runs."""
+    problems = _flow_problems(drop, solder) or _pad_problems(drop) or _section_problems(drop, solder)
+    problems = problems or checks.ispg_problems(solder, _unverified_drop(drop, solder))
+    problems = problems or _impact_problems(drop, solder)
+    problems = problems or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    return problems or _wall_problems(drop) or free_problems(drop, solder)
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
-    """Find what cannot work before two drops run: too coarse, overlapping, or never or always in touch."""
-    found = _flow_problems(pair, solder) or checks.ispg_problems(solder, _unverified_pair(pair, solder))
-    found = found or free_problems(pair, solder) or _pair_resolution(pair)
-    return found or _distance_problems(pair, solder)
+    """Find problems of two drops before they run: too coarse, overlapping, or at an unsuitable distance."""
+    problems = _flow_problems(pair, solder) or checks.ispg_problems(solder, _unverified_pair(pair, solder))
+    problems = problems or free_problems(pair, solder) or _pair_resolution(pair)
+    return problems or _distance_problems(pair, solder)
 
 
 def _flow_problems(scene: HasWall, solder: Solder) -> list[Problem]:
-    """Find a scheme that does not go with its numerics, and liquid that nothing brings to rest."""
+    """Find numerics that the scheme does not support, and liquid that never comes to rest."""
     return checks.scheme_problems(solder) + checks.effect_problems(solder, decide_drop(solder, scene.is_free))
 
 
 def _section_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find drops that the scheme ispg does not compute in section: it knows uniform walls with free slip only."""
+    """Find drops that cannot be computed in section: only uniform walls with free slip are supported."""
     if drop.section == "none":
         return []
     if solder.numerics.scheme != "ispg":
         message = f'a drop in section (drop.section = "{drop.section}") needs the scheme "ispg"'
         return [Problem("solder.numerics.scheme", message, solder.numerics.scheme, "ispg")]
-    places = {
+    features = {
         "a free drop": drop.is_free,
         "a pad": drop.pad_radius is not None,
         "half of one": drop.symmetry != "none",
         "one that rubs on it": solder.wall != "free-slip",
     }
-    for place, is_met in places.items():
+    for feature, is_met in features.items():
         if is_met:
-            message = f"a section is computed of a drop on a uniform wall, not of {place}"
+            message = f"a section is computed of a drop on a uniform wall, not of {feature}"
             return [Problem("drop.section", message, drop.section, "none")]
     return []
 
 
 def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
-    """What of a drop the scheme ispg is not verified for; None where it is."""
+    """Return the feature of a drop for which the scheme ispg is not verified; None if it is verified."""
     inertia, angle = decide_drop(solder, drop.is_free)["inertia"], _angle_at_rest(drop)
     fewest, most = SECTION_EDGES if drop.section != "none" else ISPG_EDGES if drop.hysteresis is None else HELD_EDGES
     rubs, (low, high) = solder.wall != "free-slip", FRICTION_EDGES
@@ -108,14 +114,14 @@ def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
     in_section, rests = drop.section != "none", drop.hysteresis or (angle,)
     smooth = not (rubs or in_section or drop.pad_radius or drop.hysteresis or drop.symmetry_axes)
     least = PLANE_ANGLE if drop.section == "plane" else FILM_ANGLE if smooth else ISPG_ANGLES[0]
-    is_film = not all(_is_between(one) for one in rests)
-    places = {
+    is_film = not all(_is_between(rest_angle) for rest_angle in rests)
+    features = {
         "parts of free drops": drop.is_free and drop.symmetry != "none",
         f"{drop.count} particles along an edge of a free drop (for {FREE_EDGES[0]} to {FREE_EDGES[1]} it is)": (
             drop.is_free and not FREE_EDGES[0] <= drop.count <= FREE_EDGES[1]
         ),
         f"contact angles outside {deg(least)} to {deg(ISPG_ANGLES[1])} at rest": (
-            not all(_is_between(one, least) for one in rests)
+            not all(_is_between(rest_angle, least) for rest_angle in rests)
         ),
         f"{drop.count} particles along an edge below {deg(ISPG_ANGLES[0])} (for {thin[0]} to {thin[1]} it is)": (
             is_film and not thin[0] <= drop.count <= thin[1]
@@ -133,27 +139,27 @@ def _unverified_drop(drop: Drop, solder: Solder) -> str | None:
             drop.pad_radius is not None and drop.count > ISPG_PAD_EDGE
         ),
     }
-    return next((place for place, is_met in places.items() if is_met), None)
+    return next((feature for feature, is_met in features.items() if is_met), None)
 
 
 def _impact_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find drops that strike a wall as no scheme is verified for: others know no flight, faster ones no film."""
+    """Find impacts for which no scheme is verified: wrong scheme, unsupported wall, resolution or speed."""
     if drop.speed is None:
         return []
     speed, (low, high) = f"{drop.speed:.4g} m/s", IMPACT_EDGES
     if solder.numerics.scheme != "ispg":
         message = f"a drop that strikes a wall (drop.speed = {speed}) needs the scheme ispg; or a case with [droplet]"
         return [Problem("solder.numerics.scheme", message, solder.numerics.scheme, "ispg")]
-    places = {
+    features = {
         "a section": drop.section != "none",
         "a wall that is slid on freely (solder.wall)": solder.wall == "free-slip",
         "a pad": drop.pad_radius is not None,
         "planes of symmetry": drop.symmetry != "none",
         "hysteresis": drop.hysteresis is not None,
     }
-    for place, is_met in places.items():
+    for feature, is_met in features.items():
         if is_met:
-            return [Problem("drop.speed", f"an impact is not verified with {place}", speed, "none")]
+            return [Problem("drop.speed", f"an impact is not verified with {feature}", speed, "none")]
     if not low <= drop.count <= high:
         message = f"an impact is not verified for {drop.count} particles along an edge"
         return [Problem("drop.speed", message, speed, f"{low} to {high} along an edge")]
@@ -167,26 +173,26 @@ def _impact_problems(drop: Drop, solder: Solder) -> list[Problem]:
 
 
 def _unverified_pair(pair: Drops, solder: Solder) -> str | None:
-    """What of two drops the scheme ispg is not verified for; None where it is."""
+    """Return the feature of two drops for which the scheme ispg is not verified; None if it is verified."""
     inertia = decide_drop(solder, pair.is_free)["inertia"]
-    places = {
+    features = {
         f"contact angles outside {deg(ISPG_ANGLES[0])} to {deg(ISPG_ANGLES[1])}": not _is_between(pair.contact_angle),
         "walls that hold the liquid": solder.wall != "free-slip",
         f"drops without inertia ({inertia['why']})": not inertia["on"],
         f"two drops of {pair.particles} particles (up to {ISPG_PAIR} it is)": pair.particles > ISPG_PAIR,
     }
-    return next((place for place, is_met in places.items() if is_met), None)
+    return next((feature for feature, is_met in features.items() if is_met), None)
 
 
 def _angle_at_rest(drop: Drop) -> float | None:
-    """Contact angle [rad] of a drop at rest, that at the edge of its pad if this holds it; without its weight."""
+    """Return the contact angle [rad] of a weightless drop at rest, pinned at the edge of its pad if possible."""
     if drop.pad_radius is None or drop.contact_angle is None:
         return drop.contact_angle
     return min(max(cap_angle(drop.volume, drop.pad_radius), drop.contact_angle), drop.mask_contact_angle)
 
 
 def _is_between(angle: float | None, least: float = ISPG_ANGLES[0]) -> bool:
-    """Whether a contact angle [rad] is one that the scheme ispg is verified for, from the least on."""
+    """Return whether the scheme ispg is verified for a contact angle [rad], from a smallest angle [rad] on."""
     return angle is None or least - ROUNDING <= angle <= ISPG_ANGLES[1] + ROUNDING
 
 
@@ -199,22 +205,22 @@ def _pair_resolution(pair: Drops) -> list[Problem]:
 
 
 def _distance_problems(pair: Drops, solder: Solder) -> list[Problem]:
-    """The centres must be so far apart that the drops do not overlap, and so near that they touch if they shall."""
+    """Find drops that overlap, do not touch though they should merge, or touch though they should not."""
     apart, reach = _distances(pair, solder)
     value, clear = mm(pair.distance), reach + 2.0 * pair.spacing
     if pair.distance < apart:
         return [Problem("drops.distance", "the drops overlap at the start", value, f">= {mm(apart)}")]
     if pair.merge and pair.distance > reach:
-        message = "the drops are meant to become one, but do not reach each other"
+        message = "drops.merge = true, but the drops do not reach each other"
         return [Problem("drops.distance", message, value, f"{mm(apart)} to {mm(reach)}")]
     if not pair.merge and pair.distance < clear:
-        message = "the drops are not meant to become one (drops.merge = false), but would touch"
+        message = "drops.merge = false, but the drops would touch"
         return [Problem("drops.distance", message, value, f">= {mm(clear)}")]
     return []
 
 
 def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
-    """Distance of centres at which the drops touch at the start, and up to which they touch at rest [m]."""
+    """Return the distance of centres of initial contact, and the largest one with contact at rest [m]."""
     edges = [volume ** (1.0 / 3.0) for volume in pair.volumes]
     if pair.contact_angle is None:
         apart = sum(edge * (0.75 / pi) ** (1.0 / 3.0) for edge in edges)
@@ -225,7 +231,7 @@ def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
 
 
 def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
-    """Find a liquid so viscous that a drop of it creeps back to its sphere."""
+    """Find a liquid so viscous that a drop of it returns to the sphere without oscillation."""
     decay = lamb_decay_rate(2, scene.radius, solder.density, solder.viscosity)
     frequency = rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)
     if decay < frequency:
@@ -236,11 +242,11 @@ def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
 
 
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
-    """Find effects that are asked for, but need a wall that a scene has not."""
+    """Find enabled effects that need a wall in a scene without one."""
     if not scene.is_free:
         return []
     switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
-    message = "without a contact angle there is no wall: a free drop falls as a whole"
+    message = "without a contact angle the scene has no wall: a free drop falls as a whole"
     return [Problem(key, message, switch, "auto, off") for key, switch in switches.items() if switch == "on"]
 
 
@@ -258,7 +264,7 @@ def _resolution_problems(drop: Drop) -> list[Problem]:
 
 
 def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find what a part of a drop cannot do for the whole."""
+    """Find a resolution or scheme that does not support planes of symmetry."""
     if drop.symmetry == "none":
         return []
     key, effects = "drop.symmetry", decide_drop(solder, drop.is_free)
@@ -275,9 +281,9 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
 
 
 def _wall_problems(drop: Drop) -> list[Problem]:
-    """Find angles that do not go together, and a pad without its angle."""
-    given = {"receding_angle": drop.receding_angle, "advancing_angle": drop.advancing_angle}
-    angles = {f"drop.{name}": value for name, value in given.items() if value is not None}
+    """Find inconsistent contact angles, and a pad without a contact angle."""
+    hysteresis = {"receding_angle": drop.receding_angle, "advancing_angle": drop.advancing_angle}
+    angles = {f"drop.{name}": value for name, value in hysteresis.items() if value is not None}
     key, value = next(iter(angles.items()), ("", 0.0))
     if drop.contact_angle is not None and angles:
         both = "drop.receding_angle and drop.advancing_angle, or drop.contact_angle"

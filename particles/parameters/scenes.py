@@ -1,6 +1,6 @@
-"""Scenes of solder alone, their parameters in SI floats: a drop, a joint, two drops, a free drop that oscillates.
+"""Parameters (SI) of scenes with liquid solder alone: a drop, a joint, two drops, a free oscillating drop.
 
-A scene is resolved into the `Solder` and the geometry that the solvers take.
+A scene is resolved into the `Solder` and the geometry for the solvers.
 """
 
 import math
@@ -34,10 +34,10 @@ PROPERTIES = {
 
 
 class FloatingPackage(Parameters):
-    """A package that floats on the joint: free to lift, to shift (along x and y) or to turn (about x and y).
+    """Package that floats on the joint, free to lift, to shift (along x and y) or to turn (about x and y).
 
-    Free to shift and to turn it would roll off: a pad is in balance anywhere on a sphere. The load presses it down: its
-    weight over the number of its joints.
+    It cannot be free to both shift and turn, since it would roll off. The load presses it down: the weight of the
+    package divided by the number of its joints.
     """
 
     load: Annotated[float, Quantity("mN")] = Field(0.0, ge=0)
@@ -45,10 +45,11 @@ class FloatingPackage(Parameters):
 
 
 class PackagePath(Parameters):
-    """A package that is moved from where the joint reflows to another place; what is not given stays as it was.
+    """Path of a package from the position of the reflow to another one; omitted coordinates stay unchanged.
 
-    It is moved slowly, and the joint comes to rest in each of 10 steps or as many as are given; or, where inertia acts
-    and with the scheme ispg, in one go at a speed: that of the pad's centre, or of its edge where it is turned.
+    Without a speed the package moves slowly, and the joint comes to rest after each of ``steps`` steps (default 10).
+    With a speed, the package moves without stops; this needs inertia and the scheme ispg. The speed refers to
+    the centre of the pad, or to its edge in a rotation.
     """
 
     standoff: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
@@ -59,16 +60,16 @@ class PackagePath(Parameters):
 
 
 class Drop(Parameters):
-    """A drop that starts as a cube on a wall: uniform, or a round pad in the solder mask (with ``pad_radius``).
+    """Drop that starts as a cube on a uniform wall, or on a round pad in the solder mask (with ``pad_radius``).
 
-    A wall with hysteresis has ``receding_angle`` and ``advancing_angle`` in the place of ``contact_angle``. Without any
-    angle there is no wall: the drop is free and becomes a sphere.
-    Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; 11 per edge if neither is given.
-    With ``symmetry`` only half or a quarter of the drop is computed; volume and results are those of the whole.
-    With ``section`` it is computed in a plane, by the scheme ispg. Axisymmetric: its meridian alone, it starts as a
-    cylinder as high as the cube. Plane: it is the same along y, starts as the cube's section, and volume, energy and
-    forces are those of a piece as deep as the cube.
-    With ``speed`` it strikes the wall, by the scheme ispg: it starts as a sphere with the foot of a cap of 155 degrees.
+    For a wall with hysteresis, ``receding_angle`` and ``advancing_angle`` replace ``contact_angle``. Without any angle
+    the drop is free and becomes a sphere.
+    Resolution: ``spacing`` or ``particles_per_edge`` of the cube, not both; the default is 11 particles per edge.
+    With ``symmetry``, only half or a quarter of the drop is computed; volume and results refer to the whole drop.
+    With ``section``, the scheme ispg computes a two-dimensional drop. Axisymmetric: the drop starts as a cylinder as
+    high as the cube. Plane: the drop is uniform along y and starts as the section of the cube; volume, energy and
+    forces refer to a piece as deep as the cube.
+    With ``speed``, the scheme ispg computes an impact, which starts as a spherical cap of 155 degrees.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -85,12 +86,12 @@ class Drop(Parameters):
 
     @property
     def symmetry_axes(self) -> tuple[int, ...]:
-        """Axes of the planes of symmetry that the drop is cut by: 0 for x = 0, 1 for y = 0."""
+        """Normal axes of the planes of symmetry: 0 for x = 0, 1 for y = 0."""
         return {"none": (), "half": (0,), "quarter": (0, 1)}[self.symmetry]
 
     @property
     def particles(self) -> int:
-        """Number of particles of the cube, or of the part of it that is computed."""
+        """Number of particles of the computed part of the cube."""
         if self.section == "plane":
             return self.count * (1 + 2 * max(3, round(0.5 * (self.count - 1))))
         if self.section != "none":
@@ -110,14 +111,14 @@ class Drop(Parameters):
 
     @property
     def count(self) -> int:
-        """Particles along an edge of the cube."""
+        """Number of particles along an edge of the cube."""
         if self.spacing is not None:
             return max(2, 1 + round(self.edge / self.spacing))
         return self.particles_per_edge or DEFAULT_PER_EDGE
 
     @property
     def resolution(self) -> float:
-        """Spacing of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         return self.edge / (self.count - 1)
 
     @property
@@ -134,22 +135,22 @@ class Drop(Parameters):
 
     @property
     def is_free(self) -> bool:
-        """Whether there is no wall."""
+        """Whether the scene is free of walls."""
         return self.contact_angle is None and self.hysteresis is None
 
     @property
     def contact_angles(self) -> dict[str, float]:
-        """Contact angles as the solder has them [rad]: of pad and mask."""
+        """Contact angles of pad and mask under the names of ``Solder`` [rad]."""
         if self.contact_angle is None:
             return {}
         return {"pad_contact_angle": self.contact_angle, "mask_contact_angle": self.mask_contact_angle}
 
 
 class Joint(Parameters):
-    """A joint between two round pads, one above the other; its rims are pinned or slide by pad and mask angle.
+    """Joint between two round pads; its contact lines are pinned or slide, by the angles of pad and mask.
 
-    The upper pad may be offset along x and tilted about y (its side at +x down). It holds still, unless there is a
-    table joint.package (it floats) or joint.path (it is moved).
+    The upper pad may be offset along x and tilted about y (the +x side down). It is fixed, unless a table
+    joint.package lets it float or a table joint.path moves it.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -166,28 +167,28 @@ class Joint(Parameters):
 
     @property
     def geometry(self) -> JointGeometry:
-        """Gap, pads, offset and tilt for the solver."""
+        """Gap, pad radii, offset and tilt for the solver."""
         return self.place(self.standoff, self.offset, self.tilt)
 
     def place(self, standoff: float, offset: float, tilt: float) -> JointGeometry:
-        """The pads with the upper one elsewhere: standoff and offset [m], tilt [rad]."""
+        """Return the geometry for another standoff [m], offset [m] and tilt [rad] of the upper pad."""
         return JointGeometry(standoff, self.pad_bottom, self.pad_top, (offset, 0.0), (0.0, tilt))
 
     @property
     def places(self) -> list[JointGeometry]:
-        """Where the path leads, step by step, in one at a speed; empty without a path."""
+        """Geometries after each step of the path, a single one with a speed; empty without a path."""
         if self.path is None:
             return []
         start = (self.standoff, self.offset, self.tilt)
-        given = (self.path.standoff, self.path.offset, self.path.tilt)
-        ways = [(a, a if b is None else b) for a, b in zip(start, given, strict=True)]
+        target = (self.path.standoff, self.path.offset, self.path.tilt)
+        ranges = [(a, a if b is None else b) for a, b in zip(start, target, strict=True)]
         steps = self.path.steps or (DEFAULT_PLACES if self.path.speed is None else 1)
         shares = [number / steps for number in range(1, steps + 1)]
-        return [self.place(*(a + share * (b - a) for a, b in ways)) for share in shares]
+        return [self.place(*(a + share * (b - a) for a, b in ranges)) for share in shares]
 
     @property
     def way(self) -> float:
-        """Length of the path [m], a rotation counted at the edge of the upper pad; zero without one."""
+        """Length of the path [m], with rotations measured at the edge of the upper pad; zero without a path."""
         if not self.places:
             return 0.0
         end = self.places[-1]
@@ -196,17 +197,17 @@ class Joint(Parameters):
 
     @property
     def resolution(self) -> float:
-        """Spacing of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         return self.spacing
 
     @property
     def contact_angles(self) -> dict[str, float]:
-        """Contact angles as the solder has them [rad]: of pad and mask."""
+        """Contact angles of pad and mask under the names of ``Solder`` [rad]."""
         return {"pad_contact_angle": self.pad_contact_angle, "mask_contact_angle": self.mask_contact_angle}
 
 
 class Scene(Protocol):
-    """What the solver has to know of a scene besides its geometry: volume [m^3], contact angles [rad], spacing [m]."""
+    """Scene data for the solver: volume [m^3], contact angles [rad] and particle spacing [m]."""
 
     @property
     def volume(self) -> float: ...  # noqa: D102
@@ -219,10 +220,10 @@ class Scene(Protocol):
 
 
 class Liquid(Parameters):
-    """A liquid by the name of a set of properties; a single value given here overrides that of the set.
+    """Liquid with a named set of properties, whose values can be overridden individually.
 
-    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
-    the viscosity.
+    The set physical is SAC solder; the set paper has the values of Hu et al., with 10 times the surface tension and
+    100 times the viscosity.
     """
 
     parameters: Literal["physical", "paper"] = "physical"
@@ -233,15 +234,15 @@ class Liquid(Parameters):
     @property
     def properties(self) -> dict[str, float]:
         """Density, surface tension and viscosity."""
-        own = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
-        return PROPERTIES[self.parameters] | own
+        overrides = {name: getattr(self, name) for name in PROPERTIES["physical"] if getattr(self, name) is not None}
+        return PROPERTIES[self.parameters] | overrides
 
 
 class Fluid(Liquid, Walls):
-    """Molten solder by the name of a set of properties; a single value given here overrides that of the set.
+    """Molten solder with a named set of properties, whose values can be overridden individually.
 
-    The set physical is SAC solder; paper is what Hu et al. print, with 10 times the surface tension and 100 times
-    the viscosity.
+    The set physical is SAC solder; the set paper has the values of Hu et al., with 10 times the surface tension and
+    100 times the viscosity.
     """
 
     gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
@@ -250,13 +251,13 @@ class Fluid(Liquid, Walls):
     numerics: FlowNumerics = FlowNumerics()
 
     def resolve(self, scene: Scene, gravity: Switch) -> Solder:
-        """Return the solder of a scene, with the set's properties where none are given.
+        """Return the solder of a scene, with the properties of this liquid.
 
-        The scheme auto is energy here; `scene_checks.with_scheme` may take another.
+        The scheme auto becomes energy here; ``scene_checks.with_scheme`` may select another one.
 
         Args:
-            scene: volume and contact angles.
-            gravity: whether gravity acts.
+            scene: Volume, contact angles and spacing.
+            gravity: Switch of gravity.
         """
         numerics = self.numerics.model_dump()
         if self.numerics.scheme == "auto":
@@ -275,9 +276,9 @@ class Fluid(Liquid, Walls):
 
 
 class Drops(Parameters):
-    """Two drops, their centres a distance apart, that are meant to become one or (with merge = false) to stay apart.
+    """Two drops at a distance of centres, which are expected to merge or, with merge = false, to stay apart.
 
-    With a contact angle they start as cubes on a wall and spread; without, there is no wall and they start as balls.
+    With a contact angle they start as cubes on a wall and spread; otherwise they are free and start as spheres.
     """
 
     volume_left: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -299,34 +300,34 @@ class Drops(Parameters):
 
     @property
     def resolution(self) -> float:
-        """Spacing of the particles at the start [m]."""
+        """Initial spacing of the particles [m]."""
         return self.spacing
 
     @property
     def is_free(self) -> bool:
-        """Whether there is no wall."""
+        """Whether the scene is free of walls."""
         return self.contact_angle is None
 
     @property
     def contact_angles(self) -> dict[str, float]:
-        """Contact angle as the solder has it [rad]."""
+        """Contact angle under its name in ``Solder`` [rad]."""
         return {} if self.contact_angle is None else {"pad_contact_angle": self.contact_angle}
 
     def per_edge(self, volume: float) -> int:
-        """Particles along an edge of the cube of a volume [m^3]."""
+        """Return the number of particles along an edge of a cube of a volume [m^3]."""
         return 1 + round(volume ** (1.0 / 3.0) / self.spacing)
 
     @property
     def particles(self) -> int:
-        """Particles of both cubes; balls have nearly as many."""
+        """Number of particles of both cubes, an approximation for spheres."""
         return sum(self.per_edge(volume) ** 3 for volume in self.volumes)
 
 
 class Oscillation(Parameters):
-    """A free drop that swings in its second mode: it starts as a ball, with the velocity of that mode.
+    """Free drop that oscillates in its second mode, starting as a sphere with the velocity of that mode.
 
-    The amplitude is in radii, the duration in Rayleigh's periods. The scheme inertia carries tetrahedra along, ispg is
-    the paper's particle method in a form that holds.
+    The amplitude is in radii, the duration in Rayleigh periods. The scheme inertia uses moving tetrahedra; ispg is a
+    stable form of the particle method of Hu et al.
     """
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -338,7 +339,7 @@ class Oscillation(Parameters):
 
     @property
     def radius(self) -> float:
-        """Radius of the ball [m]."""
+        """Radius of the sphere [m]."""
         return (0.75 * self.volume / pi) ** (1.0 / 3.0)
 
     @property
@@ -347,12 +348,12 @@ class Oscillation(Parameters):
         return 1 + sum(10 * shell**2 + 2 for shell in range(1, self.particles_per_radius + 1))
 
     def resolve(self, liquid: Liquid) -> Solder:
-        """Return the drop's liquid."""
+        """Return the solder of the drop."""
         scheme = "ispg" if self.scheme == "ispg" else "energy"
         numerics = SolderNumerics(spacing=self.radius / self.particles_per_radius, scheme=scheme)
         return Solder(volume=self.volume, numerics=numerics, **liquid.properties)
 
 
 def rayleigh_period(scene: Oscillation, solder: Solder) -> float:
-    """Period of the second mode at small amplitude and viscosity [s]."""
+    """Return the period of the second mode at small amplitude and viscosity [s]."""
     return 2.0 * pi / rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)

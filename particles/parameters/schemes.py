@@ -1,6 +1,6 @@
-"""Registry of the schemes that compute a reflow, and of what each of them does not support; no numerical library.
+"""Registry of the reflow schemes and their limits; loads no numerical library.
 
-`scenes/step_methods.py` has the step solvers of each scheme.
+``scenes/step_methods.py`` has the step solvers of each scheme.
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ class SchemeRecord:
     """Scheme of a reflow and its limits.
 
     Attributes:
-        walls: Conditions on walls that it supports.
+        walls: Supported wall conditions.
         largest_time_step: Largest stable time step, in capillary limits.
-        has_basis: Whether `numerics.basis` selects its basis.
+        has_basis: Whether ``numerics.basis`` selects its basis.
         moves_plates: Whether plates may move.
         moves_at_speed: Whether a package may move at a speed, with inertia.
     """

@@ -1,6 +1,6 @@
-"""Parameters of the molten solder and of how its flow is computed.
+"""Parameters of molten solder and of the computation of its flow.
 
-All values are SI floats; ``Quantity`` has the unit in which a user sees them.
+All values are SI floats; ``Quantity`` has the unit of the case file.
 """
 
 import math
@@ -15,15 +15,15 @@ from reflowshock.quantity import Quantity
 
 
 class FlowNumerics(Parameters):
-    """How a reflow is computed, apart from its resolution.
+    """Numerical parameters of a reflow, apart from the resolution.
 
-    The scheme energy moves to the least energy of the tracked surface at exactly the volume, on tetrahedra where
-    inertia or viscosity acts. The scheme ispg is the paper's method in a form that holds, for drops on a wall or that
-    merge and for joints, with inertia. The scheme auto is ispg where that is verified, which costs less than
-    tetrahedra, else energy. The scheme gripc is what Hu et al. print, for comparison: time steps end at the capillary
-    limit, and drops break up.
+    The scheme energy minimises the energy of the tracked surface at constant volume, and uses tetrahedra for inertia
+    and viscosity. The scheme ispg is a stable form of the method of Hu et al., with inertia, for drops on a wall,
+    merging drops and joints. The scheme auto selects ispg where it is verified, since it costs less than tetrahedra,
+    and energy otherwise. The scheme gripc is the method as published by Hu et al., for comparison: its time steps are
+    bounded by the capillary limit, and drops break up.
 
-    Where max_steps is not given, it is 1000; with ispg as many more as the slowest swing of the solder dies away in.
+    The default of max_steps is 1000; with ispg it grows by the steps in which the slowest oscillation decays.
     """
 
     scheme: SchemeOrAuto = "auto"
@@ -34,23 +34,23 @@ class FlowNumerics(Parameters):
 
 
 class SolderNumerics(FlowNumerics):
-    """How the reflow is computed, by a scheme that is decided."""
+    """Numerical parameters of a reflow with a resolved scheme."""
 
     scheme: Scheme = "energy"
     spacing: Annotated[float, Quantity("mm")] = Field(4.0e-5, gt=0)
 
 
 class Reflow(Parameters):
-    """Who computes the joints of an array: as many MPI ranks, or, without a number, processes on the cores given.
+    """Parallel execution of an array of joints: a number of MPI ranks or, by default, processes on the available cores.
 
-    The joints are the same to the last bit. Ranks may be on several machines that see the run folder.
+    The results are identical to the last bit. Ranks may run on several machines that share the run folder.
     """
 
     ranks: int | None = Field(None, ge=1, le=100_000)
 
 
 class FlowEffects(Parameters):
-    """Effects of a reflow but gravity: decided from dimensionless numbers (auto), or by the user."""
+    """Effects of a reflow except gravity: decided from dimensionless numbers (auto), or set by the user."""
 
     inertia: Switch = "auto"
     viscosity: Switch = "auto"
@@ -59,9 +59,9 @@ class FlowEffects(Parameters):
 
 
 class Walls(Parameters):
-    """How liquid slides on walls where viscosity acts; contact lines move in any case.
+    """Wall condition of viscous flow; contact lines move in any case.
 
-    The slip length belongs to wall = "slip" (Navier): the depth below the wall at which the flow would rest.
+    The slip length is for wall = "slip" (Navier): the depth below the wall at which the extrapolated flow would rest.
     """
 
     wall: Wall = "free-slip"
@@ -69,13 +69,13 @@ class Walls(Parameters):
 
 
 class SolderEffects(FlowEffects):
-    """Effects of the reflow: decided from dimensionless numbers (auto), or by the user."""
+    """Effects of a reflow: decided from dimensionless numbers (auto), or set by the user."""
 
     gravity: Switch = "auto"
 
 
 class Solder(Walls):
-    """Molten solder: volume of a ball, fluid properties, contact angles, process."""
+    """Molten solder: volume of one ball, fluid properties, contact angles and process."""
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
     density: Annotated[float, Quantity("kg/m^3")] = Field(8930.0, gt=0)

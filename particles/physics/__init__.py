@@ -1,1 +1,1 @@
-"""What acts on a liquid body: a list of effects; start with `physics.py`."""
+"""Forces, operators and constraints of a liquid body; start with ``physics.py``."""

@@ -1,7 +1,7 @@
-"""Conservative forces on the free surface, gradients of their energies: surface tension, gravity, wall adhesion.
+"""Conservative surface forces as energy gradients: surface tension, gravity and wall adhesion.
 
-The weight of an incompressible body is a hydrostatic load on its boundary; wetting a wall gains gamma cos(theta) a unit
-area.
+The weight of an incompressible body is a hydrostatic load on its boundary; wetting a wall lowers the energy by
+gamma cos(theta) per unit area.
 """
 
 from collections.abc import Sequence
@@ -32,65 +32,66 @@ class SurfaceTension:
     """Energy E = gamma A of the free surface.
 
     Attributes:
-        coefficient: surface tension gamma [N/m].
+        coefficient: Surface tension gamma [N/m].
     """
 
     coefficient: float
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """Pull on the surface, at the end of the step."""
+        """Add the force and its semi-implicit operator to the physics."""
         tension = cls(solder.surface_tension)
         return replace(physics, forces=(*physics.forces, tension), operators=(*physics.operators, tension))
 
     def energy(self, body: Body) -> float:
-        """Surface energy [J]."""
+        """Return the surface energy [J]."""
         return self.coefficient * surface_area(body.points, body.triangles)
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx = -gamma K x, `(n, 3)` [N]."""
+        """Return the force -dE/dx = -gamma K x, shape (n, 3) [N]."""
         return -self.coefficient * area_gradient(body.points, body.triangles)
 
     def matrix(self, body: Body, _space: Discretisation, time_step: float) -> sparse.csr_matrix:
-        """Semi-implicit part dt gamma K, `(3 n, 3 n)` [kg/s]: the force at the end of the step is f - dt gamma K v."""
+        """Return the semi-implicit matrix dt gamma K, shape (3 n, 3 n) [kg/s]; the new force is f - dt gamma K v."""
         stiffness = self.coefficient * cotangent_laplacian(body.points, body.triangles, len(body.points))
         return sparse.kron(sparse.identity(3), time_step * stiffness, format="csr")
 
 
 @dataclass(frozen=True, slots=True)
 class Gravity:
-    """Potential energy of the weight in the tracked surface.
+    """Gravity as the potential energy of the volume inside the tracked surface.
 
-    The weight m g of each particle would leave the statics to the interior operator (1 % in height).
+    Weights m g of the particles would make the equilibrium depend on the interior operator (1 % error in height).
 
     Attributes:
-        weight: rho g, weight of the unit volume [N/m^3].
+        weight: Specific weight rho g [N/m^3].
     """
 
     weight: float
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """Push on the surface."""
+        """Add the force to the physics."""
         return replace(physics, forces=(*physics.forces, cls(solder.density * solder.gravity)))
 
     def energy(self, body: Body) -> float:
-        """Potential energy rho g times the integral of z over the body [J], by the divergence theorem.
+        """Return the potential energy, rho g times the integral of z over the body [J].
 
-        The integral of z^2 / 2 n_z over the free surface and over the walls, exact for flat triangles.
+        By the divergence theorem this is the integral of z^2 / 2 n_z over free surface and walls, exact for flat
+        triangles.
         """
         return self.weight * self._potential(body)[0]
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N], of this very energy.
+        """Return the force -dE/dx, shape (n, 3) [N], the exact gradient of the discrete energy.
 
-        The hydrostatic load -rho g z dV/dx is the same to second order in the spacing; but where it differs, a step
-        along it may raise the energy, and a flat film never rests.
+        The hydrostatic load -rho g z dV/dx agrees to second order in the spacing, but a step along it may raise the
+        energy, so that a flat film never comes to rest.
         """
         return -self.weight * self._potential(body)[1]
 
     def _potential(self, body: Body) -> tuple[float, Floats]:
-        """Integral of z over the body [m^4] and its gradient `(n, 3)` [m^3]."""
+        """Return the integral of z over the body [m^4] and its gradient, shape (n, 3) [m^3]."""
         total, gradient = _potential_and_gradient(body.points, body.triangles)
         for ring, plate in zip(body.cloud.rings, body.plates, strict=True):
             corners = wall_corners(body.points, ring, plate)
@@ -102,15 +103,15 @@ class Gravity:
 
 
 def _by_vertex(by_corner: Floats, side: float) -> Floats:
-    """Gradient by the vertices of a contact line `(k, 3)` of that by the corners of `wall_corners` `(k, 3, 3)`."""
-    own, after = (1, 2) if side > 0.0 else (2, 1)
+    """Convert a gradient by the corners of ``wall_corners``, shape (k, 3, 3), to one by line vertices, shape (k, 3)."""
+    vertex, successor = (1, 2) if side > 0.0 else (2, 1)
     centre = by_corner[:, 0].sum(axis=0) / len(by_corner)
-    return by_corner[:, own] + np.roll(by_corner[:, after], 1, axis=0) + centre
+    return by_corner[:, vertex] + np.roll(by_corner[:, successor], 1, axis=0) + centre
 
 
 @njit(cache=True)
 def _potential_and_gradient(points, triangles):
-    """Integral of z^2 / 2 n_z over flat triangles [m^4], and its gradient `(n, 3)` [m^3]."""
+    """Return the integral of z^2 / 2 n_z over flat triangles [m^4] and its gradient, shape (n, 3) [m^3]."""
     total, gradient = 0.0, np.zeros(points.shape)
     for t in range(triangles.shape[0]):
         i, j, m = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -132,9 +133,9 @@ class Wetting:
     """Energy E = -gamma cos(theta) A_wet of the wetted walls (the functional of Brakke's Surface Evolver).
 
     Attributes:
-        coefficient: surface tension gamma [N/m].
-        lines: contact lines with the angle that acts on each vertex.
-        others: all other forces on the surface; with them a pinned vertex knows its contact angle.
+        coefficient: Surface tension gamma [N/m].
+        lines: Contact lines with the contact angle at each vertex.
+        others: All other surface forces; their balance gives the contact angle at a pinned vertex.
     """
 
     coefficient: float
@@ -143,16 +144,16 @@ class Wetting:
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """Pull on the contact lines and let them go; all other forces act already."""
+        """Add the force and the events of the contact lines; all other forces must be present."""
         wetting = cls(solder.surface_tension, physics.lines, physics.forces)
         return replace(physics, forces=(*physics.forces, wetting), events=(*physics.events, wetting))
 
     def energy(self, body: Body) -> float:
-        """Energy of the walls [J], that of a line at the edges of the pads being zero."""
+        """Return the energy of the wetted walls [J], relative to contact lines at the edges of the pads."""
         return -self.coefficient * sum(line.cosine_area(body) for line in self.lines)
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx on the contact lines, gamma cos(theta) dA_wet/dx where one angle acts, `(n, 3)` [N]."""
+        """Return the force -dE/dx, shape (n, 3) [N]: gamma cos(theta) dA_wet/dx on contact lines of one angle."""
         force = np.zeros_like(body.points)
         for line in self.lines:
             ring = body.cloud.rings[line.wall]
@@ -160,12 +161,12 @@ class Wetting:
         return force
 
     def contact_cosines(self, body: Body) -> list[Floats]:
-        """Cosines of the contact angles at the vertices of each contact line, from the balance of forces."""
+        """Compute the cosines of the contact angles at the vertices of each contact line, by the balance of forces."""
         load = self._load(body)
         return [line.contact_cosine(body, load, self.coefficient) for line in self.lines]
 
     def update(self, body: Body) -> None:
-        """Release vertices at the edges of the wetted discs, hold those that have crossed one."""
+        """Release or pin vertices at the edges of the pads."""
         lines = [line for line in self.lines if line.has_events]
         if not lines:
             return
@@ -174,26 +175,26 @@ class Wetting:
             line.update(body, load, self.coefficient)
 
     def attempt(self, body: Body) -> bool:
-        """Put vertices close to an edge that would hold them onto it; return whether there were any.
+        """Snap vertices close to a pinning edge onto it; return whether any moved.
 
-        Alone this dents the surface: it pays where the step that follows gains more than it takes.
+        This raises the energy; it is kept only if the next step lowers the energy by more.
         """
         lines = [line for line in self.lines if line.has_edge]
         if not lines:
             return False
-        load, found = self._load(body), False
+        load, has_moved = self._load(body), False
         for line in lines:
             near = line.near_edges(body, load, self.coefficient)
             if near.any():
                 line.catch(body, near)
-                found = True
-        return found
+                has_moved = True
+        return has_moved
 
     def _load(self, body: Body) -> Floats:
-        """All forces but the walls', `(n, 3)` [N], with the mean capillary pressure of the surface.
+        """Return all forces except wetting, shape (n, 3) [N], including the mean capillary pressure of the surface.
 
-        The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines; the
-        pressure of the solve would bring the accelerations of a violent start into the contact angle.
+        The pressure p is the least-squares solution of f + p a = 0 over the vertices off the contact lines. The
+        pressure of the solver would add the accelerations of a violent start to the contact angle.
         """
         force = sum((other.force(body) for other in self.others), np.zeros_like(body.points))
         force, gradient = fold(body.cloud, force), fold(body.cloud, body.volume()[1])

@@ -1,9 +1,9 @@
-"""Implicit operators of a step: mass and inertia, viscosity, and what a wall does to the liquid that slides on it.
+"""Implicit operators of a step: mass, inertia, viscosity and wall friction.
 
-A wall does nothing (free slip), exerts a friction (Navier slip), or holds the liquid. Navier's condition: the shear
-stress on the wall is mu / b times the velocity relative to the plate, b the slip length, the depth below the wall at
-which the flow, continued linearly, would rest. Contact lines stay mobile without slip, too: there the stress of a line
-that moves would be infinite (Huh & Scriven 1971).
+Walls have free slip, Navier slip or no slip. Navier's condition: the shear stress on the wall is mu / b times the
+velocity relative to the plate, where the slip length b is the depth below the wall at which the linearly extrapolated
+velocity vanishes. Contact lines remain mobile even without slip, since the stress at a moving line would be infinite
+(Huh & Scriven 1971).
 """
 
 from dataclasses import dataclass, replace
@@ -21,36 +21,36 @@ from reflowshock.particles.physics.physics import Physics
 
 @dataclass(frozen=True, slots=True)
 class Mass:
-    """Mass. Without `Inertia` beside it, it only damps: velocity is force times dt over mass.
+    """Mass matrix; without ``Inertia`` it only acts as damping, with velocity = force * dt / mass.
 
     Attributes:
-        density: [kg/m^3].
+        density: Density [kg/m^3].
     """
 
     density: float
 
     def matrix(self, _body: Body, space: Discretisation, time_step: float) -> sparse.csr_matrix:
-        """M / dt, `(3 n, 3 n)` [kg/s]."""
+        """Return M / dt, shape (3 n, 3 n) [kg/s]."""
         return sparse.kron(sparse.identity(3), self.density / time_step * space.mass, format="csr")
 
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Momentum of the last step.
+    """Inertia: momentum carried over from the last step.
 
     Attributes:
-        density: [kg/m^3].
+        density: Density [kg/m^3].
     """
 
     density: float
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """Carry momentum from step to step."""
+        """Add the momentum of the last step to the physics."""
         return replace(physics, momenta=(*physics.momenta, cls(solder.density)))
 
     def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
-        """M v_n / dt, `(n, 3)` [N]."""
+        """Return M v_n / dt, shape (n, 3) [N]."""
         return self.density / time_step * (space.mass @ body.velocity)
 
 
@@ -59,14 +59,14 @@ class Viscosity:
     """Newtonian viscosity.
 
     Attributes:
-        coefficient: dynamic viscosity mu [Pa s].
+        coefficient: Dynamic viscosity mu [Pa s].
     """
 
     coefficient: float
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """Share momentum in the liquid and, where it does not slide freely, with the walls."""
+        """Add the viscous operator, and the wall friction or no-slip condition of the solder, to the physics."""
         acting = replace(physics, operators=(*physics.operators, cls(solder.viscosity)))
         if solder.wall == "slip" and solder.slip_length is not None:
             return replace(acting, frictions=(*acting.frictions, NavierSlip(solder.viscosity / solder.slip_length)))
@@ -75,7 +75,7 @@ class Viscosity:
         return acting
 
     def matrix(self, _body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
-        """Matrix of the virtual power, `(3 n, 3 n)` [kg/s], components one after the other.
+        """Return the matrix of the virtual power, shape (3 n, 3 n) [kg/s], ordered by component.
 
         With D = (grad v + grad v^T) / 2:
         2 mu D : D = mu (grad v : grad v + grad v : grad v^T). Symmetric, positive semidefinite, zero for rigid motion.
@@ -91,36 +91,36 @@ class Viscosity:
 
 @dataclass(frozen=True, slots=True)
 class NavierSlip:
-    """Friction on all walls.
+    """Navier slip on all walls.
 
     Attributes:
-        coefficient: viscosity over slip length [Pa s/m].
+        coefficient: Viscosity over slip length [Pa s/m].
     """
 
     coefficient: float
 
     def matrix(self, body: Body, space: Discretisation, _time_step: float) -> sparse.csr_matrix:
-        """Matrix `(3 n, 3 n)` [kg/s] that multiplies the velocities relative to the plates."""
+        """Return the friction matrix, shape (3 n, 3 n) [kg/s], for velocities relative to the plates."""
         return sparse.diags(np.tile(self.coefficient * wall_areas(body, space), 3), format="csr")
 
 
 @dataclass(frozen=True, slots=True)
 class NoSlip:
-    """Walls hold the liquid that touches them, except at contact lines."""
+    """No-slip condition: liquid sticks to the walls, except at contact lines."""
 
     def pinned(self, body: Body) -> NDArray[np.int32]:
-        """The particles on walls, less those of the contact lines."""
-        held = body.cloud.wall >= 0
+        """Return the indices of the particles on walls, except those on contact lines."""
+        on_walls = body.cloud.wall >= 0
         for ring in body.cloud.rings:
-            held[ring] = False
-        return np.flatnonzero(held).astype(np.int32)
+            on_walls[ring] = False
+        return np.flatnonzero(on_walls).astype(np.int32)
 
 
 def wall_areas(body: Body, space: Discretisation) -> Floats:
-    """Area of the wall that each particle stands for, `(n,)` [m^2]; zero off the walls.
+    """Compute the wall area that belongs to each particle, shape (n,) [m^2]; zero off the walls.
 
-    The gradient of the volume is the third of the area vectors of all faces around a particle, those of the free
-    surface included, which contact lines have a part in.
+    The volume gradient of a particle is one third of the area vectors of all faces around it. At contact lines this
+    includes faces of the free surface, which are subtracted.
     """
     corners = body.points[body.triangles]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6.0

@@ -1,4 +1,4 @@
-"""What acts on a liquid body: lists of effects. An effect that is off is absent from its list."""
+"""Physics of a liquid body: forces, operators, events and constraints of the active effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,59 +19,62 @@ from reflowshock.particles.surface.contact_line import ContactLine
 
 
 class Force(Protocol):
-    """A conservative force on the surface."""
+    """Conservative force on the surface."""
 
     def energy(self, body: Body) -> float:
-        """Energy [J]."""
+        """Return the energy [J]."""
 
     def force(self, body: Body) -> Floats:
-        """Force -dE/dx, `(n, 3)` [N]: the gradient of this very energy, so that a step along it lowers it."""
+        """Return the force -dE/dx, shape (n, 3) [N]: the exact negative gradient of ``energy``."""
 
 
 class Operator(Protocol):
-    """A part of the implicit step: a symmetric matrix that multiplies the new velocity."""
+    """Part of the implicit step: a symmetric matrix that multiplies the new velocity."""
 
     def matrix(self, body: Body, space: Discretisation, time_step: float) -> sparse.csr_matrix:
-        """Matrix `(3 n, 3 n)` [kg/s], components one after the other."""
+        """Return the matrix, shape (3 n, 3 n) [kg/s], ordered by component."""
 
 
 class Momentum(Protocol):
-    """What is left of the last step's velocity."""
+    """Momentum carried over from the last step."""
 
     def load(self, body: Body, space: Discretisation, time_step: float) -> Floats:
-        """Momentum over the time step, `(n, 3)` [N]."""
+        """Return the momentum divided by the time step, shape (n, 3) [N]."""
 
 
 class Hold(Protocol):
-    """What keeps particles where they are on their plates."""
+    """Constraint that pins particles to their plates."""
 
     def pinned(self, body: Body) -> NDArray[np.int32]:
-        """The particles."""
+        """Return the indices of the pinned particles."""
 
 
 class Event(Protocol):
-    """A discrete change before a step."""
+    """Discrete change of the boundary before a step."""
 
     def update(self, body: Body) -> None:
-        """Change the state of the body's boundary where that changes no energy."""
+        """Change the state of the boundary without changing the energy."""
 
     def attempt(self, body: Body) -> bool:
-        """Change it where a step may make up for the energy, which is else undone; return whether it did."""
+        """Make a change that may raise the energy; return whether any was made.
+
+        The caller undoes it unless the next step lowers the energy again.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Everything that acts on a body.
+    """Active effects on a body; the lists contain only the effects that are on.
 
     Attributes:
-        forces: conservative forces.
-        operators: parts of the implicit matrix; the mass is one of them.
-        momenta: empty in the quasi-static mode, where each step relaxes towards rest.
-        events: changes before a step.
-        lines: contact lines, which hold their pinned vertices.
-        motions: of the plates that do not rest.
-        frictions: operators on the velocities relative to the plates.
-        holds: what else pins particles to their plates.
+        forces: Conservative forces.
+        operators: Parts of the implicit matrix, including the mass.
+        momenta: Momenta of the last step; empty in the quasi-static mode, where each step relaxes towards rest.
+        events: Changes of the boundary before a step.
+        lines: Contact lines, which hold their pinned vertices.
+        motions: Motions of the moving plates.
+        frictions: Operators on the velocities relative to the plates.
+        holds: Further constraints that pin particles to their plates.
     """
 
     forces: Sequence[Force]
@@ -84,50 +87,56 @@ class Physics:
     holds: Sequence[Hold] = ()
 
     def force(self, body: Body) -> Floats:
-        """Sum of the forces `(n, 3)` [N]."""
+        """Return the sum of the forces, shape (n, 3) [N]."""
         return sum((force.force(body) for force in self.forces), np.zeros_like(body.points))
 
     def energy(self, body: Body) -> float:
-        """Sum of the energies [J], with the potential of the loads on the plates."""
+        """Return the sum of the energies [J], including the potential of the loads on the plates."""
         loads = sum(float(motion.load @ body.plates[motion.wall].origin) for motion in self.motions)
         return sum(force.energy(body) for force in self.forces) - loads
 
     def pinned(self, body: Body) -> NDArray[np.bool_]:
-        """The particles that edges and walls hold, `(n,)`."""
+        """Return whether each particle is pinned by an edge or a wall, shape (n,)."""
         pinned = np.zeros(len(body.points), bool)
         for hold in (*self.lines, *self.holds):
             pinned[hold.pinned(body)] = True
         return pinned
 
     def admit(self, body: Body, field: Floats) -> Floats:
-        """The part of a displacement `(n, 3)` that resting plates, symmetry (free slip) and edges (none) allow."""
+        """Project a displacement field on the admissible one, shape (n, 3).
+
+        Particles slide along resting plates and planes of symmetry; pinned particles do not move.
+        """
         along = fold(body.cloud, slide(body.plates, body.cloud.wall, field))
         return np.where(self.pinned(body)[:, None], 0.0, along)
 
     def projections(self, body: Body) -> Floats:
-        """The matrices `(n, 3, 3)` of `admit`, one for each particle: what it leaves of the unit vectors."""
+        """Return the projection matrices of ``admit``, one per particle, shape (n, 3, 3)."""
         fields = (np.tile(axis, (len(body.points), 1)) for axis in np.eye(3))
         return np.stack([self.admit(body, field) for field in fields], axis=-1)
 
 
 class Acting(Protocol):
-    """The object of an effect, `place` in `parameters/effects.py`: a class that joins what acts."""
+    """Class that implements an effect; ``place`` in ``parameters/effects.py`` names it."""
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:
-        """The lists with an object of it for a solder."""
+        """Return the physics extended by the effect, with the properties of the solder."""
 
 
 def plate_wrench(body: Body, others: Sequence[Force], wall: int) -> Floats:
-    """Force `(3,)` [N] and moment about the plate's origin `(3,)` [N m] of the solder on a plate, `(6,)`.
+    """Compute the wrench of the solder on a plate.
 
-    A plate that moves takes its contact line along, and the energy E - p V changes by the forces on the line: the
-    pull of the free surface, and the pressure on the wetted area and on the line's share of the free surface.
+    A moving plate carries its contact line along, and the energy E - p V changes by the forces on the line: the
+    tension of the free surface, and the pressure on the wetted area and on the line's share of the free surface.
 
     Args:
-        body: a body at rest.
-        others: forces on the surface but wetting (the wetted area does not change).
-        wall: index of the plate.
+        body: Body at rest.
+        others: Surface forces except wetting, since the wetted area does not change.
+        wall: Index of the plate.
+
+    Returns:
+        Force [N] and moment about the origin of the plate [N m], shape (6,).
     """
     ring = body.cloud.rings[wall]
     pressure = body.surface_pressure * body.volume()[1]

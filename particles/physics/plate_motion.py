@@ -1,4 +1,7 @@
-"""How plates move: along a prescribed path, or freely under the solder and a load. A plate in no list rests."""
+"""Motion of plates: along a prescribed path, or floating on the solder under a load.
+
+A twist is the velocity of the origin of a plate and its angular velocity, shape (6,) [m/s, rad/s].
+"""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,7 +17,7 @@ TURN = np.eye(6)[3:5]
 
 
 class PlateMotion(Protocol):
-    """The motion of one plate: a given twist, and free ones. A twist is the velocity of the origin and a spin."""
+    """Motion of one plate: a prescribed twist and free directions."""
 
     @property
     def wall(self) -> int:
@@ -22,25 +25,25 @@ class PlateMotion(Protocol):
 
     @property
     def directions(self) -> Floats:
-        """The twists with which the plate moves freely, `(k, 6)`."""
+        """Twists in which the plate moves freely, shape (k, 6)."""
 
     @property
     def load(self) -> Floats:
-        """Force on the plate besides the solder's, at its origin, `(3,)` [N]."""
+        """External force at the origin of the plate, shape (3,) [N]."""
 
     def given(self, plate: Plate, time_step: float) -> Floats:
-        """Twist `(6,)` [m/s, rad/s] over the next time step [s]."""
+        """Return the prescribed twist over the next time step [s], shape (6,) [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Travel:
-    """A plate that is moved to a target on the straight way, at a speed.
+    """Plate that moves straight to a target at constant speed.
 
     Attributes:
-        wall: index of the plate.
-        target: where it stops.
-        speed: of the origin, and of a point that a rotation turns on the lever [m/s].
-        lever: for example the radius of the pad [m].
+        wall: Index of the plate.
+        target: Final position of the plate.
+        speed: Speed of the origin, or of a rotating point at the distance ``lever`` [m/s].
+        lever: Length that converts rotations to distances, for example the pad radius [m].
     """
 
     wall: int
@@ -50,32 +53,32 @@ class Travel:
 
     @property
     def directions(self) -> Floats:
-        """None."""
+        """Free twists: none, shape (0, 6)."""
         return np.zeros((0, 6))
 
     @property
     def load(self) -> Floats:
-        """None."""
+        """External force: zero, shape (3,) [N]."""
         return np.zeros(3)
 
     def given(self, plate: Plate, time_step: float) -> Floats:
-        """Twist towards the target, `(6,)`."""
+        """Return the twist towards the target, shape (6,) [m/s, rad/s]."""
         return plate.motion_to(self.target) / max(time_step, self.duration(plate))
 
     def duration(self, plate: Plate) -> float:
-        """Time that the way to the target takes [s]."""
-        way = plate.motion_to(self.target) * np.repeat((1.0, self.lever), 3)
-        return float(np.linalg.norm(way)) / self.speed
+        """Return the time to reach the target [s]."""
+        path = plate.motion_to(self.target) * np.repeat((1.0, self.lever), 3)
+        return float(np.linalg.norm(path)) / self.speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floating:
-    """A plate that follows the solder's force and a load.
+    """Floating plate, moved by the force of the solder and a load.
 
     Attributes:
-        wall: index of the plate.
-        directions: `(k, 6)` twists that are free, such as LIFT, SHIFT and TURN, stacked.
-        load: `(3,)` force at its origin [N], for example a share of the package's weight.
+        wall: Index of the plate.
+        directions: Free twists, such as LIFT, SHIFT and TURN stacked, shape (k, 6).
+        load: Force at the origin, for example a share of the package's weight, shape (3,) [N].
     """
 
     wall: int
@@ -83,5 +86,5 @@ class Floating:
     load: Floats
 
     def given(self, _plate: Plate, _time_step: float) -> Floats:
-        """None."""
+        """Return the prescribed twist, which is zero, shape (6,) [m/s, rad/s]."""
         return np.zeros(6)

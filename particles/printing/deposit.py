@@ -1,8 +1,8 @@
-"""Ink on a plate: particles that are liquid, held or solid, and the surface of what is liquid.
+"""Ink deposited on a plate: liquid, held and solid particles, and the surface of the bodies that have liquid.
 
-A particle that is cured or frozen never moves again. As long as some of its body, a connected part of the liquid's
-surface, is liquid, it is held: it stands still as walls do, but carries the surface. A body without liquid is solid: it
-leaves the loops, but for particles that liquid can reach, which are its walls.
+A body is a connected part of the liquid's surface. A cured or frozen particle never moves again. It is held while some
+of its body is liquid: it is fixed like a wall particle but still carries the surface. A body without liquid is solid:
+it is removed from the simulation except for particles that liquid can reach, which act as walls.
 """
 
 from collections.abc import Mapping
@@ -18,27 +18,36 @@ from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.flows.droplet_shape import start_shape
 from reflowshock.particles.flows.printing import WITHIN_REACH, Printing
 from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.heat import Heat, enthalpy_at
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
-from reflowshock.particles.sph.surface_care import EDGE
 from reflowshock.particles.sph_flows.droplet import liquid_of
-from reflowshock.particles.surface.closing import part_of_vertex
-from reflowshock.particles.surface.cloud_level_set import mirrored
-from reflowshock.particles.surface.level_set import LevelSet, within_band
+from reflowshock.particles.surface.cloud_level_set import with_mirror_image
+from reflowshock.particles.surface.level_set import LevelSet, signed_distance_in_band
+from reflowshock.particles.surface.morphological_closing import part_of_vertex
+from reflowshock.particles.surface.remeshing import EDGE
+from reflowshock.particles.surface.surface_mesh import SurfaceMesh
 
 LIQUID, HELD, SOLID = 0, 1, 2
-# In spacings: how far the surface of a new drop is from particles below it.
+# Distance between the surface of a new drop and particles below it, in spacings.
 CLEARANCE = 1.1
+# Relative tolerance of the dose that cures.
 ROUNDING = 1e-9
-# In spacings of the particles: nodes of the level set of the ground; in these, how far about its face it is told.
+# Node spacing of the level set of the ground, in particle spacings, and width of its band in nodes.
 NODES, MARGIN = 0.75, 4
 
 
 class CuredBody(NamedTuple):
-    """A solid body: surface of points `(m, 3)` [m] and triangles, which ends on the plate; the last of its drops."""
+    """A solid body.
+
+    Attributes:
+        points: Vertices of its surface, which ends on the plate, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        drop: Number of its last drop.
+    """
 
     points: Floats
     triangles: Indices
@@ -50,20 +59,22 @@ class Deposit:
     """Ink on a plate.
 
     Attributes:
-        scene: what is printed.
-        fields: quantities of all particles, in the order in which they have landed.
-        state: `(n,)` `LIQUID`, `HELD` or `SOLID`.
-        dose: `(n,)` of light that each has got [J/m^2].
-        enthalpy: `(n,)` of each where drops freeze, over that of solid at the melting point [J/kg].
-        drop: `(n,)` number of each one's drop.
-        bodies: what is solid, in the order in which it cured.
-        ground: distance to the bodies, on a grid about all that will be printed.
-        surface: of what is liquid, and held with it; empty where all is solid.
-        simulation: of what is liquid; None where nothing is.
-        order: which particles those of the simulation are.
-        heat: of these particles; None where nothing freezes.
-        time: [s].
-        spray: largest share of the liquid, with what is held with it, that was outside its surface at a time.
+        scene: Printing parameters.
+        fields: Fields of all particles, in the order of landing.
+        state: State of each particle, `LIQUID`, `HELD` or `SOLID`, shape (n,).
+        dose: Light dose of each particle, shape (n,) [J/m^2].
+        enthalpy: Specific enthalpy of each particle, zero in the solid at the melting point, shape (n,) [J/kg].
+        drop: Number of each particle's drop, shape (n,).
+        bodies: Solid bodies, in the order in which they became solid.
+        ground: Distance to the solid bodies, on a grid around the whole print.
+        surface: Surface of the bodies that have liquid; empty if all ink is solid.
+        simulation: Simulation of liquid and held particles; None if there is no liquid.
+        order: Number of each particle of the simulation.
+        heat: Heat of the particles of the simulation; None without freezing.
+        time: Time [s].
+        spray: Largest share of the liquid and held particles that was outside the surface at any time.
+        law: Parameters of the pair interactions.
+        start: Particles of a drop, its surface, and the spacing, before it is moved to its position.
     """
 
     scene: Printing
@@ -88,13 +99,13 @@ class Deposit:
         points, surface, spacing = start_shape(drop, EDGE)
         self.start = points, surface, spacing
         self.law, tension = liquid_of(drop, spacing)
-        self.ground = nothing_of(self.scene, spacing)
+        self.ground = empty_ground(self.scene, spacing)
         self.fields = flow.liquid_and_walls(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
-        none = np.empty((0, 3)), np.empty((0, 3), np.int32)
-        self.surface = LiquidSurface(*none, tension, cos(drop.angle), self.law)
+        mesh = SurfaceMesh(np.empty((0, 3)), np.empty((0, 3), np.int32), self.law.spacing, bool(self.law.mirror))
+        self.surface = LiquidSurface(mesh, Capillarity(tension, cos(drop.angle), self.law))
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state, for a checkpoint."""
         self.update()
         return {
             "fields": self.fields._asdict(), "state": self.state, "dose": self.dose, "drop": self.drop,
@@ -105,7 +116,7 @@ class Deposit:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that `saved` returned."""
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
         self.enthalpy, self.spray = saved["enthalpy"], saved["spray"]
@@ -121,29 +132,29 @@ class Deposit:
 
     @property
     def liquid(self) -> Indices:
-        """Particles that are liquid."""
+        """Numbers of the liquid particles, shape (k,)."""
         return np.flatnonzero(self.state == LIQUID)
 
     @property
     def moving(self) -> int:
-        """Number of particles that move now."""
+        """Number of particles that move at present."""
         return self.simulation.fluids if self.simulation else 0
 
     @property
     def points(self) -> Floats:
-        """Of all particles `(n, 3)` [m], up to the present where none moves now."""
+        """Positions of all particles at the last `update`, shape (n, 3) [m]."""
         return np.stack(self.fields[:3], axis=1)
 
     @property
     def pressures(self) -> Floats:
-        """Of all particles [Pa], with that of the surface; none in what is cured."""
+        """Pressure of all particles, that of the surface included, shape (n,) [Pa]; zero if held or solid."""
         return np.where(self.state == LIQUID, self.fields.pressure + self.surface.pressure, 0.0)
 
-    def add_drop(self, place: tuple[float, float]) -> None:
-        """Let a drop land at x, y [m]: it starts as a sphere that all but touches what is below it."""
+    def add_drop(self, position: tuple[float, float]) -> None:
+        """Add a drop at x, y [m], a sphere that almost touches the plate or the particles below it."""
         self.update()
         (start, (corners, triangles), _), drop = self.start, self.scene.drop
-        shift = np.array([*place, self._lift(place) - 0.5 * drop.diameter - 0.5 * EDGE * drop.spacing])
+        shift = np.array([*position, self._height(position) - 0.5 * drop.diameter - 0.5 * EDGE * drop.spacing])
         still = np.zeros(start.shape[1])
         new = flow.liquid_and_walls(start + shift[:, None], np.empty((3, 0)), still, self.law)
         for speed, value in zip(new[3:6], self.scene.velocity, strict=True):
@@ -157,7 +168,7 @@ class Deposit:
         self._begin()
 
     def _add_heat(self, count: int) -> None:
-        """Add particles of a new drop, warm; what is solid has cooled down to the plate."""
+        """Add the enthalpy of a new drop; solid particles have cooled down to the temperature of the plate."""
         freezing, warm = self.scene.freezing, 0.0
         if freezing is not None:
             self.enthalpy[self.state[: len(self.enthalpy)] == SOLID] = enthalpy_at(
@@ -166,23 +177,23 @@ class Deposit:
             warm = enthalpy_at(freezing, freezing.temperature)
         self.enthalpy = np.append(self.enthalpy, np.full(count, warm))
 
-    def _lift(self, place: tuple[float, float]) -> float:
-        """Height of the centre of a drop that lands at x, y [m]."""
+    def _height(self, position: tuple[float, float]) -> float:
+        """Return the height of the centre of a drop that lands at x, y [m]."""
         drop = self.scene.drop
         radius = 0.5 * drop.diameter
         near = radius + CLEARANCE * drop.spacing
-        aside2 = (self.fields.x - place[0]) ** 2 + (self.fields.y - place[1]) ** 2
+        aside2 = (self.fields.x - position[0]) ** 2 + (self.fields.y - position[1]) ** 2
         below = aside2 < near**2
         heights = self.fields.z[below] + np.sqrt(near**2 - aside2[below])
         return float(heights.max(initial=radius + 0.5 * EDGE * drop.spacing))
 
     def _begin(self) -> None:
-        """Start a simulation of what is liquid, with what of the solid it can reach."""
+        """Start a simulation of the liquid and held particles, with the solid ones that liquid can reach as walls."""
         liquid, held = self.liquid, np.flatnonzero(self.state == HELD)
         near = self._within_reach(np.concatenate((liquid, held)))
         self.order = np.concatenate((liquid, held, near))
         walls, viscosity = np.zeros((5, len(held) + len(near))), np.zeros(len(self.order))
-        fields = Fields(*[*(one[self.order] for one in self.fields[:12]), *walls, viscosity])
+        fields = Fields(*[*(values[self.order] for values in self.fields[:12]), *walls, viscosity])
         depth = -self.ground.at(self.points[near], 1) / self.law.length
         fields.wall_room[len(held) :] = beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
         self.surface.lie_on(self.ground if self.bodies else None)
@@ -193,12 +204,12 @@ class Deposit:
             self.heat = Heat(self.scene.freezing, self.law, self.enthalpy[self.order])
 
     def _add_body(self, body: CuredBody) -> None:
-        """Add a solid body to the ground."""
+        """Add a solid body to the bodies and to the ground."""
         self.bodies.append(body)
-        join(self.ground, body)
+        add_to_ground(self.ground, body)
 
     def _within_reach(self, carriers: Indices) -> Indices:
-        """Solid particles that liquid may come to touch."""
+        """Return the solid particles that may come within reach of liquid."""
         points, solid = self.points, np.flatnonzero(self.state == SOLID)
         reach = WITHIN_REACH * self.scene.length + SUPPORT * self.law.length
         low, high = points[carriers].min(axis=0) - reach, points[carriers].max(axis=0) + reach
@@ -206,7 +217,7 @@ class Deposit:
         return solid[near]
 
     def step(self, longest: float) -> float:
-        """Let the liquid flow for a time step, or less [s]; return it."""
+        """Advance the liquid by a stable time step, at most ``longest`` [s]; return the time step [s]."""
         assert self.simulation is not None
         time_step = min(self.simulation.time_step(), longest, self.heat.longest_step if self.heat else longest)
         self.simulation.step(time_step)
@@ -218,40 +229,43 @@ class Deposit:
         return time_step
 
     def update(self) -> None:
-        """Take over what the simulation has computed; what walls are given to act on liquid is not theirs."""
+        """Copy the results of the simulation to the fields, except the values that walls extrapolate."""
         if self.simulation is None:
             return
         moving = self.simulation.fluids
-        for everything, some in zip(self.fields[:12], self.simulation.fields[:12], strict=True):
-            everything[self.order[:moving]] = some[:moving]
+        for values, simulated in zip(self.fields[:12], self.simulation.fields[:12], strict=True):
+            values[self.order[:moving]] = simulated[:moving]
         if self.heat:
             self.enthalpy[self.order] = self.heat.enthalpy
 
     def expose(self, duration: float) -> None:
-        """Give all particles that are not solid the light of a duration [s], where it is light that cures."""
+        """Add the light of a duration [s] to the dose of all particles that are not solid, unless drops freeze."""
         self.update()
         if self.scene.freezes:
             return
-        open_ = np.flatnonzero(self.state != SOLID)
-        self.dose[open_] += duration * self._intensity(open_)
+        exposed = np.flatnonzero(self.state != SOLID)
+        self.dose[exposed] += duration * self._intensity(exposed)
 
     def cures_in(self) -> float:
-        """Duration until the next liquid particle is cured if nothing moves [s]."""
+        """Return the time until the next liquid particle is cured if nothing moves [s]."""
         liquid = self.liquid
         return float(((self.scene.light.dose - self.dose[liquid]) / self._intensity(liquid)).min())
 
     def _intensity(self, particles: Indices) -> Floats:
-        """Light at particles [W/m^2]: it dies out below the highest particle about the vertical through them."""
+        """Return the light intensity at particles, shape (k,) [W/m^2].
+
+        It decays exponentially with the depth below the highest particle within a spacing of the vertical.
+        """
         cure = self.scene.light
         if cure.depth is None:
             return np.full(len(particles), cure.intensity)
         points = self.points
-        beside = cKDTree(points[:, :2]).query_ball_point(points[particles, :2], self.law.spacing)
-        top = np.array([points[column, 2].max() for column in beside])
+        columns = cKDTree(points[:, :2]).query_ball_point(points[particles, :2], self.law.spacing)
+        top = np.array([points[column, 2].max() for column in columns])
         return cure.intensity * np.exp(-(top - points[particles, 2]) / cure.depth)
 
     def cure(self) -> bool:
-        """Hold liquid particles that are cured or frozen; bodies without liquid are solid. Return whether any were."""
+        """Hold cured or frozen particles and make bodies without liquid solid; return whether any particle changed."""
         self.update()
         cured = self.state == LIQUID
         if self.heat:
@@ -277,16 +291,21 @@ class Deposit:
         return True
 
 
-def join(ground: LevelSet, body: CuredBody) -> None:
-    """Add a solid body to a level set, with its image behind the plate."""
-    points, triangles = mirrored(body.points, body.triangles)
+def add_to_ground(ground: LevelSet, body: CuredBody) -> None:
+    """Add a solid body and its mirror image behind the plate to the level set of the ground, in place."""
+    points, triangles = with_mirror_image(body.points, body.triangles)
     part, nodes = ground.grid.part_around(points, MARGIN)
-    distance = within_band(points, triangles, part, MARGIN * part.spacing)
+    distance = signed_distance_in_band(points, triangles, part, MARGIN * part.spacing)
     ground.values[nodes] = np.minimum(ground.values[nodes], distance.values)
 
 
-def nothing_of(scene: Printing, spacing: float) -> LevelSet:
-    """Return the level set of nothing about all that will be printed, for particles a spacing apart [m]."""
+def empty_ground(scene: Printing, spacing: float) -> LevelSet:
+    """Return a level set without solid bodies on a grid around the whole print.
+
+    Args:
+        scene: Printing parameters.
+        spacing: Particle spacing [m].
+    """
     places = np.array(scene.places())
     aside = scene.length * (1.0 + WITHIN_REACH)
     top = (scene.layers + 1.0) * scene.length

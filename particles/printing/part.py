@@ -1,4 +1,4 @@
-"""The printed part: its surface, height map, roughness, voids, layers, and how many parts it consists of."""
+"""The printed part: surface, height map, roughness, voids, layers and number of connected parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,27 +12,29 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.surface_measure import volume_and_gradient
 from reflowshock.particles.flows.printing import Printing
 from reflowshock.particles.flows.result import Metrics
-from reflowshock.particles.printing.deposit import Deposit, join, nothing_of
-from reflowshock.particles.surface.closing import closed_level, groups
+from reflowshock.particles.printing.deposit import Deposit, add_to_ground, empty_ground
 from reflowshock.particles.surface.level_set import LevelSet, extract_surface
+from reflowshock.particles.surface.morphological_closing import close_gaps, connected_groups
 
-# In spacings of the particles: gaps of the part that are none; particles whose drops touch are not farther apart.
+# In particle spacings: width below which gaps between solid bodies are filled, and largest distance of two particles
+# whose drops touch.
 GAP, LINK = 1.0, 2.0
 
 
 class Layer(NamedTuple):
-    """What a layer added, and what all that is printed up to it looks like.
+    """One layer, and the print up to and including it.
 
     Attributes:
-        number: from 1.
-        drops: printed in it.
-        parts: connected parts of its drops alone.
-        parts_so_far: of all up to it.
-        mean_top: top of its drops on average [m].
-        height: top of all up to it [m].
-        roughness_sa, roughness_sz: of all up to it [m].
-        volume: of what cured in it [m^3].
-        voids: in all up to it.
+        number: Number of the layer, from 1.
+        drops: Number of drops in the layer.
+        parts: Number of connected parts of the layer's drops alone.
+        parts_so_far: Number of connected parts of the print so far.
+        mean_top: Mean height of the tops of the layer's drops [m].
+        height: Largest height of the print so far [m].
+        roughness_sa: Mean deviation Sa of the height of the print so far [m].
+        roughness_sz: Range Sz of the height of the print so far [m].
+        volume: Volume of the bodies that became solid in the layer [m^3].
+        voids: Number of voids in the print so far.
     """
 
     number: int
@@ -49,15 +51,16 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What was printed.
+    """A printed part.
 
     Attributes:
-        points: of its surface, closed by the plate, `(m, 3)` [m].
-        triangles: `(t, 3)`, outward oriented.
-        x, y: of the height map `(i,)`, `(j,)` [m].
-        heights: `(i, j)` above the plate [m]; 0 where there is no ink.
-        layers: in their order.
-        voids: volume of each [m^3].
+        points: Vertices of the surface, closed by the plate, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        x: Coordinates of the rows of the height map, shape (i,) [m].
+        y: Coordinates of its columns, shape (j,) [m].
+        heights: Height map above the plate, shape (i, j) [m]; 0 where there is no ink.
+        layers: Layers from the plate upwards.
+        voids: Volume of each void, shape (k,) [m^3].
     """
 
     points: Floats
@@ -70,7 +73,7 @@ class Part:
 
     @property
     def outcome(self) -> str:
-        """What became of the drops beside each other: merged, with voids or not, partly so, or separate."""
+        """Whether adjacent drops merged: "merged", "partly merged", "separate", or "voids" if there are any."""
         parts, drops = self.layers[-1].parts_so_far, self.layers[0].drops
         if len(self.voids):
             return "voids"
@@ -80,8 +83,8 @@ class Part:
 
 
 def part_of(scene: Printing, deposit: Deposit) -> Part:
-    """Return the part that solid bodies make."""
-    level = closed_level(deposit.ground, GAP * deposit.law.spacing)
+    """Assemble the printed part from the solid bodies of a deposit."""
+    level = close_gaps(deposit.ground, GAP * deposit.law.spacing)
     x, y, z = level.grid.axes()
     above = LevelSet(level.grid, np.maximum(level.values, -z))
     points, triangles = extract_surface(above)
@@ -89,7 +92,7 @@ def part_of(scene: Printing, deposit: Deposit) -> Part:
 
 
 def _heights(level: LevelSet) -> Floats:
-    """Height of the highest liquid above each node of the plate `(i, j)` [m]."""
+    """Return the height of the highest zero of a level set above each node of the plate, shape (i, j) [m]."""
     values, z = level.values, level.grid.axes()[2]
     inside = (values < 0.0) & (z > 0.0)
     top = len(z) - 1 - np.argmax(inside[:, :, ::-1], axis=2)
@@ -101,7 +104,7 @@ def _heights(level: LevelSet) -> Floats:
 
 
 def _voids(level: LevelSet) -> Floats:
-    """Volumes of what is enclosed and not filled `(k,)` [m^3]."""
+    """Return the volumes of enclosed voids, shape (k,) [m^3]."""
     air = (level.values > 0.0) & (level.grid.axes()[2] > 0.0)
     numbers, count = label(air)
     sizes = np.bincount(numbers.ravel(), minlength=count + 1)[1:]
@@ -109,20 +112,20 @@ def _voids(level: LevelSet) -> Floats:
 
 
 def _layers(scene: Printing, deposit: Deposit) -> list[Layer]:
-    """Return the layers; a body that several of them share counts to the last."""
+    """Measure the layers; a body that several layers share belongs to the last of them."""
     rows, points, spacing = [], deposit.points, deposit.law.spacing
     layer = deposit.drop // scene.drops_of_layer
     highest = np.full(scene.drops, -np.inf)
     np.maximum.at(highest, deposit.drop, points[:, 2] + 0.5 * spacing)
-    ground = nothing_of(scene, spacing)
+    ground = empty_ground(scene, spacing)
     for number in range(scene.layers):
         bodies = [body for body in deposit.bodies if body.drop // scene.drops_of_layer == number]
         for body in bodies:
-            join(ground, body)
-        level = closed_level(ground, GAP * spacing)
-        field = _field(scene, level.grid.axes(), _heights(level))
+            add_to_ground(ground, body)
+        level = close_gaps(ground, GAP * spacing)
+        field = _printed_heights(scene, level.grid.axes(), _heights(level))
         drops = highest[number * scene.drops_of_layer : (number + 1) * scene.drops_of_layer]
-        alone, so_far = (_parts(points[some], LINK * spacing) for some in (layer == number, layer <= number))
+        alone, so_far = (_count_groups(points[chosen], LINK * spacing) for chosen in (layer == number, layer <= number))
         rows.append(
             Layer(
                 number + 1,
@@ -140,17 +143,17 @@ def _layers(scene: Printing, deposit: Deposit) -> list[Layer]:
     return rows
 
 
-def _parts(points: Floats, reach: float) -> int:
-    """Number of groups of points `(n, 3)` that are no farther than a reach from each other [m]."""
+def _count_groups(points: Floats, reach: float) -> int:
+    """Return the number of groups of points (n, 3) connected by distances up to a reach [m]."""
     first, second = cKDTree(points).query_pairs(reach, output_type="ndarray").T
-    return int(groups(first, second, len(points)).max()) + 1
+    return int(connected_groups(first, second, len(points)).max()) + 1
 
 
 def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
-    """Return the numbers of a printed part."""
+    """Return the metrics of a printed part, each with value and unit."""
     printed = scene.drops * scene.drop_volume
     bodies = sum(layer.volume for layer in part.layers)
-    field = _field(scene, (part.x, part.y), part.heights)
+    field = _printed_heights(scene, (part.x, part.y), part.heights)
     particles = float((deposit.fields.mass / deposit.fields.density).sum())
     return {
         "drops": (float(scene.drops), ""),
@@ -170,15 +173,22 @@ def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
 
 
 def _volume(points: Floats, triangles: Indices) -> float:
+    """Return the volume enclosed by a surface and the plate [m^3]."""
     return volume_and_gradient(points, triangles, (), ())[0]
 
 
 def _sa(field: Floats) -> float:
-    """Mean distance from the mean."""
+    """Return the mean absolute deviation of heights from their mean [m]."""
     return float(np.abs(field - field.mean()).mean())
 
 
-def _field(scene: Printing, places: Sequence[Floats], heights: Floats) -> Floats:
-    """Heights `(i, j)` at x, y within half a pitch of the places of drops `(k,)` [m]: where roughness is told."""
+def _printed_heights(scene: Printing, axes: Sequence[Floats], heights: Floats) -> Floats:
+    """Return the heights within half a pitch of the drops, over which roughness is measured, shape (k,) [m].
+
+    Args:
+        scene: Printing parameters.
+        axes: Coordinates x (i,) and y (j,) of the height map [m].
+        heights: Height map, shape (i, j) [m].
+    """
     half_x, half_y = 0.5 * scene.columns * scene.pitch, 0.5 * scene.rows * scene.pitch
-    return heights[np.abs(places[0]) <= half_x][:, np.abs(places[1]) <= half_y].ravel()
+    return heights[np.abs(axes[0]) <= half_x][:, np.abs(axes[1]) <= half_y].ravel()

@@ -1,4 +1,4 @@
-"""Files of a printed part: its surface, height map and layers."""
+"""Files of a printed part: surface, height map and table of layers."""
 
 from pathlib import Path
 
@@ -8,13 +8,18 @@ import numpy as np
 from reflowshock.particles.printing.part import Part
 
 LAYERS = "layer,drops,parts_of_layer,parts_so_far,mean_top_um,height_um,roughness_sa_um,roughness_sz_um,volume_pl,voids"
-FACTORS = np.array([1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 1e6, 1e6, 1e15, 1.0])  # from SI
+# Factors from SI units to those of the columns.
+FACTORS = np.array([1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 1e6, 1e6, 1e15, 1.0])
 
 
 def write_part(folder: Path, part: Part) -> None:
     """Write `part.stl` [mm], `height_map.npy` [m], `height_map.csv` [um] and `layers.csv` [um, pL].
 
-    The first row and column of `height_map.csv` are y and x; `height_map.npy` has a row for each x.
+    The first row of `height_map.csv` has y, its first column x; `height_map.npy` has one row for each x.
+
+    Args:
+        folder: Folder of the files.
+        part: Printed part.
     """
     meshio.Mesh(1e3 * part.points, [("triangle", part.triangles)]).write(folder / "part.stl", file_format="stl")
     np.save(folder / "height_map.npy", part.heights)

@@ -1,8 +1,8 @@
-"""Drop after drop lands, flows and cures: from the first one to the printed part.
+"""Printing run: drops land one after the other, flow and solidify into the printed part.
 
-Time goes on in events. While liquid moves it is computed step by step; what has been followed for the settling time
-since the last drop landed, or does not move any more, rests until the next drop lands or a particle cures: no steps.
-What freezes is followed until it is solid.
+Time advances by events. Moving liquid is computed in time steps. Once the settling time has passed since the last drop
+landed, or the liquid no longer moves, time jumps to the next landing or curing particle. Freezing drops are computed
+until they are solid.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,11 +22,11 @@ from reflowshock.particles.printing.deposit import LIQUID, Deposit
 from reflowshock.particles.printing.part import Part, measure_part, part_of
 from reflowshock.particles.sph.flow import PICTURES
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import SurfaceLost
-from reflowshock.particles.surface.closing import Meeting
+from reflowshock.particles.surface.morphological_closing import TopologyChange
+from reflowshock.particles.surface.surface_mesh import SurfaceLost
 
 COLUMNS = ("time", "drops", "largest_speed", "kinetic_energy", "surface_energy", "height")
-# Steps after which the light is accounted for, and after which a row of the history is kept.
+# Number of steps between two exposures to light, and between two rows of the history.
 LIGHT, SAMPLE = 20, 20
 # Kinetic energy over the surface energy of one sphere below which liquid is at rest.
 REST = 1e-4
@@ -34,19 +34,19 @@ REST = 1e-4
 
 @dataclass(slots=True)
 class PrintRun:
-    """State of a run.
+    """State of a printing run.
 
     Attributes:
-        deposit: the ink.
-        landed: drops that have.
-        since: time of the last one [s].
-        followed: time for which liquid was followed that has got no light yet [s].
-        steps: of all liquid together.
-        particle_steps: liquid particles, summed over the steps.
-        left: largest kinetic energy of liquid that was taken to rest, over the surface energy of a sphere.
-        rows: of the history.
-        pictures: after a drop each.
-        seconds: wall time [s].
+        deposit: Ink on the plate.
+        landed: Number of drops that have landed.
+        since: Time at which the last drop landed [s].
+        followed: Time that was simulated since the last exposure to light [s].
+        steps: Number of time steps.
+        particle_steps: Number of liquid particles, summed over the steps.
+        left: Largest kinetic energy that liquid had when it was taken to rest, over the surface energy of a sphere.
+        rows: Rows of the history.
+        pictures: Particles after some of the drops.
+        seconds: Wall time [s].
     """
 
     deposit: Deposit
@@ -61,14 +61,14 @@ class PrintRun:
     seconds: float = 0.0
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state, for a checkpoint."""
         return {
             "deposit": self.deposit.saved(), "rows": np.array(self.rows), "pictures": self.pictures,
             "numbers": {name: getattr(self, name) for name in NUMBERS},
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that `saved` returned."""
         self.deposit.restore(saved["deposit"])
         self.rows, self.pictures = [tuple(row) for row in saved["rows"].tolist()], saved["pictures"]
         for name, value in saved["numbers"].items():
@@ -83,25 +83,33 @@ def solve_printing(
 ) -> tuple[FlowResult, Part]:
     """Print a part.
 
-    Its metric `spray_share` is the largest share of the liquid of a time, not of all that is printed, that was outside
-    its surface: so it tells of one drop that splashes among many.
+    The metric `spray_share` is the largest share of the liquid present at one time that was outside its surface, so it
+    also detects one drop that splashes among many.
+
+    Args:
+        scene: Printing parameters.
+        progress: Called with the fraction of drops that are solid.
+        checkpoint: Checkpoint to continue from and to write.
+
+    Returns:
+        History, pictures and metrics of the run, and the printed part.
 
     Raises:
-        FloatingPointError: a position is not finite.
-        SurfaceLost: the liquid has left its surface, or that is none any more.
+        FloatingPointError: A position is not finite.
+        SurfaceLost: The liquid has left its surface, or the triangles no longer form a surface.
     """
     run = PrintRun(Deposit(scene))
-    saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
+    saved = checkpoint.read((Picture, TopologyChange)) if checkpoint else None
     if saved:
         run.restore(saved)
     while run.landed < scene.drops or run.deposit.simulation:
         start = perf_counter()
         try:
             with threads_for(run.deposit.moving):
-                _go_on(run, scene)
+                _advance(run, scene)
         except SurfaceLost as error:
             raise SurfaceLost(
-                f"drop {run.landed}, {1e6 * run.deposit.time:.4g} us: {error}; take more particles per diameter"
+                f"drop {run.landed}, {1e6 * run.deposit.time:.4g} us: {error}; increase particles_per_diameter"
             ) from error
         run.seconds += perf_counter() - start
         if checkpoint is not None and checkpoint.is_due():
@@ -111,12 +119,12 @@ def solve_printing(
     return _result(run, scene)
 
 
-def _go_on(run: PrintRun, scene: Printing) -> None:
-    """Go on to the next event, or by one step where liquid moves."""
+def _advance(run: PrintRun, scene: Printing) -> None:
+    """Advance by one time step if liquid moves, otherwise to the next event."""
     deposit = run.deposit
     arrival = run.landed * scene.delay if run.landed < scene.drops else inf
     if deposit.time >= arrival:
-        _shine(run)
+        _expose(run)
         places = scene.places()
         deposit.add_drop(places[run.landed % len(places)])
         run.landed, run.since = run.landed + 1, deposit.time
@@ -124,7 +132,7 @@ def _go_on(run: PrintRun, scene: Printing) -> None:
     elif deposit.simulation is None:
         deposit.time = arrival
     elif _rests(run, deposit.simulation, scene):
-        _shine(run)
+        _expose(run)
         if deposit.simulation is None:
             return
         run.left = max(run.left, deposit.simulation.kinetic_energy / _unit_of_energy(scene))
@@ -137,19 +145,20 @@ def _go_on(run: PrintRun, scene: Printing) -> None:
         run.followed += deposit.step(arrival - deposit.time)
         run.steps, run.particle_steps = run.steps + 1, run.particle_steps + deposit.simulation.fluids
         if run.steps % LIGHT == 0:
-            _shine(run)
+            _expose(run)
         if run.steps % SAMPLE == 0:
             _sample(run)
 
 
-def _shine(run: PrintRun) -> None:
-    """Account for the light of the time in which liquid was followed."""
+def _expose(run: PrintRun) -> None:
+    """Expose the ink to the light of the simulated time and cure it."""
     run.deposit.expose(run.followed)
     run.followed = 0.0
     run.deposit.cure()
 
 
 def _rests(run: PrintRun, simulation: Simulation, scene: Printing) -> bool:
+    """Return whether the liquid may be taken to rest."""
     if scene.freezes:
         return False
     is_old = run.deposit.time - run.since >= scene.settling_time
@@ -157,11 +166,12 @@ def _rests(run: PrintRun, simulation: Simulation, scene: Printing) -> bool:
 
 
 def _unit_of_energy(scene: Printing) -> float:
-    """Energy of the surface of one sphere [J]."""
+    """Return the surface energy of one spherical drop [J]."""
     return pi * scene.length**2 * scene.surface_tension
 
 
 def _sample(run: PrintRun) -> None:
+    """Add a row to the history."""
     deposit = run.deposit
     if deposit.simulation is None:
         return
@@ -171,7 +181,7 @@ def _sample(run: PrintRun) -> None:
 
 
 def _picture(run: PrintRun, scene: Printing) -> None:
-    """Keep the present particles after some 24 of the drops."""
+    """Store the present particles, after about `PICTURES` of the drops."""
     deposit, count = run.deposit, len(run.pictures)
     if run.landed * PICTURES < (count + 1) * scene.drops or count >= min(run.landed, PICTURES):
         return
@@ -182,17 +192,17 @@ def _picture(run: PrintRun, scene: Printing) -> None:
 
 
 def _result(run: PrintRun, scene: Printing) -> tuple[FlowResult, Part]:
-    """Return how the ink flowed, and what became of it."""
+    """Return the result of the run and the printed part."""
     deposit = run.deposit
     if not run.pictures or len(run.pictures[-1].points) < len(deposit.points):
         still = np.zeros_like(deposit.points)
         run.pictures.append(Picture(deposit.time, deposit.points, still, deposit.pressures))
     part = part_of(scene, deposit)
     history: dict[str, Floats] = dict(zip(COLUMNS, np.array(run.rows).T, strict=True))
-    meetings = deposit.surface.meetings
+    changes = deposit.surface.topology_changes
     metrics: Metrics = measure_part(scene, deposit, part) | {
-        "mergers": (float(sum(one.after < one.before for one in meetings)), ""),
-        "splits": (float(sum(one.after > one.before for one in meetings)), ""),
+        "mergers": (float(sum(change.after < change.before for change in changes)), ""),
+        "splits": (float(sum(change.after > change.before for change in changes)), ""),
         "spray_share": (deposit.spray, ""),
         "solid_after": (deposit.time - run.since, "s"),
         "motion_left": (run.left, ""),

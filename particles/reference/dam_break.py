@@ -1,16 +1,17 @@
-"""What is known of dam breaks: the pressure at a wall (Buchner 2002, thesis, TU Delft), the front by another code.
+"""Reference data of dam breaks: measured wall pressure (Buchner 2002, thesis, TU Delft) and a computed front.
 
-Water 2 H wide and H high in a tank 5.366 H long; sensor 0.2 H above the floor. Time in sqrt(H / g), pressure over
-rho g H, as digitised from the plot in the thesis for PySPH (BSD-3), `pysph/examples/db_exp_data.py`.
-`FRONT` is of a column 2 a high and a wide (a = 57.15 mm) by interFoam of OpenFOAM 1912, a run of this project: water
-and air in a plane, smooth walls, a / 40 cells (with a / 20 it is 1.2, 1.2, 0.9 % farther), Courant number 0.4.
+Pressure: water 2 H wide and H high in a tank 5.366 H long, sensor 0.2 H above the floor; time in sqrt(H / g), pressure
+in rho g H. The values were digitised from the thesis for PySPH (BSD-3), ``pysph/examples/db_exp_data.py``.
+``FRONT``: a column 2 a high and a wide (a = 57.15 mm), computed by this project with interFoam of OpenFOAM 1912 for
+water and air in a plane, with smooth walls, cells of a / 40 and a Courant number of 0.4. With cells of a / 20 the front
+is 1.2, 1.2 and 0.9 % farther.
 """
 
 import numpy as np
 
 from reflowshock.arrays import Floats
 
-WIDTH, TANK, SENSOR = 2.0, 5.366, 0.2  # over H
+WIDTH, TANK, SENSOR = 2.0, 5.366, 0.2  # in H
 ALIKE = 0.01
 MEASURED = (
     (0.055, 0), (0.394, 0.028), (0.466, -0.134), (0.506, -0.162), (0.553, 0.1629), (0.674, 0.0505), (0.675, -0.078),
@@ -27,17 +28,17 @@ MEASURED = (
     (6.699, 0.522), (6.749, 0.561), (6.769, 0.511), (6.8, 0.46), (6.86, 0.415), (6.97, 0.432), (7.02, 0.477),
     (7.059, 0.505), (7.1, 0.466), (7.16, 0.455), (7.21, 0.415), (7.36, 0.449),
 )  # fmt: skip
-# Time in sqrt(a / 2 g); where volume fractions of a half are farthest, over a.
+# Times in sqrt(a / 2 g), and positions of the front (volume fraction 0.5) in a.
 FRONT = (1.219, 1.602, 1.997), (1.725, 2.137, 2.619)
 
 
 def measured_pressure(width: float, tank: float, sensor: float) -> Floats | None:
-    """Return times and pressures `(2, k)` that were measured; None for another tank.
+    """Return the measured times [sqrt(H / g)] and pressures [rho g H], shape (2, k); None for a different geometry.
 
     Args:
-        width: of the column, over its height.
-        tank: length of the tank, over the same.
-        sensor: height of the sensor, over the same.
+        width: Width of the column over its height.
+        tank: Length of the tank over the height of the column.
+        sensor: Height of the sensor over the height of the column.
     """
-    given = np.array([width / WIDTH, tank / TANK, sensor / SENSOR])
-    return np.array(MEASURED).T if (np.abs(given - 1.0) < ALIKE).all() else None
+    ratios = np.array([width / WIDTH, tank / TANK, sensor / SENSOR])
+    return np.array(MEASURED).T if (np.abs(ratios - 1.0) < ALIKE).all() else None

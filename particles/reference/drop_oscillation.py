@@ -1,29 +1,29 @@
-"""Small oscillations of a drop: Rayleigh's frequency, Lamb's damping, both exactly for any viscosity; of a cap."""
+"""Small oscillations of drops: Rayleigh frequency, Lamb damping, exact viscous solution, and sessile caps."""
 
 from cmath import sqrt as complex_sqrt
 from math import cos, pi, sqrt
 
 
 def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension: float) -> float:
-    """Angular frequency without viscosity, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s]."""
+    """Return the inviscid angular frequency, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s] (Rayleigh)."""
     return sqrt(mode * (mode - 1) * (mode + 2) * surface_tension / (density * radius**3))
 
 
 def cap_frequency(angle: float, volume: float, density: float, surface_tension: float) -> float:
-    """Angular frequency of the slowest swing of a cap whose foot slides freely, or above it [rad/s].
+    """Return an upper bound of the lowest angular frequency of a cap with a freely sliding contact line [rad/s].
 
-    The lower of Rayleigh's quotients of two flows: (x, -y, 0), in which the foot becomes an ellipse, and (x, y, -2 z),
-    in which the cap rises and sinks: the second derivative of the surface energy over that of the kinetic energy. With
-    Sn the integral of sin^n up to the contact angle they are (8 S3 / S5 - 2) and, with c the cosine and the integral I
-    of (z - c)^2 (1 - z^2) from c to 1, 4 (4 (1 - c) + 6 S3 - 9 S5 - 2 c (1 - c^2)) / (S5 + 8 I), in gamma / (rho R^3).
-    Both are exact for half a ball, else above the frequency: measured swings are 1.3 % slower at 60 degrees, 10 % at
-    120 and 26 % at 148, where a quarter of the period is that much too short.
+    The bound is the lower Rayleigh quotient of two trial flows: (x, -y, 0), in which the base becomes an ellipse, and
+    (x, y, -2 z), in which the cap rises and sinks. A quotient is the second derivative of the surface energy divided by
+    the second derivative of the kinetic energy. With Sn the integral of sin^n up to the contact angle, the quotients
+    are (8 S3 / S5 - 2) and, with c the cosine and I the integral of (z - c)^2 (1 - z^2) from c to 1,
+    4 (4 (1 - c) + 6 S3 - 9 S5 - 2 c (1 - c^2)) / (S5 + 8 I), in gamma / (rho R^3). Both are exact for a half sphere;
+    measured oscillations are 1.3 % slower at 60 degrees, 10 % at 120 degrees and 26 % at 148 degrees.
 
     Args:
-        angle: contact angle [rad], in (0, pi).
-        volume: of the cap [m^3].
-        density: of the liquid [kg/m^3].
-        surface_tension: of it [N/m].
+        angle: Contact angle [rad], in (0, pi).
+        volume: Volume of the cap [m^3].
+        density: Density of the liquid [kg/m^3].
+        surface_tension: Surface tension of the liquid [N/m].
     """
     c = cos(angle)
     d = 1.0 - c
@@ -36,22 +36,22 @@ def cap_frequency(angle: float, volume: float, density: float, surface_tension: 
 
 
 def lamb_decay_rate(mode: int, radius: float, density: float, viscosity: float) -> float:
-    """Decay rate of the amplitude at small viscosity, (n - 1)(2 n + 1) mu / (rho R^2) [1/s]."""
+    """Return the decay rate of the amplitude at small viscosity, (n - 1)(2 n + 1) mu / (rho R^2) [1/s] (Lamb)."""
     return (mode - 1) * (2 * mode + 1) * viscosity / (density * radius**2)
 
 
 def viscous_oscillation(mode: int, frequency: float, diffusion_rate: float) -> tuple[float, float]:
-    """Decay rate [1/s] and angular frequency [rad/s] of a mode at any viscosity that lets it oscillate.
+    """Compute decay rate [1/s] and angular frequency [rad/s] of a mode at any viscosity below critical damping.
 
     Amplitude exp(-s t) with s = decay + i frequency solves, with q^2 = s / nu* and Q = J_{n+3/2}(q) / J_{n+1/2}(q),
     omega^2 / nu*^2 = 2 q^2 (n - 1) (n + (n + 1)(q - 2 n Q) / (q - 2 Q)) - q^4 (Chandrasekhar 1959; Reid 1960).
 
     Args:
-        mode: n.
-        frequency: Rayleigh's omega [rad/s].
-        diffusion_rate: nu* = mu / (rho R^2) [1/s].
+        mode: Mode number n.
+        frequency: Rayleigh frequency omega [rad/s].
+        diffusion_rate: Viscous diffusion rate nu* = mu / (rho R^2) [1/s].
     """
-    from scipy.optimize import newton  # plans and stages that need no root start without them
+    from scipy.optimize import newton  # imported late to keep the start-up of plans fast
     from scipy.special import jve
 
     ratio = (frequency / diffusion_rate) ** 2

@@ -1,4 +1,4 @@
-"""Exact viscous flows: the start of a flow between plates, vortices that die out."""
+"""Exact solutions of viscous flows: start-up and steady channel flow, decaying Taylor-Green vortices."""
 
 from collections.abc import Callable
 from math import exp, pi
@@ -9,18 +9,20 @@ from scipy.integrate import cumulative_trapezoid
 from reflowshock.arrays import Floats
 
 TERMS = 40
-POINTS = 2001  # of rates between the middle of a channel and its plates
+POINTS = 2001  # samples of the shear rate between centre line and plate
 
 
 def starting_channel(height: Floats, time: float, width: float, viscosity: float, force: float) -> Floats:
-    """Return the speed [m/s] between plates after a force has begun to act (Morris et al. 1997, eq 21).
+    """Return the start-up velocity profile between plates under a constant force, shape (n,) [m/s].
+
+    The series solution of plane Poiseuille flow from rest (Morris et al. 1997, eq 21).
 
     Args:
-        height: `(n,)` above the lower plate [m].
-        time: since then [s].
-        width: between the plates [m].
-        viscosity: kinematic [m^2/s].
-        force: acceleration along the plates [m/s^2].
+        height: Heights above the lower plate, shape (n,) [m].
+        time: Time since the force was applied [s].
+        width: Distance between the plates [m].
+        viscosity: Kinematic viscosity [m^2/s].
+        force: Force per unit mass along the plates [m/s^2].
     """
     speed = force / (2.0 * viscosity) * height * (width - height)
     for term in range(TERMS):
@@ -31,30 +33,31 @@ def starting_channel(height: Floats, time: float, width: float, viscosity: float
 
 
 def steady_channel(height: Floats, width: float, rate_at_wall: float, viscosity: Callable[[float], float]) -> Floats:
-    """Return the speed [m/s] of steady flow between plates of liquid whose viscosity depends on the rate of shear.
+    """Return the steady velocity profile between plates for shear-rate dependent viscosity, shape (n,) [m/s].
 
-    The stress is linear across the channel, so that the place of each rate is known; speed is the integral of rates.
+    The stress is linear across the channel, which gives the position of each shear rate; the speed is the integral of
+    the shear rate.
 
     Args:
-        height: `(n,)` above the lower plate [m].
-        width: between the plates [m].
-        rate_at_wall: of shear at the plates [1/s].
-        viscosity: at a rate of shear [Pa s].
+        height: Heights above the lower plate, shape (n,) [m].
+        width: Distance between the plates [m].
+        rate_at_wall: Shear rate at the plates [1/s].
+        viscosity: Function from shear rate [1/s] to viscosity [Pa s].
     """
     rates = np.linspace(0.0, rate_at_wall, POINTS)
     stress = np.array([viscosity(rate) * rate for rate in rates])
-    place = 0.5 * width * stress / stress[-1]  # from the middle
-    below = cumulative_trapezoid(rates, place, initial=0.0)
-    return np.interp(np.abs(height - 0.5 * width), place, below[-1] - below)
+    offset = 0.5 * width * stress / stress[-1]  # from the centre line
+    below = cumulative_trapezoid(rates, offset, initial=0.0)
+    return np.interp(np.abs(height - 0.5 * width), offset, below[-1] - below)
 
 
 def taylor_green(x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Floats]:
-    """Return velocities over the largest one U, and pressure over rho U^2, of vortices (Taylor & Green 1937).
+    """Return velocities over their maximum U, and pressure over rho U^2, of vortices (Taylor & Green 1937).
 
     Args:
-        x: `(n,)` [m].
-        y: `(n,)` [m].
-        side: of the box [m].
+        x: First coordinates, shape (n,) [m].
+        y: Second coordinates, shape (n,) [m].
+        side: Side of the periodic box [m].
     """
     wave = 2.0 * pi / side
     u = -np.cos(wave * x) * np.sin(wave * y)
@@ -63,5 +66,5 @@ def taylor_green(x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Flo
 
 
 def taylor_green_decay(side: float, viscosity: float) -> float:
-    """Return the rate [1/s] at which their speeds die out, for a kinematic viscosity [m^2/s]."""
+    """Return the decay rate of the vortex speeds [1/s], for a box side [m] and a kinematic viscosity [m^2/s]."""
     return 8.0 * pi**2 * viscosity / side**2

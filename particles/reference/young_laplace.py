@@ -1,8 +1,9 @@
-"""Young-Laplace meridians: the independent reference for joints and sessile drops (scipy only).
+"""Young-Laplace meridians: independent reference solutions for joints and sessile drops (scipy only).
 
-An axisymmetric surface at rest, s the arc length and psi the slope of the meridian against the outward radius:
+Axisymmetric surface at rest, with the arc length s and the angle psi of the meridian to the outward radius:
     r' = cos psi,  z' = sin psi,  psi' = (p - w z) / gamma - sin(psi) / r,  V' = pi r^2 sin psi,
-p the pressure at z = 0, w = rho g the weight of the unit volume. In a plane without sin(psi) / r, and A' = 2 r sin psi.
+with the pressure p at z = 0 and the specific weight w = rho g. In a plane, the term sin(psi) / r vanishes and
+A' = 2 r sin psi.
 """
 
 from collections.abc import Callable
@@ -18,19 +19,20 @@ SMALLEST_RADIUS = 1e-3
 
 
 class NoMeridian(ValueError):
-    """There is no smooth equilibrium meridian for these parameters, or it was not found."""
+    """Error for parameters without a smooth equilibrium meridian, or whose meridian was not found."""
 
 
 @dataclass(frozen=True, slots=True)
 class Meridian:
-    """An equilibrium meridian, from the board upwards.
+    """Equilibrium meridian, from the board upwards.
 
     Attributes:
-        r, z: `(k,)` coordinates [m].
-        pressure: above ambient at z = 0 [Pa].
-        axial_force: force of the liquid on the package along +z [N]: positive pushes the plates apart.
-        angle_board: contact angle at the board, measured inside the liquid [rad].
-        angle_package: the same at the package; nan for a drop.
+        r: Radii, shape (k,) [m].
+        z: Heights, shape (k,) [m].
+        pressure: Pressure above ambient at z = 0 [Pa].
+        axial_force: Force of the liquid on the package along +z [N]; positive pushes the plates apart.
+        angle_board: Contact angle at the board, measured inside the liquid [rad].
+        angle_package: Contact angle at the package [rad]; nan for a drop.
     """
 
     r: Floats
@@ -66,20 +68,20 @@ def joint_meridian(  # noqa: PLR0913 - six physical numbers define a joint
     *,
     angle_limits: tuple[float, float] = (0.0, 2.0 * np.pi),
 ) -> Meridian:
-    """Find the meridian of a joint that is pinned at the edges of both discs.
+    """Compute the meridian of a joint that is pinned at the edges of both discs.
 
     Args:
-        volume: [m^3].
-        radius_board: radius of the lower disc [m].
-        radius_package: radius of the upper disc [m].
-        gap: distance of the discs [m].
-        surface_tension: gamma [N/m].
-        weight: rho g [N/m^3].
-        angle_limits: contact angles of pad and mask [rad]: an end whose angle would leave them leaves its edge, and
-            has this angle instead of the radius (Gibbs). By default edges hold always.
+        volume: Volume [m^3].
+        radius_board: Radius of the lower disc [m].
+        radius_package: Radius of the upper disc [m].
+        gap: Distance between the discs [m].
+        surface_tension: Surface tension gamma [N/m].
+        weight: Specific weight rho g [N/m^3].
+        angle_limits: Contact angles of pad and mask [rad]. An end whose angle would exceed a limit leaves its edge and
+            takes the limit as contact angle (Gibbs). By default, both ends stay pinned.
 
     Raises:
-        NoMeridian: the boundary value problem has no solution near the family of smooth barrels.
+        NoMeridian: The boundary value problem has no solution near the family of smooth barrels.
     """
     a, b, target = radius_board / gap, radius_package / gap, volume / gap**3
     bond = weight * gap**2 / surface_tension
@@ -111,16 +113,16 @@ class _End:
         return radius - self.radius if np.isfinite(self.radius) else angle - self.angle
 
     def released(self, angle: float, limits: tuple[float, float]) -> "_End":
-        """This end, or the end that slides with the limit that the angle exceeds."""
+        """Return this end, or a sliding end with the limit that the angle exceeds."""
         allowed = min(max(angle, limits[0]), limits[1])
         return self if allowed == angle or np.isfinite(self.angle) else _End(angle=allowed)
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """Nodes, states r, z, psi, V there, unknowns (length of the meridian, pressure); in lengths of the gap.
+    """Nodes, states (r, z, psi, V) at the nodes, and unknowns (length of the meridian, pressure), scaled by the gap.
 
-    `sample` interpolates the states.
+    ``sample`` interpolates the states.
     """
 
     s: Floats
@@ -131,7 +133,7 @@ class _State:
 
 def _solve_joint_meridian(guess: _State, ends: tuple[_End, _End], target: float, bond: float) -> _State:
     """Solve the boundary value problem: two ends, the gap, and the volume fix the length and the pressure."""
-    from scipy.integrate import solve_bvp  # plans that need no meridian start without it
+    from scipy.integrate import solve_bvp  # imported late to keep the start-up of plans fast
 
     def slopes(_: Floats, y: Floats, unknown: Floats) -> Floats:
         length, pressure = unknown
@@ -144,17 +146,17 @@ def _solve_joint_meridian(guess: _State, ends: tuple[_End, _End], target: float,
         package = ends[1].residual(high[0], high[2])
         return np.array([board, low[1], low[3], package, high[1] - 1.0, high[3] - target])
 
-    with np.errstate(all="ignore"):  # where there is no equilibrium, the search runs away before it gives up
-        found = solve_bvp(slopes, conditions, guess.s, guess.y, p=guess.unknown, tol=TOLERANCE, max_nodes=20000)
-    if not found.success or found.y[0].min() <= SMALLEST_RADIUS:
+    with np.errstate(all="ignore"):  # without an equilibrium, the iterates diverge before the solver stops
+        solution = solve_bvp(slopes, conditions, guess.s, guess.y, p=guess.unknown, tol=TOLERANCE, max_nodes=20000)
+    if not solution.success or solution.y[0].min() <= SMALLEST_RADIUS:
         raise NoMeridian(
-            f"no equilibrium joint of volume {target:.4g} and ends {ends} (in gaps): {found.message.lower()}"
+            f"no equilibrium joint of volume {target:.4g} and ends {ends} (in gaps): {solution.message.lower()}"
         )
-    return _State(found.x, found.y, found.p, found.sol)
+    return _State(solution.x, solution.y, solution.p, solution.sol)
 
 
 def _barrel(a: float, b: float, target: float) -> _State:
-    """Parabolic barrel of the right volume as a first guess."""
+    """Return a parabolic barrel of the required volume as initial guess."""
     z = np.linspace(0.0, 1.0, 101)
     rim, hump = a + (b - a) * z, 4.0 * z * (1.0 - z)
 
@@ -173,45 +175,45 @@ def _barrel(a: float, b: float, target: float) -> _State:
 
 @dataclass(frozen=True, slots=True)
 class _Fluid:
-    """Surface tension [N/m] and weight of the unit volume [N/m^3]."""
+    """Surface tension [N/m] and specific weight [N/m^3]."""
 
     surface_tension: float
     weight: float
 
 
 def sessile_meridian(volume: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
-    """Find the meridian of a drop on a uniform wall (Bashforth & Adams), from the wall to the apex.
+    """Compute the meridian of a drop on a uniform wall (Bashforth & Adams), from the wall to the apex.
 
     Args:
-        volume: [m^3].
-        contact_angle: [rad], in (0, pi).
-        surface_tension: gamma [N/m].
-        weight: rho g [N/m^3].
+        volume: Volume [m^3].
+        contact_angle: Contact angle [rad], in (0, pi).
+        surface_tension: Surface tension gamma [N/m].
+        weight: Specific weight rho g [N/m^3].
     """
     cap = np.cbrt(np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle)))
     return _sessile(np.cbrt(volume), cap, contact_angle, _Fluid(surface_tension, weight), is_plane=False)
 
 
 def sessile_section(area: float, contact_angle: float, surface_tension: float, weight: float = 0.0) -> Meridian:
-    """Find half the section of a drop on a uniform wall that is the same along y, r from its middle.
+    """Compute half of the cross-section of a plane drop on a uniform wall; r is the distance from the middle.
 
-    Without weight it is a segment of a circle. Arguments as `sessile_meridian`, with the area of the section [m^2].
+    Without weight it is a segment of a circle.
+
+    Args: as ``sessile_meridian``, with the area of the section [m^2].
     """
     segment = np.sqrt(contact_angle - np.sin(contact_angle) * np.cos(contact_angle))
     return _sessile(np.sqrt(area), segment, contact_angle, _Fluid(surface_tension, weight), is_plane=True)
 
 
-def _sessile(
-    length: float, weightless: float, contact_angle: float, fluid: _Fluid, *, is_plane: bool
-) -> Meridian:
+def _sessile(length: float, weightless: float, contact_angle: float, fluid: _Fluid, *, is_plane: bool) -> Meridian:
     """Shoot from the apex until the profile has turned by the contact angle; find the apex curvature from the size.
 
     Args:
-        length: Edge of a cube, or of a square, of the size of the drop [m].
-        weightless: Apex curvature without weight, times that length.
+        length: Edge of a cube of equal volume, or of a square of equal area [m].
+        weightless: Apex curvature without weight, times ``length``.
         contact_angle: Contact angle [rad].
         fluid: Surface tension and weight.
-        is_plane: Whether the drop is the same along y.
+        is_plane: Whether the drop is plane instead of axisymmetric.
     """
     from scipy.optimize import brentq
 
@@ -235,15 +237,15 @@ def _sessile(
 
 
 def sphere_meridian(volume: float, surface_tension: float) -> Meridian:
-    """Meridian of a free drop about the origin: volume [m^3], surface tension gamma [N/m]."""
+    """Return the meridian of a free drop centred at the origin, from volume [m^3] and surface tension [N/m]."""
     radius, psi = float(np.cbrt(3.0 * volume / (4.0 * np.pi))), np.linspace(0.0, np.pi, SAMPLES)
     pressure = 2.0 * surface_tension / radius
     return Meridian(radius * np.sin(psi), -radius * np.cos(psi), pressure, 0.0, float("nan"), float("nan"))
 
 
 def cap_angle(volume: float, radius: float) -> float:
-    """Contact angle [rad] of the spherical cap of a volume [m^3] on a disc of a radius [m]."""
-    half, cube = 3.0 * volume / np.pi, radius**3  # of the height: h^3 + 3 r^2 h = 2 half
+    """Return the contact angle [rad] of a spherical cap of a volume [m^3] on a disc of a radius [m]."""
+    half, cube = 3.0 * volume / np.pi, radius**3  # the height h solves h^3 + 3 r^2 h = 2 half
     root = np.hypot(half, cube)
     height = np.cbrt(half + root) + np.cbrt(half - root)
     return float(2.0 * np.arctan2(height, radius))
@@ -257,16 +259,17 @@ def pad_meridian(
     *,
     angle_limits: tuple[float, float],
 ) -> Meridian:
-    """Find the meridian of a drop on a round pad in a mask: pinned at the pad's edge while its angle allows it (Gibbs).
+    """Compute the meridian of a drop on a round pad in a solder mask, pinned at the edge by Gibbs' condition.
 
-    The base narrows as the contact angle grows: inside the pad a drop has the pad's angle, outside the mask's.
+    A base inside the pad has the contact angle of the pad, a base on the mask has the angle of the mask; between these
+    angles the contact line is pinned at the edge.
 
     Args:
-        volume: [m^3].
-        pad_radius: [m], infinite for a uniform wall.
-        surface_tension: gamma [N/m].
-        weight: rho g [N/m^3].
-        angle_limits: contact angles of pad and mask [rad].
+        volume: Volume [m^3].
+        pad_radius: Radius of the pad [m], infinite for a uniform wall.
+        surface_tension: Surface tension gamma [N/m].
+        weight: Specific weight rho g [N/m^3].
+        angle_limits: Contact angles of pad and mask [rad].
     """
     from scipy.optimize import brentq
 
@@ -284,9 +287,9 @@ def pad_meridian(
 
 
 def _from_apex(curvature: float, bond: float, contact_angle: float, is_plane: bool) -> Floats:
-    """Radius, depth below the apex and volume along the meridian, `(3, k)`, in lengths of V^(1/3).
+    """Integrate radius, depth below the apex and volume along the meridian, shape (3, k), scaled by V^(1/3).
 
-    In a plane half the width and the area, in lengths of its square root.
+    In a plane: half width, depth and area, scaled by the square root of the area.
     """
     from scipy.integrate import solve_ivp
 

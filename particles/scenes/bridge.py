@@ -84,7 +84,7 @@ def _walls(geometries: Sequence[JointGeometry], distance: float, gap: float, pad
 
 
 def _placed(shape: JointShape, x: float, walls: tuple[Plate, Plate], spacing: float) -> Body:
-    """A joint at rest at its place between the walls, stretched to their distance."""
+    """Return a joint at rest at its position between the walls, stretched to their distance."""
     points, gap = shape.points.copy(), walls[1].origin[2]
     points[:, 2] *= gap / shape.metrics["standoff"][0]
     for ring, plate in zip(shape.rings, walls, strict=True):

@@ -1,7 +1,7 @@
 """A joint between plates that a structure moves: carried from place to place, kept in a file in between.
 
 The flow at rest in one place is where the next one begins, so that a further exchange with the structure costs a
-fraction of a first reflow. What is in the file is all that there is: any process may carry the joint on. The exchange
+fraction of a first reflow. The file holds the complete state, so any process may continue the joint. The exchange
 starts from an estimate of the joint's stiffness.
 """
 
@@ -34,7 +34,7 @@ OF_WAY = ("time_at_rest", "_loss")  # how metrics end that add up to nothing: pl
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a joint at rest does to its pads.
+    """Wrenches of a joint at rest on its pads.
 
     Attributes:
         wrenches: `(2, 6)` force [N] and moment about the pad's centre [N m] on board and package, in the joint's frame.
@@ -96,7 +96,7 @@ def carry_joint(
 
 
 def _resumed(known: Mapping[str, Any], place: JointGeometry, solder: Solder) -> LiquidFlow:
-    """The flow as it was left; its effects are still those that were decided for the gap at which it began."""
+    """Restore a flow, with the effects decided for its initial gap."""
     cloud = known["flow"]["body"].cloud
     flow = joint_flow(cloud, replace(place, gap=float(cloud.plates[1].origin[2])), solder)
     flow.restore(known["flow"])
@@ -116,7 +116,7 @@ def _wrenches(flow: LiquidFlow) -> Floats:
 def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: Checkpoint) -> JointShape:
     """Return the shape of a joint in its last place, with the history of its first reflow and of its last exchange.
 
-    The time to rest and what was lost on the way are no metrics of it.
+    Time to rest and losses are omitted from the metrics, since they depend on the path.
 
     Args:
         place: the last one.
@@ -142,7 +142,7 @@ def _last_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last: C
 
 
 def _joined(first: Run, last: Run) -> Run:
-    """A run and a later one as one."""
+    """Join a run and a later one."""
     return Run(
         records=first.records + last.records,
         profiles=first.profiles + last.profiles,

@@ -22,11 +22,11 @@ from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine, HystereticLine, RubbingLine
+from reflowshock.particles.surface.contact_line import ContactLine, FrictionLine, HystereticLine
 from reflowshock.particles.surface.profile import width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
-# Of the cap that a drop which strikes a wall starts as: at 160 degrees particles slip out between surface and wall.
+# Contact angle of the initial cap of an impact: at 160 degrees particles slip out between surface and wall.
 TOUCHING_ANGLE = float(np.radians(155.0))
 TOUCHING_STEP = 100.0  # capillary limits, while it takes this shape
 
@@ -75,7 +75,7 @@ def flow_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[LiquidFlow, Run]:
-    """The flow of a drop at rest, and its run; arguments and errors as `drop_to_rest`."""
+    """Return the flow of a drop at rest and its run; arguments and errors as ``drop_to_rest``."""
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":
         section = start_section(drop, solder, acting)
@@ -102,7 +102,7 @@ def _rule(drop: Drop, cloud: Cloud, solder: Solder) -> StopRule:
 
 
 def _touching(cloud: Cloud, solder: Solder) -> Cloud:
-    """The particles of a cube on a wall as a sphere that has just touched it."""
+    """Deform a cube on a wall into a sphere that just touches the wall."""
     numerics = solder.numerics.model_copy(update={"scheme": "energy", "time_step_limit": TOUCHING_STEP})
     still = solder.model_copy(update={"numerics": numerics, "pad_contact_angle": TOUCHING_ANGLE})
     acting = {effect.name: effect.name in ("surface_tension", "wall_adhesion") for effect in LIQUID_EFFECTS}
@@ -125,7 +125,7 @@ def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLin
         return ()
     if drop.hysteresis is None:
         return (contact_line(cloud, 0, drop.edge_radius, solder),)
-    line = RubbingLine if solder.numerics.scheme == "ispg" else HystereticLine
+    line = FrictionLine if solder.numerics.scheme == "ispg" else HystereticLine
     return (line(0, *drop.hysteresis, cloud.plates[0].local(cloud.points[cloud.rings[0]])),)
 
 

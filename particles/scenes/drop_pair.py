@@ -67,7 +67,7 @@ def pair_to_rest(
 
 
 def start_clouds(scene: Drops) -> list[Cloud]:
-    """Clouds of both drops, beside each other along x with their common centre of volume at x = 0."""
+    """Clouds of both drops, side by side along x with their common centre of volume at x = 0."""
     share = scene.volume_left / scene.volume
     places = (-(1.0 - share) * scene.distance, share * scene.distance)
     return [_moved(_cloud(scene, volume), x) for volume, x in zip(scene.volumes, places, strict=True)]
@@ -129,7 +129,7 @@ def _worst(results: Sequence[Metrics]) -> Metrics:
 
 
 def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> JointShape:
-    """All drops that are left as one shape, the history that of the first; `capillary`: mu / gamma."""
+    """Combine the remaining drops in one shape, with the history of the first; ``capillary`` is mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
     counts = [body.cloud.surface_count for body in bodies]
     points = concatenated([body.points for body in bodies], counts)
@@ -148,7 +148,7 @@ def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> J
 
 
 def _stages(drops: Sequence[MovingDrop]) -> list[Snapshot]:
-    """The start and, where the drops merged, the states before and after."""
+    """Return the initial state and, if the drops merged, the states before and after."""
     if not drops[0].parents:
         return [_side_by_side([drop.first for drop in drops])]
     parents = drops[0].parents

@@ -122,12 +122,12 @@ def run_drops(
         if checkpoint is not None and checkpoint.is_due():
             checkpoint.write([drop.saved() for drop in drops])
         if progress is not None:
-            progress(min((fraction_done(one.records, rule) for one in drops if one.moves(rule)), default=1.0))
+            progress(min((fraction_done(drop.records, rule) for drop in drops if drop.moves(rule)), default=1.0))
     return drops
 
 
 def _apart(flows: Sequence[LiquidFlow]) -> list[MovingDrop]:
-    """The drops at the start, which may touch, but not overlap by more than half a spacing."""
+    """Create the initial drops, which must not overlap by more than half a spacing."""
     for (i, first), (j, second) in combinations(enumerate(flows), 2):
         spacing = min(first.body.cloud.spacing, second.body.cloud.spacing)
         depth = overlap(first.body, second.body)

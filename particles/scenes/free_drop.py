@@ -184,7 +184,7 @@ def _radius(solder: Solder) -> float:
 
 
 def _physics(solder: Solder) -> Physics:
-    """What acts on a free drop."""
+    """Build the physics of a free drop."""
     return build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
 
 

@@ -86,7 +86,7 @@ def joint_to_rest(
 
 
 def floating(package: FloatingPackage) -> Floating:
-    """The motion of a package that floats."""
+    """Return the motion of a floating package."""
     free = np.vstack([DIRECTIONS[name] for name in package.free])
     return Floating(1, free, np.array([0.0, 0.0, -package.load]))
 
@@ -97,7 +97,7 @@ def _along(
     progress: Callable[[float], None] | None,
     checkpoints: Callable[[int], Checkpoint] | None,
 ) -> list[JointShape]:
-    """The joint at rest at the start and in each place of the path, as far as the neck holds."""
+    """Return the joint at rest at the start and after each step of the path, until the neck breaks."""
     shapes = []
     speed = joint.path.speed if joint.path else None
     for shape in follow_path(joint.geometry, solder, joint.places, checkpoints, speed):
@@ -139,7 +139,7 @@ def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> 
 
 
 def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) -> float:
-    """Standoff [m] at which the Young-Laplace joint carries the load, near a given one; nan where there is none."""
+    """Standoff [m] at which the Young-Laplace joint carries the load, near a guess; nan if none exists."""
     load = joint.package.load if joint.package else 0.0
 
     def excess(standoff: float) -> float:
@@ -153,7 +153,7 @@ def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) ->
 
 
 def _record(geometry: JointGeometry, shape: JointShape, reference: Meridian | None) -> dict:
-    """Place, verdict, main metrics and the exact force, SI values; None where there is none."""
+    """Place, verdict, main metrics and the exact force, SI values; None for missing values."""
     values = {name: _value(shape, name) for name in OF_A_PLACE}
     exact = {"axial_force_exact": float("nan") if reference is None else reference.axial_force}
     known = {name: value if np.isfinite(value) else None for name, value in (values | exact).items()}
@@ -167,7 +167,7 @@ def _value(shape: JointShape, name: str) -> float:
 
 
 def _worst(shapes: Sequence[JointShape]) -> Metrics:
-    """The largest errors of all places that have a reference, and how many places were reached."""
+    """Return the largest errors of all positions with a reference, and the number of positions reached."""
     worst: Metrics = {"places": (float(len(shapes)), "")}
     for name in ERRORS:
         known = [value for shape in shapes if np.isfinite(value := _value(shape, name))]

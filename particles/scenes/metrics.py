@@ -7,11 +7,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reflowshock.arrays import Floats, Indices
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from reflowshock.particles.core.surface_measure import ring_area, wall_corners
 from reflowshock.particles.core.symmetry import on_plane, whole_points
-from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
@@ -124,7 +124,7 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint whose solder is a drop on the board: those of the drop, under a joint's names."""
+    """Collect the numbers of a joint whose solder is a drop on the board, under the names of a joint."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     own = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
     return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
@@ -166,7 +166,7 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
     """Judge a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
     if ruptured:
         return "open"
-    if any(len(line.held_pads()) > 1 for line in lines):
+    if any(len(line.wetted_pads()) > 1 for line in lines):
         return "bridged"
     with_edge = [line for line in lines if line.has_edge]
     if any((line.state == ON_MASK).any() for line in with_edge):
@@ -267,7 +267,7 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def particles_lost(body: Body) -> int:
-    """Number of particles below the surface that are outside the body: through the surface or a wall, or off the wall.
+    """Count interior particles outside the body: beyond the surface or a wall, or off their wall.
 
     Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
     """
@@ -284,13 +284,13 @@ def particles_lost(body: Body) -> int:
         corners[0] = np.concatenate((corners[0], (corners[0] * image)[:, ::-1]))
         inside[on_plane(cloud, axis), axis] = LITTLE * cloud.spacing
     below = inside[cloud.surface_count :]
-    return int((winding_numbers(below, np.concatenate(corners)) < 0.5).sum())
+    return int((winding_numbers.at_points(below, np.concatenate(corners)) < 0.5).sum())
 
 
 def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
-    """What became of the energy that the scheme ispg started with, in all bodies, over that energy.
+    """Return the energy losses of the scheme ispg in all bodies over the initial energy, and the imbalance.
 
-    And how fast a body slides, which on smooth walls it may do for ever, as it is.
+    The sliding speed of a body is included, since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     known = [(flow, state, first) for flow, state, first in moved if state is not None]

@@ -48,7 +48,7 @@ def settle_joint(
 
 
 def _aligned(geometry: JointGeometry) -> JointGeometry:
-    """The coaxial joint where a joint differs from one to second order only: it has a meridian to compare with."""
+    """Return the coaxial joint if a joint is nearly coaxial, so that an exact meridian exists."""
     radius = min(geometry.radius_board, geometry.radius_package)
     nearly = hypot(*geometry.offset) < ALIGNED * radius and hypot(*geometry.tilt) < ALIGNED
     return replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0)) if nearly else geometry
@@ -92,7 +92,7 @@ def follow_path(
 
 
 def _broken(joint: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, time: float) -> JointShape:
-    """A joint that broke on the way to a place, with the standoff there; with inertia the drops that it leaves.
+    """Return a joint that broke on its path, with the standoff at break; with inertia, as the two drops.
 
     Args:
         joint: when it broke.

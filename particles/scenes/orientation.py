@@ -44,7 +44,7 @@ class Orientation:
         return canonical @ self.matrix.T
 
     def wrenches(self, canonical: Floats) -> Floats:
-        """Forces and moments `(k, 6)` of the canonical joint as those of this joint; moments are axial vectors."""
+        """Rotate wrenches, shape (k, 6), from the canonical joint to this joint; moments are axial vectors."""
         sign = -1.0 if self.mirror else 1.0
         return np.hstack((self.vectors(canonical[:, :3]), sign * self.vectors(canonical[:, 3:])))
 
@@ -66,18 +66,18 @@ def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
 
 
 def _nothing(pair: tuple[float, float], lever: float) -> tuple[float, float]:
-    """The pair, or zeros where it moves nothing on the lever [m] by as much as a picometre."""
+    """Return the pair, or zeros if it moves the lever [m] by less than a picometre."""
     return pair if hypot(*pair) * lever >= NOTHING else (0.0, 0.0)
 
 
 def sizes(geometry: JointGeometry) -> Floats:
-    """What makes a joint in canonical orientation another than others, as lengths `(6,)` [m]."""
+    """Return the lengths that identify a joint in canonical orientation, shape (6,) [m]."""
     discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
     return np.array([*discs, *geometry.offset, geometry.tilt[1] * geometry.radius_package])
 
 
 def oriented(shape: JointShape, orientation: Orientation) -> JointShape:
-    """Return the shape of a joint from that of its canonical one."""
+    """Transform the shape of a canonical joint to an orientation."""
     if orientation == Orientation():
         return shape
 

@@ -1,4 +1,4 @@
-"""Bodies made anew: two that touch become one, one whose triangles have collapsed gets even ones, a joint is split.
+"""Remeshing of bodies: merge two that touch, remesh one with collapsed triangles, or split a joint.
 
 A joint whose neck has collapsed becomes two drops, one on each pad.
 
@@ -25,9 +25,9 @@ from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, p
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, concatenated, shifted_indices
-from reflowshock.particles.surface.closing import without_slits
-from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, lidded
+from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, with_lids
 from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.morphological_closing import smooth_slits
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
 CONTACT_SPACINGS = 1.0
@@ -52,7 +52,7 @@ def touch(first: Body, second: Body) -> bool:
 
 def overlap(first: Body, second: Body) -> float:
     """How deep particles of the second body are inside the first [m]; negative where none are."""
-    return float(depths(second.points, closed_surface(first)).max())
+    return float(depths(second.points, *closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:
@@ -91,7 +91,7 @@ def rebuild(*bodies: Body) -> Body:
     if any(_contact_lines_meet(body) for body in bodies):
         union = LevelSet(grid, union.values - CLOSING_SPACINGS * spacing)
     volume = sum(body.volume()[0] for body in bodies)
-    result = Body.at_rest(cloud_from_level_set(without_slits(union), volume, walls))
+    result = Body.at_rest(cloud_from_level_set(smooth_slits(union), volume, walls))
     moments = [body_moments(body) for body in bodies]
     centre = np.sum([moment[1] for moment in moments], axis=0) / sum(moment[0] for moment in moments)
     _put_centre(result, walls, centre)
@@ -111,12 +111,12 @@ def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
-    """Give flows of bodies made anew the time and the steps of the old ones.
+    """Transfer time and steps from old flows to those of remeshed bodies.
 
-    With the scheme ispg they get their motion, centre and ledger, too.
+    With the scheme ispg, motion, centre and energy budget are transferred, too.
     """
     for flow in new:
-        flow.time, flow.steps = max(one.time for one in old), max(one.steps for one in old)
+        flow.time, flow.steps = max(former.time for former in old), max(former.steps for former in old)
     before, after = _moving(old), _moving(new)
     if len(before) == len(old) and len(after) == len(new):
         _keep_centre(before, after)
@@ -156,11 +156,11 @@ def closed_surface(body: Body) -> tuple[Floats, Indices]:
         points.append(mirrored)
         faces.append(image[triangles][:, ::-1])
     all_faces = np.concatenate(faces)
-    return lidded(np.concatenate(points), all_faces, boundary_loops(all_faces))
+    return with_lids(np.concatenate(points), all_faces, boundary_loops(all_faces))
 
 
 def _walls(body: Body) -> tuple[Plate, ...]:
-    """The walls that a body is on, the lower one first; contact lines on the same wall have plates of their own."""
+    """Return the walls of a body, the lower one first; contact lines on one wall have separate plates."""
     if any(plate.normal[2] != 1.0 for plate in body.plates):
         raise CannotRebuild("only bodies on horizontal walls can be rebuilt")
     by_side = {plate.side: plate for plate in reversed(body.plates)}
@@ -168,7 +168,7 @@ def _walls(body: Body) -> tuple[Plate, ...]:
 
 
 def _common_walls(bodies: Sequence[Body]) -> tuple[Plate, ...]:
-    """The walls of bodies that are to become one."""
+    """Return the common walls of bodies that merge."""
     first, *others = [_walls(body) for body in bodies]
     places = [[(plate.side, plate.origin[2]) for plate in walls] for walls in (first, *others)]
     if any(place != places[0] for place in places[1:]):
@@ -221,7 +221,7 @@ def _neck(profile: Profile) -> tuple[float, float]:
 
 
 def _cut(body: Body, walls: tuple[Plate, ...], neck: float, below: float) -> tuple[Body, Body]:
-    """What is below and above the neck, with new particles; together they have the body's volume."""
+    """Cut a body at its neck into two with new particles, at constant total volume."""
     volume = body.volume()[0]
     grid = Grid.around(body.points, body.cloud.spacing, [plate.origin[2] for plate in walls])
     values, heights = signed_distance(*closed_surface(body), grid).values, grid.axes()[2]
@@ -234,7 +234,7 @@ def _cut(body: Body, walls: tuple[Plate, ...], neck: float, below: float) -> tup
 
 
 def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> JointShape:
-    """The shape of an open joint: both drops at rest, with the history of the joint until its neck collapsed.
+    """Return the shape of an open joint: both drops at rest, with the history until the neck collapsed.
 
     Args:
         joint: when its neck collapsed.

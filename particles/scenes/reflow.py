@@ -76,7 +76,7 @@ def solve_joint(
 
 
 def parted(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, shape: JointShape) -> JointShape:
-    """The shape of a joint whose neck has collapsed: a drop at rest on each pad; where that cannot be, as it is."""
+    """Return a drop at rest on each pad for a joint with a collapsed neck; the shape itself if that fails."""
     effects = switched(decide_effects(geometry, solder))
     if solder.numerics.scheme != "ispg":
         effects |= AT_REST
@@ -137,7 +137,7 @@ def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> Cont
 
 
 def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
-    """Set up the contact lines of a body made anew, on plates that know their pads."""
+    """Set up the contact lines of a remeshed body, on plates with pads."""
     lines = []
     for wall, (ring, plate) in enumerate(zip(cloud.rings, cloud.plates, strict=True)):
         corners = np.array([pad.corners(cloud.spacing) for pad in plate.pads])

@@ -34,7 +34,7 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
 
 
 def section_physics(solder: Solder, effects: dict[str, bool]) -> Physics:
-    """What acts on a section of a drop: the effects that are on, those of its surface by its polyline."""
+    """Build the physics of a section of a drop, with surface forces on its polyline."""
     physics = build_physics(solder, effects | {"wall_adhesion": False}, ())
     wetting = (PolylineWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
 

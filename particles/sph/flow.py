@@ -1,4 +1,4 @@
-"""From scene to result: particles on a lattice, a run with samples and pictures, a checkpoint."""
+"""Runs of delta-SPH from scene to result: parameters, initial fields, history, pictures and checkpoint."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -18,8 +18,9 @@ from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
 from reflowshock.particles.sph.simulation import Particles, Simulation
 from reflowshock.particles.sph.smoothing import KERNELS, SUPPORT, norm
 from reflowshock.particles.sph.threads import ThreadParticles
-from reflowshock.particles.surface.closing import Meeting
+from reflowshock.particles.surface.morphological_closing import TopologyChange
 
+# Number of pictures and of rows of the history.
 PICTURES = 24
 SAMPLES = 2000
 
@@ -29,7 +30,14 @@ Vector = tuple[float, float, float]
 
 @dataclass(slots=True)
 class FlowRun:
-    """State of a run: the simulation, rows of the history, pictures, wall time [s]."""
+    """State of a run.
+
+    Attributes:
+        simulation: Simulation at the present time.
+        rows: Rows of the history.
+        pictures: Pictures so far.
+        seconds: Wall time [s].
+    """
 
     simulation: Simulation
     rows: list[tuple[float, ...]] = field(default_factory=list)
@@ -37,26 +45,28 @@ class FlowRun:
     seconds: float = 0.0
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state, for a checkpoint."""
         rows, pictures = np.array(self.rows), self.pictures
         return {
             "simulation": self.simulation.saved(), "rows": rows, "pictures": pictures, "seconds": self.seconds,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that `saved` returned."""
         self.simulation.restore(saved["simulation"])
         self.rows = [tuple(row) for row in saved["rows"].tolist()]
         self.pictures, self.seconds = saved["pictures"], saved["seconds"]
 
     def history(self, names: tuple[str, ...]) -> dict[str, Floats]:
-        """Return the columns of its rows by name."""
+        """Return the columns of the history by name."""
         return dict(zip(names, np.array(self.rows).T, strict=True))
 
     def picture(self) -> None:
-        """Keep the present particles, those of a periodic flow within its period."""
+        """Store a picture of the present particles, moved into the periodic domain."""
         simulation, liquid = self.simulation, slice(self.simulation.fluids)
-        points, velocity = (np.stack([one[liquid] for one in simulation.fields[k : k + 3]], axis=1) for k in (0, 3))
+        points, velocity = (
+            np.stack([values[liquid] for values in simulation.fields[k : k + 3]], axis=1) for k in (0, 3)
+        )
         law = simulation.law
         for axis, period in enumerate((law.period_x, law.period_y, law.period_z)):
             if period > 0.0:
@@ -71,20 +81,20 @@ def run_flow(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FlowRun:
-    """Let a liquid flow up to a time [s]; sample it some 2000 times and keep 24 pictures.
+    """Run a simulation to a final time with about `SAMPLES` rows of history and `PICTURES` pictures.
 
     Args:
-        simulation: the liquid at the start.
-        until: time of the end [s].
-        sample: returns a row of the history, the time first.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        simulation: Simulation in its initial state.
+        until: Final time [s].
+        sample: Returns a row of the history, the time first.
+        progress: Called with the completed fraction.
+        checkpoint: Checkpoint to continue from, with identical bits, and to write.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
     """
     run = FlowRun(simulation)
-    saved = checkpoint.read((Picture, Meeting)) if checkpoint else None
+    saved = checkpoint.read((Picture, TopologyChange)) if checkpoint else None
     if saved:
         run.restore(saved)
     else:
@@ -102,6 +112,7 @@ def _flow_until(
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint | None,
 ) -> None:
+    """Advance the simulation to the final time; arguments as for `run_flow`."""
     simulation = run.simulation
     while simulation.time < until:
         start = perf_counter()
@@ -118,10 +129,10 @@ def _flow_until(
 
 
 def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
-    """Return what the particles of a flow are on; a GPU is looked for only where one is asked for.
+    """Return the class of particles for the device of a flow; CUDA is imported only if it is requested.
 
     Raises:
-        NoDeviceError: there is none.
+        NoDeviceError: There is no CUDA device.
     """
     if scene.numerics.device == "cpu":
         return ThreadParticles
@@ -131,13 +142,13 @@ def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
 
 
 def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool) -> Law:
-    """Return what acts between two particles of a flow in the plane of x and z.
+    """Return the parameters of the pair interactions of a flow in the plane of x and z.
 
     Args:
-        scene: the flow.
-        periods: of a periodic flow [m]; 0 where it is not.
-        gravity: [m/s^2].
-        has_surface: whether the liquid has a free one, where particles cannot be shifted, and is free to turn.
+        scene: Parameters of the flow.
+        periods: Periods along x, y and z [m]; 0 if not periodic.
+        gravity: Gravity along x, y and z [m/s^2].
+        has_surface: Whether the liquid has a free surface, near which particles cannot be shifted.
     """
     numerics, spacing = scene.numerics, scene.spacing
     length, kernel = numerics.smoothing_length * spacing, KERNELS[numerics.kernel]
@@ -170,21 +181,28 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
 
 
 def shear_law(scene: FlowScene) -> dict[str, Any]:
-    """Return what a law says of a viscosity that depends on the rate of shear."""
-    given = scene.rheology
-    if given is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
+    """Return the entries of `Law` for a shear-dependent viscosity."""
+    rheology = scene.rheology
+    if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
         return {"rheology": NEWTON, "exponent": 1.0, "shear_rate": 1.0, "least_viscosity": 0.0, "most_viscosity": 0.0}
-    least, most = given.viscosity_at_infinity, scene.liquid_viscosity
-    if given.law == "power_law":
-        least, most = scene.liquid_viscosity / given.bound, scene.liquid_viscosity * given.bound
+    least, most = rheology.viscosity_at_infinity, scene.liquid_viscosity
+    if rheology.law == "power_law":
+        least, most = scene.liquid_viscosity / rheology.bound, scene.liquid_viscosity * rheology.bound
     return {
-        "rheology": LAWS[given.law], "exponent": given.exponent, "shear_rate": given.shear_rate,
+        "rheology": LAWS[rheology.law], "exponent": rheology.exponent, "shear_rate": rheology.shear_rate,
         "least_viscosity": least, "most_viscosity": most,
     }  # fmt: skip
 
 
 def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
-    """Return the law of a flow in space, of particles a spacing apart [m], above a mirror in z = 0 or not."""
+    """Return the law of the same flow in space.
+
+    Args:
+        law: Law of a flow in a plane.
+        spacing: Particle spacing in space [m].
+        mirror: Whether the plane z = 0 is a wall with mirror images.
+        no_slip: Whether walls act on the liquid by viscosity.
+    """
     length = law.length / law.spacing * spacing
     return law._replace(
         dimension=3, spacing=spacing, length=length, norm=norm(law.kernel, 3, length), mirror=int(mirror),
@@ -193,12 +211,19 @@ def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
 
 
 def wall_layers(scene: FlowScene) -> int:
-    """Layers of particles that fill the support of liquid beside a wall."""
+    """Return the number of layers of wall particles that fill the support of liquid near a wall."""
     return int(np.ceil(SUPPORT * scene.numerics.smoothing_length))
 
 
 def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
-    """Return the fields of liquid `(3, n)` [m] at rest under a pressure `(n,)` [Pa], and of walls `(3, m)` [m]."""
+    """Return the initial fields of liquid and walls at rest.
+
+    Args:
+        liquid: Positions of the liquid particles, shape (3, n) [m].
+        walls: Positions of the wall particles, shape (3, m) [m].
+        pressure: Pressures of the liquid particles, shape (n,) [Pa].
+        law: Parameters of the pair interactions.
+    """
     points = np.concatenate((liquid, walls), axis=1)
     count, fixed = points.shape[1], walls.shape[1]
     density = np.full(count, law.rest_density)
@@ -214,7 +239,7 @@ def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) 
 
 
 def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> FlowResult:
-    """Return what a run found, with the metrics that all flows have."""
+    """Return the result of a run, with the metrics that all flows share added to its own."""
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields
     at_start = fluids * simulation.law.spacing**simulation.law.dimension
@@ -225,5 +250,5 @@ def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> Flo
         "particle_steps_per_second": (simulation.steps * fluids / run.seconds, "1/s"),
         "seconds": (run.seconds, "s"),
     }
-    walls = np.stack([one[fluids:] for one in fields[:3]], axis=1)
+    walls = np.stack([values[fluids:] for values in fields[:3]], axis=1)
     return FlowResult(run.pictures, walls, history, metrics | shared)

@@ -1,7 +1,7 @@
-"""Arrays of a fluid and its walls, one a quantity, and what acts between two particles.
+"""Fields of a fluid and its walls, one array for each quantity, and parameters of the pair interactions.
 
-Particles 0 to `fluids` - 1 are liquid; the others are wall, in layers that fill the support of the liquid beside it. A
-flow in a plane is one in that of x and z.
+Particles 0 to `fluids` - 1 are liquid; the others are wall particles, in layers that fill the support of the liquid
+near the wall. A flow in a plane is in the plane of x and z.
 """
 
 from typing import NamedTuple
@@ -13,33 +13,40 @@ GRADIENTS = {"renormalised": RENORMALISED, "reproducing": REPRODUCING}
 
 
 class Law(NamedTuple):
-    """What acts between two particles; a term whose coefficient is zero is not computed.
+    """Parameters of the interaction of two particles; a term whose coefficient is zero does not act.
 
     Attributes:
-        kernel: `CUBIC_SPLINE` or `WENDLAND_C2`.
-        dimension: of the flow, 1 to 3.
-        length: smoothing length h [m].
-        norm: sigma of the kernel [1/m^d].
-        rest_density: rho_0 [kg/m^3].
-        sound: speed of sound c0 [m/s].
-        diffusion: delta h c0 [m^2/s].
-        gradient: `RENORMALISED` or `REPRODUCING`, that of the density in its diffusion.
-        artificial: alpha h c0 rho_0 [Pa s].
-        viscosity: mu [Pa s]; in the law of one that depends on the rate of shear, that of `Rheology`.
-        rheology: `NEWTON`, `POWER_LAW` or `CARREAU`.
-        exponent, shear_rate: of these laws; the rate in 1/s.
-        least_viscosity, most_viscosity: bounds [Pa s], the first one Carreau's viscosity at infinity.
-        has_surface: 1 where the liquid has a free one. Then viscosity acts along the line of two particles, elsewhere
-            along their velocities; and walls do not pull.
-        tracked: 1 where that surface is one of triangles, with a pressure of its own: then walls pull, too.
-        no_slip: whether walls hold the liquid by its viscosity; 1 or 0.
-        mirror: 1 where the plane z = 0 is a wall below the liquid: its particles meet their images behind it, which
-            costs no particles and ends, with the liquid, at the contact line.
-        spacing: of the particles at the start [m].
-        xsph: epsilon of the smoothed velocity that moves particles (Monaghan 1989); 0 is none.
-        shifting: share of the shift of particles by Sun et al. (2017); 0 is none.
-        period_x, period_y, period_z: of a periodic flow [m]; 0 where it is not.
-        gravity_x, gravity_y, gravity_z: [m/s^2].
+        kernel: Smoothing kernel, `CUBIC_SPLINE` or `WENDLAND_C2`.
+        dimension: Dimension d of the flow, 1 to 3.
+        length: Smoothing length h [m].
+        norm: Normalisation sigma of the kernel [1/m^d].
+        rest_density: Density at rest rho_0 [kg/m^3].
+        sound: Speed of sound c0 [m/s].
+        diffusion: Coefficient of density diffusion, delta h c0 [m^2/s].
+        gradient: Density gradient in the diffusion, `RENORMALISED` (3 x 3) or `REPRODUCING` (4 x 4, exact for linear
+            densities at surfaces, too).
+        artificial: Artificial viscosity, alpha h c0 rho_0 [Pa s].
+        viscosity: Viscosity mu [Pa s]; with a shear-dependent law the one named in `Rheology`.
+        rheology: Viscosity law, `NEWTON`, `POWER_LAW` or `CARREAU`.
+        exponent: Exponent of the viscosity law.
+        shear_rate: Reference shear rate of the viscosity law [1/s].
+        least_viscosity: Lower bound of the viscosity [Pa s]; Carreau's viscosity at infinite rate.
+        most_viscosity: Upper bound of the viscosity [Pa s].
+        has_surface: 1 with a free surface: viscosity acts along the line of two particles, which conserves angular
+            momentum, and walls do not pull. 0 otherwise: viscosity acts along relative velocities.
+        tracked: 1 if the free surface is a tracked one of triangles, whose pressure lets walls pull, too.
+        no_slip: 1 if walls act on the liquid by viscosity, else 0.
+        mirror: 1 if the plane z = 0 is a wall with mirror images of the particles. Images need no memory and end, with
+            the liquid, at the contact line, where layers of wall particles would press on the liquid.
+        spacing: Initial particle spacing [m].
+        xsph: Factor epsilon of the smoothed velocity that moves particles (Monaghan 1989); 0 for none.
+        shifting: Share of the particle shift of Sun et al. (2017); 0 for none.
+        period_x: Period along x [m]; 0 if not periodic.
+        period_y: Period along y [m].
+        period_z: Period along z [m].
+        gravity_x: Gravity along x [m/s^2].
+        gravity_y: Gravity along y [m/s^2].
+        gravity_z: Gravity along z [m/s^2].
     """
 
     kernel: int
@@ -73,21 +80,22 @@ class Law(NamedTuple):
 
 
 class Fields(NamedTuple):
-    """Quantities of n particles, as the loops read them.
+    """Fields of n particles, m of which are wall particles.
 
     Attributes:
-        x, y, z: positions [m].
-        u, v, w: velocities [m/s].
-        density: [kg/m^3].
-        pressure: [Pa].
-        mass: [kg].
-        slope_x, slope_y, slope_z: renormalised gradient of the density, of the last step [kg/m^4].
-        wall_u, wall_v, wall_w: velocities of the particles of walls [m/s], whose u, v, w are what viscosity sees.
-        wall_room: share of the kernel about each of them that liquid fills where it covers the wall; 0 for walls that
-            are layers of particles as they stand.
-        wall_share: how much of each counts: the liquid that it sees over that room, at most one. So a wall of cured
-            ink ends with the liquid, at the contact line, as a mirror does.
-        viscosity: of each particle [Pa s]; found where it depends on the rate of shear.
+        x: Positions along x, shape (n,) [m]; likewise y, z.
+        u: Velocities along x, shape (n,) [m/s]; likewise v, w. Those of wall particles are extrapolated for viscosity.
+        density: Densities, shape (n,) [kg/m^3].
+        pressure: Pressures, shape (n,) [Pa].
+        mass: Masses, shape (n,) [kg].
+        slope_x: Density gradient of the last step along x, shape (n,) [kg/m^4]; likewise slope_y, slope_z.
+        wall_u: Velocities of wall particles along x, shape (m,) [m/s]; likewise wall_v, wall_w.
+        wall_room: Share of the kernel about each wall particle that liquid fills when it covers the wall, shape (m,); 0
+            for walls that always count fully.
+        wall_share: Weight of each wall particle, shape (m,): the liquid within its kernel over `wall_room`, at most
+            one.
+            So a wall of cured ink ends with the liquid at the contact line, as a mirror does.
+        viscosity: Viscosities, shape (n,) [Pa s]; computed if they depend on the shear rate.
     """
 
     x: Floats

@@ -1,7 +1,7 @@
-"""Steps with time of one particle of the liquid, for threads and for CUDA: velocity Verlet, the mirror, the shift.
+"""Time integration of one particle, for threads and CUDA: velocity Verlet, mirror, particle shifting.
 
-Half way through a step a particle has the velocity u + a dt / 2 and the density rho + rate dt / 2: ``middle`` `(7, n)`,
-whose last three rows are what XSPH adds to the velocities that move particles [m/s].
+The array ``middle``, shape (7, n), has the velocity u + a dt / 2 and the density rho + rate dt / 2 in the middle of a
+step; its last three rows are the velocities that XSPH adds when it moves particles [m/s].
 """
 
 from reflowshock.particles.sph.particle_rates import compiled
@@ -9,14 +9,14 @@ from reflowshock.particles.sph.particle_rates import compiled
 
 @compiled
 def predict(i, fields, rates, middle, time_step):
-    """Move a particle over a time step [s]; velocity and density become what the last rates say of its end.
+    """Move a particle over a time step and predict its velocity and density from the last rates.
 
     Args:
-        i: the particle.
-        fields: `Fields`.
-        rates: `(10, n)`, as `rates_of` returns them.
-        middle: `(7, n)`, of which the first four are written.
-        time_step: [s].
+        i: Particle.
+        fields: `Fields` of all particles.
+        rates: Rates as `rates_of` returns them, shape (10, n).
+        middle: Values in the middle of the step, shape (7, n), of which the first four rows are written.
+        time_step: Time step [s].
     """
     half = 0.5 * time_step
     u, v, w = fields.u[i] + half * rates[1, i], fields.v[i] + half * rates[2, i], fields.w[i] + half * rates[3, i]
@@ -33,16 +33,16 @@ def predict(i, fields, rates, middle, time_step):
 
 @compiled
 def settle(i, fields, middle, law):
-    """Give a particle that has moved its pressure; one behind the mirror becomes its image, whose motion is its own."""
+    """Reflect a particle that crossed the mirror and compute its pressure from its density."""
     middle[2, i] *= reflect(i, fields, law)
     fields.pressure[i] = law.sound * law.sound * (fields.density[i] - law.rest_density)
 
 
 @compiled
 def reflect(i, fields, law):
-    """Let a particle behind the mirror z = 0 change places with its image; return the sign of what is across it then.
+    """Replace a particle behind the mirror z = 0 by its image; return -1 if it was replaced, else 1.
 
-    Without a branch: with one, threads would count references to all fields for every particle.
+    There is no branch, since with one threads would count references to all fields for every particle.
     """
     side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
     fields.z[i] *= side
@@ -53,7 +53,7 @@ def reflect(i, fields, law):
 
 @compiled
 def correct(i, fields, rates, middle, time_step):
-    """End the time step [s] of a particle with the rates of its end, whose slope of density serves the next one."""
+    """Complete the time step [s] of a particle with the rates at its end and store the density gradient."""
     half = 0.5 * time_step
     fields.u[i] = middle[0, i] + half * rates[1, i]
     fields.v[i] = middle[1, i] + half * rates[2, i]
@@ -64,13 +64,13 @@ def correct(i, fields, rates, middle, time_step):
 
 @compiled
 def take_slope(i, fields, rates):
-    """Keep the renormalised gradient of a particle's density."""
+    """Store the density gradient of a particle for the next step."""
     fields.slope_x[i], fields.slope_y[i], fields.slope_z[i] = rates[4, i], rates[5, i], rates[6, i]
 
 
 @compiled
 def shift(i, fields, rates, factor, law):
-    """Move a particle down the gradient of concentration times a factor [m^2] (Sun et al. 2017)."""
+    """Shift a particle against the concentration gradient times a factor [m^2] (Sun et al. 2017)."""
     fields.x[i] -= factor * rates[7, i]
     fields.y[i] -= factor * rates[8, i]
     fields.z[i] -= factor * rates[9, i]
@@ -79,13 +79,13 @@ def shift(i, fields, rates, factor, law):
 
 @compiled
 def speed2_of(i, fields):
-    """Return the square of a particle's speed [m^2/s^2]."""
+    """Return the squared speed of a particle [m^2/s^2]."""
     return fields.u[i] * fields.u[i] + fields.v[i] * fields.v[i] + fields.w[i] * fields.w[i]
 
 
 @compiled
 def cover(k, i, fields, found, law):
-    """Give the k-th particle of walls, i of all, what liquid beside it says; ``found`` as `wall_values` returns it."""
+    """Write the ``values`` that `wall_values` returns to the k-th wall particle, particle i of all."""
     pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share
     fields.density[i] = law.rest_density + pressure / (law.sound * law.sound)

@@ -1,7 +1,7 @@
-"""Sums over the neighbours of one particle, written so that a GPU can compile them too.
+"""Sums over the neighbours of one particle, compiled for threads and for CUDA.
 
-The sum over a particle is the same whatever the number of threads. Indices are unsigned in the loops: they do not count
-from the end.
+The order of a sum does not depend on the number of threads. Indices are unsigned in the loops, since negative indices
+would count from the end.
 """
 
 from math import floor, inf, sqrt
@@ -12,27 +12,31 @@ from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import REPRODUCING
 from reflowshock.particles.sph.smoothing import shape, slope
 
-# Of the determinant of the matrix of moments, which is one inside the liquid: with less the gradient is not resolved.
+# Least determinant of the matrix of moments, which is one inside the liquid, for a resolved gradient.
 FEWEST_MOMENTS = 0.05
-# Of the matrix of the linear fit: with a larger condition number, or fewer neighbours, the slope is none (Shepard).
+# Largest condition number of the linear fit, and number of neighbours that it must exceed; otherwise the slope is zero.
 LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
-# What makes no arrays counts no references to those it is given: for every particle that was a tenth of a step, and
-# threads waited for each other's counts.
+# Functions without arrays of their own need no reference counts, which cost a tenth of a step and made threads wait.
 compiled = njit(cache=True, error_model="numpy", _nrt=False)
-# Sums may be taken in any order, so that several pairs are computed at a time; the order does not depend on threads.
+# Sums may be reordered by the compiler, so that several pairs are computed at a time; threads do not change the order.
+# The order follows the names of the variables: renaming one changes the last bits of results.
 summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}, _nrt=False)
 
 
 @compiled
 def periods_of(law):
-    """Return the period [m] and one over it of each direction; zeros where there is none."""
+    """Return the period [m] and its inverse for each direction; zeros if not periodic."""
     x, y, z = law.period_x, law.period_y, law.period_z
     return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
 
 
 @compiled
 def constants_of(law):
-    """Return what all pairs have: a line, 1 / h, of the kernel's gradient, of viscosity, sigma over W at a spacing."""
+    """Return constants of all pairs.
+
+    These are: whether the flow has one dimension, 1 / h, the factor of the kernel gradient, the softening of viscosity
+    [m^2], and sigma over W at one spacing.
+    """
     line, inverse = law.dimension == 1, 1.0 / law.length
     scale, softening = law.norm * inverse * inverse, pair_terms.SOFTENING * law.length * law.length
     return line, inverse, scale, softening, 1.0 / shape(law.kernel, line, law.spacing * inverse)
@@ -40,13 +44,13 @@ def constants_of(law):
 
 @compiled
 def across(distance, period):
-    """Return a component of a vector between particles [m] to the nearest image."""
+    """Return a component of the vector between two particles [m] for the nearest periodic image."""
     return distance - period[0] * floor(distance * period[1] + 0.5)
 
 
 @compiled
 def apart(place, j, side, fields, periods):
-    """Return the vector from a particle, or from its image where ``side`` is -1, to a place [m]."""
+    """Return the vector from particle j, or from its mirror image if ``side`` is -1, to a position [m]."""
     dx = across(place[0] - fields.x[j], periods[0])
     dy = across(place[1] - fields.y[j], periods[1])
     return dx, dy, across(place[2] - side * fields.z[j], periods[2])
@@ -54,13 +58,13 @@ def apart(place, j, side, fields, periods):
 
 @compiled
 def positive(value):
-    """Return a value, or zero where it is negative or no number; Numba 0.68 cannot compile `max` for a GPU."""
+    """Return a value, or zero if it is negative or not a number; Numba 0.68 cannot compile `max` for a GPU."""
     return value if value > 0.0 else 0.0
 
 
 @compiled
 def liquid_among(neighbours, fluids):
-    """Number of particles of the liquid in a row, whose first ones they are: halved until it is found."""
+    """Return the number of liquid particles in a row, in which they come first, by bisection."""
     first, last = 0, len(neighbours)
     while first < last:
         middle = (first + last) // 2
@@ -73,7 +77,7 @@ def liquid_among(neighbours, fluids):
 
 @compiled
 def closing_in(k, velocity, d, fields):
-    """Return (u_i - u_j) . d for the k-th particle of walls; what comes near one with a share meets its image."""
+    """Return (u_i - u_j) . d for the k-th wall particle, doubled for weighted ones, which act as mirror images."""
     u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
     closing = u * d[0] + v * d[1] + w * d[2]
     return 2.0 * closing if fields.wall_room[k] > 0.0 else closing
@@ -81,33 +85,32 @@ def closing_in(k, velocity, d, fields):
 
 @compiled
 def pulls_not(law):
-    """Whether walls do not pull at liquid: where it has a surface that is not tracked."""
+    """Return whether walls exert no tension on liquid: with a free surface that is not tracked."""
     return law.has_surface and not law.tracked
 
 
 @compiled
 def own_viscosity(i, fields, law):
-    """Return the viscosity of a particle [Pa s]; 0 where viscosity does not act."""
+    """Return the viscosity of a particle [Pa s]; 0 if viscosity does not act."""
     return positive(fields.viscosity[i] if law.rheology else law.viscosity)
 
 
 @compiled
 def rates_of(i, fluids, neighbours, fields, law):
-    """Return what a particle of the liquid is told by its neighbours.
+    """Return the rates of a liquid particle from its neighbours.
 
-    A term whose coefficient is zero adds nothing. A particle is in its own row, for its image: to itself it does
-    nothing.
+    A particle is in its own row because of its mirror image; the pair with itself contributes nothing.
 
     Args:
-        i: the particle.
-        fluids: number of particles that are liquid.
-        neighbours: its row, those of the liquid first.
-        fields: `Fields`.
-        law: `Law`.
+        i: Particle.
+        fluids: Number of liquid particles.
+        neighbours: Row of the particle, liquid neighbours first.
+        fields: `Fields` of all particles.
+        law: `Law` of the particles.
 
     Returns:
-        rate of density, acceleration (3), renormalised gradient of the density (3), gradient of the concentration of
-        particles (3) [1/m].
+        Rate of density [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4], gradient of the
+        concentration of particles (3) [1/m].
     """
     liquid = liquid_among(neighbours, fluids)
     rate, ax, ay, az, cx, cy, cz, bx, by, bz, xx, yy, zz, xy, yz, xz = _by_liquid(i, neighbours[:liquid], fields, law)
@@ -126,9 +129,9 @@ def rates_of(i, fluids, neighbours, fields, law):
 
 @summed
 def _by_liquid(i, neighbours, fields, law):
-    """Sums over the liquid and its images: rate of density, acceleration, concentration; jumps of density, moments.
+    """Return sums over the liquid and its images: density rate, acceleration, concentration, density jumps, moments.
 
-    Nothing branches at a pair, so that several are computed at a time.
+    Pairs have no branch, so that several are computed at a time.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
@@ -181,7 +184,7 @@ def _by_liquid(i, neighbours, fields, law):
 
 @summed
 def _by_walls(i, fluids, neighbours, fields, law):
-    """Sums over particles of walls, and their images: rate of density, acceleration, concentration of particles."""
+    """Return sums over wall particles and their images: density rate, acceleration, concentration gradient."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     density, pressure, lightness = fields.density[i], fields.pressure[i], 1.0 / fields.density[i]
     periods, (line, inverse, scale, softening, peak) = periods_of(law), constants_of(law)
@@ -214,7 +217,7 @@ def _by_walls(i, fluids, neighbours, fields, law):
 
 @summed
 def drift_of(i, fluids, neighbours, fields, law):
-    """Return the velocity (3) [m/s] that XSPH adds where it moves a particle of the liquid; momentum stays."""
+    """Return the velocity (3) [m/s] that XSPH adds when it moves a liquid particle; momentum does not change."""
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     periods = periods_of(law)
     inverse = 1.0 / law.length
@@ -234,7 +237,7 @@ def drift_of(i, fluids, neighbours, fields, law):
 
 @compiled
 def solved(moments, sums, dimension):
-    """Return the gradient `moments^-1 sums`, in a plane that of x and z; zero where neighbours do not resolve it."""
+    """Return the gradient `moments^-1 sums`, in a plane with x and z only; zero if neighbours do not resolve it."""
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
     if dimension == 1:
@@ -258,10 +261,10 @@ def solved(moments, sums, dimension):
 
 @summed
 def fitted_slope(i, neighbours, fields, law):
-    """Return the slope (3) of the linear function that is next to the densities of a particle's neighbours [kg/m^4].
+    """Return the slope (3) of the linear least-squares fit to the densities of a particle's neighbours [kg/m^4].
 
-    With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), whose first row is taken out of the
-    other three. It is zero where that is not resolved: the value is then that of Shepard.
+    With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), with the first row eliminated. It is
+    zero if neighbours do not resolve it (Shepard interpolation).
     """
     x, y, z, density = fields.x[i], fields.y[i], fields.z[i], fields.density[i]
     periods, inverse = periods_of(law), 1.0 / law.length
@@ -296,9 +299,9 @@ def fitted_slope(i, neighbours, fields, law):
 
 @compiled
 def condition_of(moments, dimension):
-    """Return a bound of the condition number of a symmetric matrix, in a plane that of x and z; infinite if singular.
+    """Return an upper bound of the condition number of a symmetric matrix; infinite if singular.
 
-    The largest eigenvalue is at most the trace, and the others than the least have at most half of it each.
+    The largest eigenvalue is at most the trace, and the middle one at most half of it. In a plane only x and z count.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:
@@ -312,11 +315,11 @@ def condition_of(moments, dimension):
 
 @summed
 def wall_values(i, fluids, neighbours, fields, law):
-    """Return pressure, velocity (3) and share of a particle of a wall, from the liquid beside it (Adami et al. 2012).
+    """Return pressure, velocity (3) and weight of a wall particle from the liquid near it (Adami et al. 2012).
 
-    The pressure is that of the liquid, with its weight; where the liquid has a free surface a wall does not pull at
-    what leaves it. The velocity is the wall's less that of the liquid against it: at the wall's face it is the wall's.
-    The share is how much of it counts; see `Fields`.
+    The pressure is extrapolated from the liquid with its hydrostatic part. With a free surface that is not tracked it
+    is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the wall's velocity at
+    its face. The weight is `Fields.wall_share`.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1

@@ -1,6 +1,6 @@
-"""Viscosity that depends on the rate of shear: its laws, and the rate at a particle; compiled for threads and CUDA.
+"""Shear-dependent viscosity, for threads and CUDA: power law and Carreau, with the shear rate at a particle.
 
-The laws are those of `parameters/rheology.py`; the constants in `Law` say which one acts.
+The shear rate is sqrt(2 D : D) of the renormalised velocity gradient. `parameters/rheology.py` has the parameters.
 """
 
 from math import sqrt
@@ -23,7 +23,7 @@ LAWS = {"power_law": POWER_LAW, "carreau": CARREAU}
 
 @compiled
 def viscosity_at(rate, law):
-    """Return the viscosity [Pa s] at a rate of shear [1/s]."""
+    """Return the viscosity [Pa s] at a shear rate [1/s]."""
     ratio = rate / law.shear_rate
     if law.rheology == CARREAU:
         share = (1.0 + ratio * ratio) ** (0.5 * (law.exponent - 1.0))
@@ -38,9 +38,9 @@ def viscosity_at(rate, law):
 
 @summed
 def viscosity_of(i, fluids, neighbours, fields, law):
-    """Return the viscosity [Pa s] of a particle of the liquid, from the renormalised gradient of velocity about it.
+    """Return the viscosity [Pa s] of a liquid particle from the renormalised velocity gradient.
 
-    Walls count with the velocity that viscosity sees where they hold the liquid, else not at all.
+    Wall particles count, with their extrapolated velocities, at no-slip walls only.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     inverse = 1.0 / law.length

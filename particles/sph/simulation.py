@@ -1,7 +1,10 @@
-"""Steps with time: velocity Verlet, one loop over the pairs a step.
+"""Time integration of delta-SPH: velocity Verlet with one loop over the pairs in each step.
 
-A step is a short sequence of loops over particles, which threads or a GPU run (`threads.py`, `cuda_particles.py`); the
-surface stays with the processor.
+A step is a short sequence of loops over particles, which run on threads or on a GPU (`threads.py`,
+`cuda_particles.py`); a tracked surface stays on the processor. Density follows the continuity equation with diffusion
+along its renormalised gradient (delta-SPH), and pressure is linear in density. Particles are shifted towards lower
+concentration (Sun et al. 2017) where there is no free surface or a tracked one; without shifting vortices decay twice
+too fast.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,79 +21,79 @@ from reflowshock.particles.sph.threads import ThreadParticles
 
 
 class Particles(Protocol):
-    """The particles of a simulation on some device, and the loops over them; see `threads.ThreadParticles`."""
+    """Interface of the particles on a device and of the loops over them; see `threads.ThreadParticles`."""
 
     @property
     def fields(self) -> Fields:
-        """Their quantities, on the host; those of a GPU are copies."""
+        """Fields of all particles on the host; copies if they are on a GPU."""
 
     @property
     def rates(self) -> Floats:
-        """`(10, n)` of the liquid at the last positions, as `rates_of` returns them; likewise."""
+        """Rates of the liquid at the last positions, as `rates_of` returns them, shape (10, n)."""
 
     @property
     def built_at(self) -> Floats:
-        """Positions when neighbours were found `(3, n)` [m]; likewise."""
+        """Positions for which neighbours were listed, shape (3, n) [m]."""
 
     @property
     def builds(self) -> int:
-        """How often they were found."""
+        """Number of times neighbours were listed."""
 
     @property
     def neighbours(self) -> float:
-        """How many a particle of the liquid has in its row, on average."""
+        """Mean number of listed neighbours of a liquid particle."""
 
     @property
     def fastest(self) -> float:
-        """The largest speed of the liquid [m/s]."""
+        """Largest speed of the liquid [m/s]."""
 
     @property
     def largest_viscosity(self) -> float:
-        """Of the liquid [Pa s], where it depends on the rate of shear."""
+        """Largest viscosity of the liquid [Pa s], where it depends on the shear rate."""
 
     @property
     def velocity(self) -> Floats:
-        """What the liquid has just been moved with `(3, n)` [m/s]."""
+        """Velocities by which `predict` moved the liquid, shape (3, n) [m/s]."""
 
     def restore(self, fields: Fields, rates: Floats, built_at: Floats, builds: int, /) -> None:
-        """Go on from what was saved."""
+        """Continue from saved fields, rates and positions of the neighbour lists."""
 
     def predict(self, time_step: float, /) -> None:
         """Move the liquid over a time step [s]."""
 
     def settle(self) -> None:
-        """Reflect what has passed through the mirror; find pressures and neighbours."""
+        """Reflect particles that crossed the mirror; update pressures and neighbours."""
 
     def find_rates(self) -> None:
-        """Find the rates of the present fields."""
+        """Compute the rates for the present fields."""
 
     def add(self, act: Callable[[Floats, Fields], None], /) -> None:
-        """Let what the host computes add to the rates."""
+        """Let a function on the host add to the rates."""
 
     def take_slopes(self) -> None:
-        """Keep the gradients of density."""
+        """Store the density gradients for the next step."""
 
     def correct(self, time_step: float, /) -> None:
-        """End a time step [s]."""
+        """Complete a time step [s] with the rates at its end."""
 
     def shift(self, factor: float, /) -> None:
-        """Move particles down the gradient of their concentration times a factor [m^2]."""
+        """Shift particles against the concentration gradient times a factor [m^2]."""
 
 
 @dataclass(slots=True)
 class Simulation:
-    """A fluid between walls that moves.
+    """A moving liquid between walls.
 
     Attributes:
-        start: its quantities at the start; a device may take the arrays as they are.
-        fluids: number of particles that are liquid.
-        law: what acts between two particles.
-        surface: with tension; None where none acts.
-        device: takes fields, the number that is liquid, and the law.
-        held: how many particles next to the liquid's stand still as walls do, but carry its surface.
-        particles: positions, velocities and densities are those at `time`.
-        time: [s].
-        steps: number of them.
+        start: Initial fields; a device may use the arrays without copying them.
+        fluids: Number of liquid particles, the first ones.
+        law: Parameters of the pair interactions.
+        surface: Tracked surface; None without surface tension.
+        device: Creates particles from fields, number of liquid particles and law.
+        held: Number of fixed particles after the liquid's that still carry the surface.
+        particles: Particles, with positions, velocities and densities at `time`.
+        time: Time [s].
+        steps: Number of time steps.
     """
 
     start: InitVar[Fields]
@@ -111,45 +114,45 @@ class Simulation:
 
     @property
     def fields(self) -> Fields:
-        """Quantities of the particles."""
+        """Fields of all particles."""
         return self.particles.fields
 
     @property
     def rates(self) -> Floats:
-        """`(10, n)` of the last positions, as `rates_of` returns them."""
+        """Rates of the liquid at the last positions, as `rates_of` returns them, shape (10, n)."""
         return self.particles.rates
 
     @property
     def kinetic_energy(self) -> float:
-        """Of the liquid [J]."""
+        """Kinetic energy of the liquid [J]."""
         fields = self.fields
         u, v, w = (speed[: self.fluids] for speed in (fields.u, fields.v, fields.w))
         return 0.5 * float(fields.mass[: self.fluids] @ (u * u + v * v + w * w))
 
     @property
     def volume(self) -> float:
-        """Of the particles of the liquid [m^3]."""
+        """Volume of the liquid particles [m^3]."""
         return float((self.fields.mass[: self.fluids] / self.fields.density[: self.fluids]).sum())
 
     @property
     def elastic_energy(self) -> float:
-        """Of the compression of the liquid [J]: the work of pressure from the density at rest on."""
-        density, mass = (one[: self.fluids] for one in (self.fields.density, self.fields.mass))
-        squeezed = density / self.law.rest_density
-        return self.law.sound**2 * float(mass @ (np.log(squeezed) + 1.0 / squeezed - 1.0))
+        """Energy of compression of the liquid from its rest density [J]."""
+        density, mass = (values[: self.fluids] for values in (self.fields.density, self.fields.mass))
+        ratio = density / self.law.rest_density
+        return self.law.sound**2 * float(mass @ (np.log(ratio) + 1.0 / ratio - 1.0))
 
     @property
     def fastest(self) -> float:
-        """The largest speed of the liquid [m/s]."""
+        """Largest speed of the liquid [m/s]."""
         return self.particles.fastest
 
     @property
     def pressures(self) -> Floats:
-        """Of the particles of the liquid `(fluids,)` [Pa], with that of its surface."""
+        """Pressure of the liquid particles, that of the surface included, shape (fluids,) [Pa]."""
         return self.fields.pressure[: self.fluids] + (self.surface.pressure if self.surface else 0.0)
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state, for a checkpoint."""
         return {
             "fields": self.fields._asdict(), "rates": self.rates, "built_at": self.particles.built_at,
             "builds": self.particles.builds, "time": self.time, "steps": self.steps,
@@ -157,24 +160,24 @@ class Simulation:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from what `saved` returned."""
+        """Continue from the data that `saved` returned."""
         self.particles.restore(Fields(**saved["fields"]), saved["rates"], saved["built_at"], saved["builds"])
         self.time, self.steps = saved["time"], saved["steps"]
         if self.surface:
             self.surface.restore(saved["surface"])
 
     def time_step(self) -> float:
-        """The largest stable step [s]."""
+        """Return the largest stable time step [s]."""
         law, tension = self.law, self.surface.tension if self.surface else 0.0
         viscosity = self.particles.largest_viscosity if law.rheology else law.viscosity
         viscosity *= CENTRAL if law.has_surface else 1.0
         return largest_time_step(law.length, law.sound + self.fastest, law.rest_density, viscosity, tension)
 
     def step(self, time_step: float) -> None:
-        """Go on by a time step [s].
+        """Advance by a time step [s].
 
-        Rates need velocities and densities of the new time, which depend on them: those that the last rates predict
-        stand in, which keeps the order.
+        Rates at the new time depend on the velocities and densities at that time; those predicted from the last rates
+        are used, which keeps second order.
         """
         particles, law = self.particles, self.law
         volume = self._volume_within() if self.surface and self.surface.needs_volume else 0.0
@@ -191,15 +194,15 @@ class Simulation:
         self.steps += 1
 
     def _volume_within(self) -> float:
-        """Of the particles that carry the surface, but of those outside it [m^3]."""
+        """Return the volume of the particles that carry the surface, without those outside it [m^3]."""
         carriers, fields, surface = slice(self.fluids + self.held), self.fields, self.surface
         assert surface is not None
         volumes = fields.mass[carriers] / fields.density[carriers]
-        surface.find_spray([place[carriers] for place in fields[:3]], volumes)
+        surface.find_spray([coordinate[carriers] for coordinate in fields[:3]], volumes)
         return float(volumes.sum()) - surface.spray
 
     def _find_rates(self) -> None:
-        """Find the rates of the present fields."""
+        """Compute the rates for the present fields, those of the surface included."""
         self.particles.find_rates()
         if self.surface:
             carriers, surface = self.fluids + self.held, self.surface

@@ -1,6 +1,7 @@
-"""Smoothing kernels W of one pair, as functions of q = distance / h, in one, two and three dimensions.
+"""Smoothing kernels W of one pair as functions of q = distance / h, in one, two and three dimensions.
 
-All have the support 2 h. Sources: cubic spline, Monaghan 1992; Wendland C2, Wendland 1995 and Dehnen & Aly 2012.
+The radius of the support is 2 h. Sources: cubic spline, Monaghan 1992; Wendland C2, Wendland 1995 and Dehnen & Aly
+2012.
 """
 
 from functools import lru_cache
@@ -14,9 +15,9 @@ from reflowshock.arrays import Floats
 
 CUBIC_SPLINE, WENDLAND_C2 = 0, 1
 KERNELS = {"cubic_spline": CUBIC_SPLINE, "wendland": WENDLAND_C2}
-# Of the smoothing length h.
+# Radius of the support in smoothing lengths h.
 SUPPORT = 2.0
-# Integral of the kernel's shape over the line, the plane and space, times 1 / h^d.
+# sigma h^d in one, two and three dimensions, the inverse of the integral of W / sigma over q.
 NORMS = {
     CUBIC_SPLINE: (2.0 / 3.0, 10.0 / (7.0 * pi), 1.0 / pi),
     WENDLAND_C2: (5.0 / 8.0, 7.0 / (4.0 * pi), 21.0 / (16.0 * pi)),
@@ -24,15 +25,15 @@ NORMS = {
 
 
 def norm(kernel: int, dimension: int, length: float) -> float:
-    """Return sigma, the factor [1/m^d] that makes the integral of W one, for a smoothing length h [m]."""
+    """Return the normalisation sigma of W in ``dimension`` d for a smoothing length h [m], in 1/m^d."""
     return NORMS[kernel][dimension - 1] / length**dimension
 
 
 @njit(cache=True, error_model="numpy")
 def shape(kernel, line, q):
-    """Return W / sigma at q >= 0; ``line`` says that the flow has one dimension.
+    """Return W / sigma at q >= 0; ``line`` is True in one dimension.
 
-    Every case is computed and one is taken, so that a loop can have several pairs at a time.
+    All branches are computed and one is selected, so that a loop can compute several pairs at a time.
     """
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = 1.0 - 1.5 * q * q * half if q < 1.0 else 0.25 * rest * rest * rest
@@ -43,7 +44,7 @@ def shape(kernel, line, q):
 
 @njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
-    """Return (dW / dq) / (sigma q) at q >= 0: times sigma / h^2 and the vector between the points it is grad W."""
+    """Return (dW / dq) / (sigma q) at q >= 0; grad W is this times sigma / h^2 times the vector between the points."""
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = -3.0 + 2.25 * q if q < 1.0 else -0.75 * rest * rest / q
     wendland = half * half * (-3.0 if line else -5.0 * half)
@@ -52,9 +53,13 @@ def slope(kernel, line, q):
 
 
 def beyond_plane(kernel: int, distance: Floats) -> Floats:
-    """Return how much of the integral of W in space lies beyond a plane, at distances over h from it `(n,)`.
+    """Return the share of the integral of W in space beyond a plane, shape (n,).
 
-    Of a sphere of radius r about the point the area 2 pi r (r - distance) lies there.
+    Of a sphere of radius r about the point the area 2 pi r (r - distance) is beyond the plane.
+
+    Args:
+        kernel: `CUBIC_SPLINE` or `WENDLAND_C2`.
+        distance: Distances of the points from the plane over h, shape (n,).
     """
     return np.interp(distance, *_table_beyond_plane(kernel))
 

@@ -1,11 +1,10 @@
-"""Friction of a wall on films that are one particle thin.
+"""Wall friction on films that are one particle thin.
 
-In a film of thickness H that a wall holds, the velocity is a parabola, and the wall's friction on the mean velocity u
-is 3 mu u / H a unit of area (lubrication; Nusselt's film). Where there is one particle between the wall and the
-surface, it has this mean velocity, and all that the sums over pairs know of the wall is its image. Their viscosity,
-integrated over a layer of images in the distance 2 z, gives 8 pi mu H W(2 z) u a unit of volume in place of 3 mu u /
-H^2: 1.8 times too little where H is a spacing, twelve times where it is half of one. What they lack is added; from H =
-1.35 spacings on they lack nothing.
+In a film of thickness H on a no-slip wall the velocity is a parabola, and the wall's friction on the mean velocity u is
+3 mu u / H a unit of area (lubrication; Nusselt's film). A single particle between the wall and the surface has this
+mean velocity, and the sums over pairs see nothing of the wall but its image. Integrated over a layer of images at the
+distance 2 z, they give 8 pi mu H W(2 z) u a unit of volume in place of 3 mu u / H^2: a factor of 1.8 too little where H
+is one spacing, of 12 where it is half of one. The difference is added; from H = 1.35 spacings on it vanishes.
 """
 
 from math import pi
@@ -18,50 +17,59 @@ from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.particle_rates import own_viscosity
 from reflowshock.particles.sph.smoothing import shape
 
-# In spacings above the wall: higher particles have others between themselves and the wall.
+# Height above the wall in spacings beyond which other particles are between a particle and the wall.
 LOWEST = 0.75
-# Of the rate at which sound crosses the smoothing length: a stronger drag is not stable in a step.
+# Largest drag over the rate at which sound crosses the smoothing length; a stronger one is unstable in a time step.
 STRONGEST = 2.0
-# A surface whose normal has more than this across the wall is level, and a film where more than this share of it is so;
-# at rims, and where liquid rolls over a contact line, nothing flows as in a film.
+# A vertex is level if its unit normal has more than the first component across the wall; a film is where more than the
+# second share of the surface is level. Rims, and liquid that rolls over a contact line, are no films.
 LEVEL, MOST = 0.7, 0.5
 
 
-def hold_films(
-    surface: tuple[Floats, Floats, tuple[Indices, Indices], Floats], fields: Fields, law: Law, rates: Floats
-) -> None:
-    """Take the friction of the wall z = 0 that sums over pairs lack from the accelerations along it.
+def film_sums(
+    points: Floats, normals: Floats, lists: tuple[Indices, Indices], kernel: Floats, particles: int
+) -> Floats:
+    """Sum the surface near each particle.
 
     Args:
-        surface: its vertices `(m, 3)` [m] and outward normals `(m, 3)`, none across the wall on contact lines, the
-            particles beside each, and the kernel between them `(2, pairs)` [1/m^3].
-        fields: of the particles.
-        law: of the particles.
-        rates: of the liquid `(10, n)`; rows 1 and 2 change.
+        points: Vertices, shape (m, 3) [m].
+        normals: Outward unit normals, shape (m, 3), along the wall on contact lines.
+        lists: Offsets and indices of the particles near each vertex.
+        kernel: Kernel between each vertex and its particles, shape (pairs,) [1/m^3].
+        particles: Number of all particles.
+
+    Returns:
+        Kernel summed over all vertices, over level ones, and the latter times their height, shape (3, particles).
     """
-    points, normals, lists, weights = surface
-    sums = np.zeros((3, len(fields.x)))
-    _sum(points, normals, lists, weights[0], sums)
-    _hold(sums, fields, law, rates)
+    sums = np.zeros((3, particles))
+    _sum_surface(points, normals, lists, kernel, sums)
+    return sums
 
 
 @njit(cache=True)
-def _sum(points, normals, lists, weights, sums):
-    """Add the kernel about each particle, all of it and that of level vertices, and this times their heights."""
+def _sum_surface(points, normals, lists, kernel, sums):
+    """Add the sums of `film_sums`."""
     offsets, indices = lists
     for v in range(points.shape[0]):
         is_level = normals[v, 2] > LEVEL
         for k in range(offsets[v], offsets[v + 1]):
             j = indices[k]
-            sums[0, j] += weights[k]
+            sums[0, j] += kernel[k]
             if is_level:
-                sums[1, j] += weights[k]
-                sums[2, j] += weights[k] * points[v, 2]
+                sums[1, j] += kernel[k]
+                sums[2, j] += kernel[k] * points[v, 2]
 
 
 @njit(cache=True)
-def _hold(sums, fields, law, rates):
-    """Hold the particles next to the wall that are in films: most of the surface about them is level."""
+def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> None:
+    """Subtract the missing friction of the wall z = 0 from the accelerations of particles in films.
+
+    Args:
+        sums: Surface near each particle, as `film_sums` returns it, shape (3, particles).
+        fields: Fields of all particles.
+        law: Parameters of the pair interactions.
+        rates: Rates of the liquid, shape (10, n); rows 1 and 2 change.
+    """
     for i in range(rates.shape[1]):
         z = fields.z[i]
         if z > LOWEST * law.spacing or sums[1, i] <= MOST * sums[0, i]:

@@ -1,8 +1,8 @@
-"""The particles of a simulation on threads: their arrays, and the loops over them.
+"""Particles of a simulation on threads: arrays, neighbour lists, and the loops over particles.
 
-Each loop runs a function of one particle, which `cuda_loops.py` runs on a GPU. An array that a loop writes is an
-argument of its own, not only one of a tuple: Numba may drop the loop then. Within a parallel loop its index is
-unsigned, but Numba looks first as if it were signed, and would compile all that is called twice: `np.uint64` says so.
+Each loop calls a function of one particle, which `cuda_loops.py` runs on a GPU. An array that a loop writes is a
+separate argument: if it were only in a tuple, Numba could drop the loop. The index of a parallel loop is unsigned, but
+Numba first compiles with a signed one; `np.uint64` avoids that every called function is compiled twice.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,16 +21,16 @@ from reflowshock.particles.sph.particle_rates import drift_of, rates_of, wall_va
 from reflowshock.particles.sph.shear_viscosity import viscosity_of
 from reflowshock.particles.sph.smoothing import SUPPORT
 
-# What is found of a particle of the liquid.
+# Number of rates of a liquid particle.
 RATES = 10
-# Of the smoothing length: how far beyond their support particles are listed.
+# Skin of the neighbour lists, in smoothing lengths.
 SKIN = 0.3
 threaded = njit(cache=True, parallel=True, error_model="numpy")
 
 
 @njit(cache=True)
 def liquid_first(row, fluids):
-    """Put the particles of the liquid to the front of a row."""
+    """Reorder a row of neighbours so that liquid particles come first."""
     front = 0
     for k in range(row.shape[0]):
         if row[k] < fluids:
@@ -46,14 +46,16 @@ def _all_liquid_first(rows, counts, fluids):
 
 @dataclass(slots=True)
 class Rows:
-    """Neighbours of every particle, those of the liquid first, found again when some have moved by the skin.
+    """Neighbour table of all particles, liquid neighbours first, rebuilt when particles have moved by the skin.
 
     Attributes:
-        law: says support and periods.
-        fluids: number of particles that are liquid; those of walls list them alone.
-        built_at: `(3, n)` positions when they were found [m].
-        lists: rows `(n, k)` and how many neighbours each begins with `(n,)`; a particle of the liquid is in its own.
-        builds: how often they were found.
+        law: Parameters of the pair interactions, with support and periods.
+        fluids: Number of liquid particles; wall particles list only these.
+        built_at: Positions for which the table was built, shape (3, n) [m].
+        lists: Table of neighbours (n, k) and the number of valid entries of each row (n,); a liquid particle is in its
+            own
+            row.
+        builds: Number of times the table was built.
     """
 
     law: Law
@@ -62,23 +64,26 @@ class Rows:
     lists: tuple[Indices, Indices] = field(default_factory=lambda: (np.empty((0, 0), np.int32), np.empty(0, np.int32)))
     builds: int = 0
 
-    def update(self, places: Sequence[Floats]) -> None:
-        """Make the lists valid for x, y and z `(3, n)` [m].
+    def update(self, positions: Sequence[Floats]) -> None:
+        """Rebuild the table if it may lack pairs at these positions.
+
+        Args:
+            positions: Rows x, y and z, shape (3, n) [m].
 
         Raises:
-            FloatingPointError: a position is not finite.
+            FloatingPointError: A position is not finite.
         """
-        count, skin = len(places[0]), SKIN * self.law.length
-        here = places[0], places[1], places[2]
-        if count == self.built_at.shape[1] and not have_moved(here, self.built_at, skin):
+        count, skin = len(positions[0]), SKIN * self.law.length
+        rows_xyz = positions[0], positions[1], positions[2]
+        if count == self.built_at.shape[1] and not have_moved(rows_xyz, self.built_at, skin):
             return
-        self.built_at = np.array(here)
+        self.built_at = np.array(rows_xyz)
         reach = SUPPORT * self.law.length + skin
-        images, source = self._images(np.stack(here, axis=1), reach)
-        alone = len(images) == count  # images are numbered behind the walls
-        movers = self.fluids if alone else len(images)
+        images, source = self._images(np.stack(rows_xyz, axis=1), reach)
+        has_no_images = len(images) == count  # images are numbered after the walls
+        movers = self.fluids if has_no_images else len(images)
         rows, counts = tabulate_near(images[:count], images, reach, movers, self.lists[0])
-        if not alone:
+        if not has_no_images:
             rows = source[np.where(np.arange(rows.shape[1]) < counts[:, None], rows, 0)]
         if count > self.fluids:
             _all_liquid_first(rows, counts, self.fluids)
@@ -86,33 +91,33 @@ class Rows:
         self.builds += 1
 
     def of(self, i: int) -> Indices:
-        """Neighbours of a particle."""
+        """Return the neighbours of a particle."""
         return self.lists[0][i, : self.lists[1][i]]
 
     def _images(self, points: Floats, reach: float) -> tuple[Floats, Indices]:
-        """Points with their images beyond the periods `(n + g, 3)`, and whose each is."""
+        """Return points with their periodic images within reach, shape (n + g, 3), and the particle of each."""
         source = np.arange(len(points), dtype=np.int32)
         for axis, period in enumerate((self.law.period_x, self.law.period_y, self.law.period_z)):
             if not period:
                 continue
-            place = points[:, axis] - period * np.floor(points[:, axis] / period)
+            coordinate = points[:, axis] - period * np.floor(points[:, axis] / period)
             points = points.copy()
-            points[:, axis] = place
+            points[:, axis] = coordinate
             shift = np.zeros(3)
             shift[axis] = period
-            low, high = place < reach, place > period - reach
+            low, high = coordinate < reach, coordinate > period - reach
             points = np.concatenate((points, points[low] + shift, points[high] - shift))
             source = np.concatenate((source, source[low], source[high]))
         return points, source
 
 
 class ThreadParticles:
-    """A liquid between walls, on threads.
+    """Liquid and walls on threads.
 
     Attributes:
-        fields: its quantities.
-        rates: `(10, n)` of the liquid, as `rates_of` returns them.
-        rows: neighbours.
+        fields: Fields of all particles.
+        rates: Rates of the liquid, as `rates_of` returns them, shape (10, n).
+        rows: Neighbour table.
     """
 
     def __init__(self, fields: Fields, fluids: int, law: Law) -> None:
@@ -122,34 +127,34 @@ class ThreadParticles:
         self._near, self._near_in = np.empty(0, np.int64), self.rows.lists
 
     def restore(self, fields: Fields, rates: Floats, built_at: Floats, builds: int) -> None:
-        """Go on from these arrays, and from neighbours found at these places `(3, n)` [m]."""
+        """Continue from saved fields and rates, with the neighbours of earlier positions (3, n) [m]."""
         self.fields, self.rates, self.rows = fields, rates, Rows(self._law, self._fluids)
         self.rows.update(tuple(built_at))
         self.rows.builds = builds
 
     @property
     def built_at(self) -> Floats:
-        """Positions when neighbours were found `(3, n)` [m]."""
+        """Positions for which neighbours were listed, shape (3, n) [m]."""
         return self.rows.built_at
 
     @property
     def builds(self) -> int:
-        """How often they were found."""
+        """Number of times neighbours were listed."""
         return self.rows.builds
 
     @property
     def neighbours(self) -> float:
-        """How many a particle of the liquid has in its row, on average."""
+        """Mean number of listed neighbours of a liquid particle."""
         return float(self.rows.lists[1][: self._fluids].mean())
 
     @property
     def fastest(self) -> float:
-        """The largest speed of the liquid [m/s]."""
+        """Largest speed of the liquid [m/s]."""
         return sqrt(_fastest2(self._fluids, self.fields))
 
     @property
     def largest_viscosity(self) -> float:
-        """Of the liquid [Pa s], where it depends on the rate of shear."""
+        """Largest viscosity of the liquid [Pa s], where it depends on the shear rate."""
         return float(self.fields.viscosity[: self._fluids].max())
 
     def predict(self, time_step: float) -> None:
@@ -160,16 +165,16 @@ class ThreadParticles:
 
     @property
     def velocity(self) -> Floats:
-        """What the liquid was moved with `(3, n)` [m/s], until it has settled."""
+        """Velocities by which `predict` moved the liquid, shape (3, n) [m/s]; valid until `settle`."""
         return self._middle[:3] + self._middle[4:] if self._law.xsph else self._middle[:3]
 
     def settle(self) -> None:
-        """Reflect what has passed through the mirror, and find pressures and neighbours."""
+        """Reflect particles that crossed the mirror; update pressures and neighbours."""
         _settle(self.fields, self._middle, self._law)
         self.rows.update(self.fields[:3])
 
     def find_rates(self) -> None:
-        """Find the rates of the liquid, and before them what walls and its viscosity are."""
+        """Compute the rates of the liquid, and before them the values of walls and the viscosity."""
         fluids, lists, fields, law = self._fluids, self.rows.lists, self.fields, self._law
         _cover_walls((self._walls(), fluids), lists, fields, law, fields.wall_share)
         if law.rheology:
@@ -177,26 +182,26 @@ class ThreadParticles:
         _find_rates(fluids, lists, fields, law, self.rates)
 
     def _walls(self) -> NDArray[np.int64]:
-        """Particles of walls to cover: all in new lists, and then those alone that have liquid in their rows."""
+        """Return the wall particles to update: all of a new table, later only those with liquid neighbours."""
         if self._near_in is self.rows.lists:
             return self._near
         self._near, self._near_in = np.flatnonzero(self.rows.lists[1][self._fluids :]), self.rows.lists
         return np.arange(len(self.fields.wall_share))
 
     def add(self, act: Callable[[Floats, Fields], None]) -> None:
-        """Let what is not a loop over particles add to the rates `(10, n)`, as the fields say."""
+        """Let a function of rates (10, n) and fields add to the rates."""
         act(self.rates, self.fields)
 
     def take_slopes(self) -> None:
-        """Keep the gradients of density."""
+        """Store the density gradients for the next step."""
         _take_slopes(self.fields, self.rates, self.fields.slope_x)
 
     def correct(self, time_step: float) -> None:
-        """End a time step [s]."""
+        """Complete a time step [s] with the rates at its end."""
         _correct(self.fields, self.rates, self._middle, time_step)
 
     def shift(self, factor: float) -> None:
-        """Move particles down the gradient of their concentration times a factor [m^2]."""
+        """Shift particles against the concentration gradient times a factor [m^2]."""
         _shift(self.fields, self.rates, factor, self._law)
 
 

@@ -14,13 +14,15 @@ from reflowshock.particles.flows.droplet_shape import start_shape
 from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.flows.result import FlowResult
 from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import EDGE, SurfaceLost
 from reflowshock.particles.surface.breakup import largest_part
-from reflowshock.particles.surface.closing import parts_of
+from reflowshock.particles.surface.morphological_closing import count_parts
 from reflowshock.particles.surface.profile import width
+from reflowshock.particles.surface.remeshing import EDGE
+from reflowshock.particles.surface.surface_mesh import SurfaceLost, SurfaceMesh
 
 COLUMNS = (
     "time", "mean_pressure", "roundness", "spread", "base", "height", "largest_speed", "kinetic_energy",
@@ -73,7 +75,8 @@ def droplet(scene: Droplet) -> Simulation:
     law, tension = liquid_of(scene, spacing)
     fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     fields.w[:] = -scene.impact_speed
-    surface = LiquidSurface(*triangles, tension, cos(scene.angle), law, scene.bounds)
+    mesh = SurfaceMesh(*triangles, law.spacing, bool(law.mirror))
+    surface = LiquidSurface(mesh, Capillarity(tension, cos(scene.angle), law, scene.bounds))
     for _ in range(ENCLOSURES):
         surface.enclose(scene.volume)
     return Simulation(fields, points.shape[1], law, surface, flow.device_of(scene))
@@ -105,6 +108,6 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
         drop_height(scene, surface.points) / scene.diameter, simulation.fastest,
         simulation.kinetic_energy, surface.energy, (surface.volume + surface.spray) / scene.volume,
-        2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(parts_of(surface.triangles)),
-        surface.spray / scene.volume, float(surface.shed),
+        2.0 * sqrt(max(surface.wetted_area, 0.0) / pi) / scene.diameter, float(count_parts(surface.triangles)),
+        surface.spray / scene.volume, float(surface.detachments),
     )  # fmt: skip

@@ -1,9 +1,9 @@
-"""Triangulated surfaces that stretch or shrink: long edges are split in the middle, short ones collapse.
+"""Edge splits and edge collapses on a triangulated surface that stretches or shrinks.
 
-Both are written as means of two old vertices, so that any field of the vertices comes along. A split changes no shape.
-A collapse is left out where it would fold the surface or pinch it off (the link condition), and what is left of the
-edge stays on a contact line that one of its ends is on. Contact lines themselves are changed where they may be.
-A corner of three triangles whose base has a short edge is cut off: the base could not collapse, since it closes a loop.
+Each new vertex is the mean of two old ones, so any field on the vertices can be transferred. A split does not change
+the shape. A collapse is left out if it would fold the surface or pinch it off (link condition); if one end of the edge
+is on a contact line, the merged vertex stays on the line. A corner of three triangles whose base has a short edge is
+cut off, since the base, a closed loop, could not collapse.
 """
 
 from collections.abc import Sequence
@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 
 from reflowshock.arrays import Floats, Indices
 
-# Cosine of the angle that a collapse may turn a triangle by.
+# Cosine of the largest angle by which a collapse may turn a triangle.
 TURNED = 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class NewSurface:
-    """A changed triangulation; k vertices.
+    """Changed triangulation with k vertices.
 
     Attributes:
-        first, second: `(k,)` old vertices whose mean each one is; equal where it was kept.
-        triangles: `(t, 3)`.
-        rings: contact lines.
+        first: First of the two old vertices whose mean each new vertex is, shape (k,).
+        second: Second of them, shape (k,); equal to the first if the vertex did not change.
+        triangles: Triangles, shape (t, 3).
+        rings: Contact lines.
     """
 
     first: Indices
@@ -37,7 +38,7 @@ class NewSurface:
 
 @njit(cache=True)
 def extreme_edges(points, triangles):
-    """Lengths of the shortest and the longest edge of triangles `(t, 3)` [m]."""
+    """Return the lengths of the shortest and the longest edge of triangles (t, 3) with vertices (n, 3) [m]."""
     shortest, longest = np.inf, 0.0
     for a, b, c in triangles:
         for i, j in ((a, b), (b, c), (c, a)):
@@ -48,39 +49,41 @@ def extreme_edges(points, triangles):
 
 
 @dataclass(frozen=True, slots=True)
-class FacesOf:
-    """The triangles around each vertex, ascending, cut out where they are asked for: few of them are.
+class VertexFaces:
+    """Triangles around each vertex of a triangulation.
 
     Attributes:
-        faces: around one vertex after the other.
-        ends: of those of each vertex.
+        triangles: Triangles, shape (t, 3).
+        faces: Numbers of the triangles around one vertex after the other, ascending for each vertex, shape (3 t,).
+        ends: End of each vertex's triangles among them, shape (n,).
     """
 
+    triangles: Indices
     faces: Indices
     ends: Indices
 
     @classmethod
-    def of(cls, triangles: Indices, count: int) -> "FacesOf":
-        """Find those of so many vertices."""
+    def of(cls, triangles: Indices, count: int) -> "VertexFaces":
+        """Sort triangles (t, 3) by their vertices, of which there are ``count``."""
         order = np.argsort(triangles.ravel(), kind="stable")
-        return cls(order // 3, np.cumsum(np.bincount(triangles.ravel(), minlength=count)))
+        return cls(triangles, order // 3, np.cumsum(np.bincount(triangles.ravel(), minlength=count)))
 
     def __getitem__(self, vertex: int) -> Indices:
-        """Those around a vertex."""
+        """Return the numbers of the triangles around a vertex."""
         return self.faces[self.ends[vertex - 1] if vertex else 0 : self.ends[vertex]]
 
 
 def split_long(
     points: Floats, triangles: Indices, rings: Sequence[Indices], longest: float, on_rings: bool
 ) -> NewSurface:
-    """Split edges longer than a length [m], the longest first, at most one of a triangle.
+    """Split edges longer than a length, the longest first, at most one edge of each triangle.
 
     Args:
-        points: `(k, 3)` vertices [m].
-        triangles: `(t, 3)`.
-        rings: contact lines.
-        longest: [m].
-        on_rings: whether edges of contact lines are split, too.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        rings: Contact lines.
+        longest: Length beyond which an edge is split [m].
+        on_rings: Whether edges of contact lines are split, too.
     """
     edges, sides = _edges(triangles)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -103,9 +106,9 @@ def split_long(
             faces.append(np.where(old == j, new, old))
         if len(around) == 1:
             _insert(lines, int(i), int(j), new)
-    kept = np.arange(len(points), dtype=np.int32)
+    unchanged = np.arange(len(points), dtype=np.int32)
     ends = np.array(pairs, np.int32).reshape(-1, 2)
-    first, second = np.concatenate((kept, ends[:, 0])), np.concatenate((kept, ends[:, 1]))
+    first, second = np.concatenate((unchanged, ends[:, 0])), np.concatenate((unchanged, ends[:, 1]))
     rows = tuple(np.array(line, np.int32) for line in lines)
     return NewSurface(first, second, np.array(faces, np.int32), rows)
 
@@ -113,39 +116,44 @@ def split_long(
 def collapse_short(
     points: Floats, triangles: Indices, rings: Sequence[Indices], shortest: float, on_rings: bool
 ) -> NewSurface:
-    """Collapse edges shorter than a length [m], the shortest first, at most one around a vertex.
+    """Collapse edges shorter than a length, the shortest first, at most one edge around each vertex.
 
-    Args: as `split_long`.
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        rings: Contact lines.
+        shortest: Length below which an edge collapses [m].
+        on_rings: Whether edges of contact lines collapse, too.
     """
     edges, sides = _edges(triangles)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     on_ring = np.zeros(len(points), bool)
     for ring in rings:
         on_ring[ring] = True
-    faces_of = FacesOf.of(triangles, len(points))
+    faces_of = VertexFaces.of(triangles, len(points))
     first, second = (np.arange(len(points), dtype=np.int32) for _ in range(2))
     target, busy = np.arange(len(points), dtype=np.int32), np.zeros(len(points), bool)
     for edge in np.argsort(length, kind="stable"):
         if length[edge] >= shortest:
             break
-        kept, gone = (int(end) for end in edges[edge])
-        tip = _tip(triangles, faces_of, (kept, gone))
+        remaining, removed = (int(end) for end in edges[edge])
+        tip = _tip(faces_of, remaining, removed)
         if tip is not None:
-            gone = tip
-        elif on_ring[gone]:
-            kept, gone = gone, kept
-        outer = (sides[edge] < 0).any()
-        if on_ring[gone] and not (outer and on_rings):
+            removed = tip
+        elif on_ring[removed]:
+            remaining, removed = removed, remaining
+        is_boundary = (sides[edge] < 0).any()
+        if on_ring[removed] and not (is_boundary and on_rings):
             continue
-        near = triangles[np.concatenate((faces_of[kept], faces_of[gone]))]
-        in_place = tip is not None or (on_ring[kept] and not on_ring[gone])
-        place = points[kept] if in_place else 0.5 * (points[kept] + points[gone])
-        if busy[near].any() or (tip is None and not _may_collapse(points, triangles, faces_of, (kept, gone), place)):
+        near = triangles[np.concatenate((faces_of[remaining], faces_of[removed]))]
+        stays_fixed = tip is not None or (on_ring[remaining] and not on_ring[removed])
+        merged = points[remaining] if stays_fixed else 0.5 * (points[remaining] + points[removed])
+        if busy[near].any() or (tip is None and not _may_collapse(points, faces_of, remaining, removed, merged)):
             continue
         busy[near] = True
-        target[gone] = kept
-        if not in_place:
-            second[kept] = gone
+        target[removed] = remaining
+        if not stays_fixed:
+            second[remaining] = removed
     faces = target[triangles]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     stays = target == np.arange(len(points))
@@ -154,27 +162,31 @@ def collapse_short(
     return NewSurface(first[stays], second[stays], number[faces], lines)
 
 
-def _tip(triangles: Indices, faces_of: FacesOf, ends: tuple[int, int]) -> int | None:
-    """The vertex over an edge in which three triangles alone meet, on a base that is no triangle yet; else None."""
-    shared = set(faces_of[ends[0]]) & set(faces_of[ends[1]])
-    over = set(triangles[list(shared)].ravel().tolist()) - set(ends)
-    for vertex in over:
+def _tip(faces_of: VertexFaces, i: int, j: int) -> int | None:
+    """Return the vertex opposite to the edge i-j in which exactly three triangles meet, else None.
+
+    The base of these three triangles must not be a triangle of the surface.
+    """
+    triangles, ends = faces_of.triangles, {i, j}
+    shared = set(faces_of[i]) & set(faces_of[j])
+    opposite = set(triangles[list(shared)].ravel().tolist()) - ends
+    for vertex in opposite:
         around = set(triangles[faces_of[vertex]].ravel().tolist()) - {vertex}
-        if len(faces_of[vertex]) == len(around) == 3 and not around <= over | set(ends):
+        if len(faces_of[vertex]) == len(around) == 3 and not around <= opposite | ends:
             return int(vertex)
     return None
 
 
-def _may_collapse(points: Floats, triangles: Indices, faces_of: FacesOf, ends: tuple[int, int], place: Floats) -> bool:
-    """Whether the ends of an edge, joined at a place `(3,)`, leave a surface that is neither folded nor pinched off."""
-    kept, gone = ends
-    rings = [set(triangles[faces_of[end]].ravel().tolist()) - {kept, gone} for end in ends]
-    shared = set(faces_of[kept]) & set(faces_of[gone])
+def _may_collapse(points: Floats, faces_of: VertexFaces, i: int, j: int, merged: Floats) -> bool:
+    """Return whether merging the vertices i and j in a point (3,) neither folds the surface nor pinches it off."""
+    triangles, ends = faces_of.triangles, (i, j)
+    rings = [set(triangles[faces_of[end]].ravel().tolist()) - {i, j} for end in ends]
+    shared = set(faces_of[i]) & set(faces_of[j])
     if len(rings[0] & rings[1]) != len(shared):
         return False
-    for face in set(faces_of[kept]) ^ set(faces_of[gone]):
+    for face in set(faces_of[i]) ^ set(faces_of[j]):
         corners = points[triangles[face]]
-        moved = np.where(np.isin(triangles[face], ends)[:, None], place, corners)
+        moved = np.where(np.isin(triangles[face], ends)[:, None], merged, corners)
         before, after = (np.cross(c[1] - c[0], c[2] - c[0]) for c in (corners, moved))
         if before @ after < TURNED * np.linalg.norm(before) * np.linalg.norm(after):
             return False
@@ -182,7 +194,7 @@ def _may_collapse(points: Floats, triangles: Indices, faces_of: FacesOf, ends: t
 
 
 def _edges(triangles: Indices) -> tuple[Indices, NDArray[np.int64]]:
-    """Edges `(e, 2)`, the smaller vertex first, and the triangles on both sides `(e, 2)`, -1 where there is none."""
+    """Return edges (e, 2), the smaller vertex first, and the triangles on both sides (e, 2), -1 at a boundary."""
     half = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     owner = np.tile(np.arange(len(triangles)), 3)
     lower, upper = half.min(axis=1).astype(np.int64), half.max(axis=1)
@@ -198,9 +210,9 @@ def _edges(triangles: Indices) -> tuple[Indices, NDArray[np.int64]]:
 
 
 def _insert(lines: list[list[int]], i: int, j: int, new: int) -> None:
-    """Put a vertex between two neighbours of a contact line."""
+    """Insert a vertex between two neighbours of a contact line."""
     for line in lines:
-        for place, vertex in enumerate(line):
-            if {vertex, line[place - 1]} == {i, j}:
-                line.insert(place, new)
+        for position, vertex in enumerate(line):
+            if {vertex, line[position - 1]} == {i, j}:
+                line.insert(position, new)
                 return

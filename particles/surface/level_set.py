@@ -1,4 +1,4 @@
-"""Signed distance to closed triangle surfaces on a grid, the smooth union of two liquids, its surface."""
+"""Level sets on a grid: signed distance to closed triangulated surfaces, smooth union of liquids, triangulation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from reflowshock.arrays import Floats, Indices
-from reflowshock.particles.core import windings
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.surface import near_distance
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets
@@ -17,7 +17,9 @@ from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoo
 if TYPE_CHECKING:
     import pyvista
 
+# Smoothing passes over the triangles of a new surface.
 RELAXATIONS = 30
+# The eight corners of a cell.
 CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -26,74 +28,85 @@ class LevelSet:
     """A function on a grid, negative in the liquid.
 
     Attributes:
-        grid: the grid.
-        values: `(i, j, k)` at the nodes [m].
+        grid: Grid of nodes.
+        values: Values at the nodes, shape (i, j, k) [m].
     """
 
     grid: Grid
     values: Floats
 
     def at(self, points: Floats, order: int = 3) -> Floats:
-        """Values at points `(n, 3)` by splines, `(n,)` [m]; those of order 1 do without the whole grid's."""
+        """Return values at points (n, 3) by spline interpolation, shape (n,) [m]; order 1 is trilinear."""
         return map_coordinates(self.values, self.grid.indices(points).T, order=order, mode="nearest")
 
     def gradient(self, points: Floats, order: int = 3) -> Floats:
-        """Gradient at points, by central differences over a node spacing, `(n, 3)`."""
+        """Return the gradient at points (n, 3) by central differences over a node spacing, shape (n, 3)."""
         reach = 0.5 * self.grid.spacing
         ends = [(self.at(points + step, order), self.at(points - step, order)) for step in reach * np.eye(3)]
         return np.stack([(after - before) / (2.0 * reach) for after, before in ends], axis=1)
 
 
 def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
-    """Signed distance to a closed, outward oriented surface; inside is what it winds round, even where it is folded.
+    """Compute the signed distance to a closed surface at the nodes of a grid, negative inside.
+
+    The inside is where the winding number is positive, so folded surfaces are accepted.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`; where the surface has an edge, the triangles share its vertices.
-        grid: where to evaluate it.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
+        grid: Grid of nodes.
     """
     import pyvista  # most reflows need no level set, and start without it
 
     nodes = pyvista.ImageData(dimensions=grid.shape, spacing=(grid.spacing,) * 3, origin=grid.origin)
     distance = _distance(nodes, points, triangles).reshape(grid.shape, order="F")
-    return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
+    return LevelSet(grid, np.where(winding_numbers_on(grid, points, triangles) > 0, -distance, distance))
 
 
-def within_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
-    """Return what `signed_distance` does; nodes farther from the surface than a band [m] are told as that far."""
+def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
+    """Compute the signed distance as `signed_distance` does, limited to the half width ``band`` [m] in magnitude."""
     distance = np.full(grid.shape, band)
-    near_distance.narrow(points, triangles, grid.origin, grid.spacing, distance)
-    return LevelSet(grid, np.where(windings_on(grid, points, triangles) > 0, -distance, distance))
+    near_distance.lower_to_distance(points, triangles, grid.origin, grid.spacing, distance)
+    return LevelSet(grid, np.where(winding_numbers_on(grid, points, triangles) > 0, -distance, distance))
 
 
-def depths(points: Floats, surface: tuple[Floats, Indices]) -> Floats:
-    """How deep points `(n, 3)` are inside a closed surface, negative outside, `(n,)` [m]; arguments as above."""
+def depths(points: Floats, vertices: Floats, triangles: Indices) -> Floats:
+    """Return the depths of points inside a closed surface, negative outside, shape (n,) [m].
+
+    Args:
+        points: Points, shape (n, 3) [m].
+        vertices: Vertices of the surface, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+    """
     import pyvista
 
-    corners, triangles = surface
-    distance = _distance(pyvista.PolyData(points), corners, triangles)
-    return np.where(windings.winding_numbers(points, corners[triangles]) > 0.5, distance, -distance)
+    distance = _distance(pyvista.PolyData(points), vertices, triangles)
+    return np.where(winding_numbers.at_points(points, vertices[triangles]) > 0.5, distance, -distance)
 
 
 def _distance(nodes: "pyvista.DataSet", points: Floats, triangles: Indices) -> Floats:
-    """Distance of nodes to a surface [m]. Its sign, by the nearest triangle, is wrong where the surface is folded."""
+    """Return unsigned distances of nodes to a surface [m]; VTK's sign would be wrong where the surface is folded."""
     import pyvista
 
     surface = pyvista.PolyData.from_regular_faces(points, triangles)
     return np.abs(nodes.compute_implicit_distance(surface)["implicit_distance"])
 
 
-def windings_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
-    """How often a closed surface winds round the nodes of a grid, an array of its counts."""
-    found = np.zeros(grid.shape, np.int32)
-    windings.on_grid(points, np.ascontiguousarray(triangles), grid.origin, grid.spacing, found)
-    return found
+def winding_numbers_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
+    """Return the winding numbers of a closed surface at the nodes of a grid, an array of its shape."""
+    numbers = np.zeros(grid.shape, np.int32)
+    winding_numbers.on_grid(points, np.ascontiguousarray(triangles), grid.origin, grid.spacing, numbers)
+    return numbers
 
 
 def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:
-    """Union of liquids on one grid, with a neck wherever a gap is narrower than half the reach [m].
+    """Return the union of liquids on one grid, with a neck wherever a gap is narrower than half the reach.
 
-    The polynomial smooth minimum: min(a, b) - max(reach - |a - b|, 0)^2 / (4 reach).
+    It is the polynomial smooth minimum min(a, b) - max(reach - |a - b|, 0)^2 / (4 reach).
+
+    Args:
+        parts: Level sets on the same grid.
+        reach: Twice the width of the widest gap that is bridged [m].
     """
     values = parts[0].values
     for part in parts[1:]:
@@ -103,13 +116,13 @@ def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:
 
 
 def extract_surface(level: LevelSet) -> tuple[Floats, Indices]:
-    """Triangulate the surface on which a level set is zero, with edges of about the grid's spacing.
+    """Triangulate the zero level of a level set, with edges of about the grid's spacing.
 
     Naive surface nets (Gibson 1998): a vertex in each cell that the surface crosses, at the mean of the crossings of
     its edges; two triangles across each edge of the grid that the surface crosses.
 
     Returns:
-        Points `(n, 3)` [m] and triangles `(t, 3)`, outward oriented, closed if the liquid is inside the grid.
+        Vertices (n, 3) [m] and outward oriented triangles (t, 3), closed if the liquid is inside the grid.
     """
     inside = level.values < 0.0
     points, number = _cell_vertices(level, inside)
@@ -118,13 +131,16 @@ def extract_surface(level: LevelSet) -> tuple[Floats, Indices]:
 
 
 def relax(level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[Floats, Indices]:
-    """Even out the triangles of a surface: tangential smoothing, projection onto the level set, Delaunay flips.
+    """Smooth the triangles of a surface: tangential smoothing, projection onto the level set, Delaunay flips.
 
     Args:
-        level: level set that is zero on the surface, symmetric about the walls.
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`.
-        rings: contact lines, each in a horizontal wall, in which it stays.
+        level: Level set that is zero on the surface, symmetric about the walls.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        rings: Contact lines, each in a horizontal wall, in which it stays.
+
+    Returns:
+        New vertices (n, 3) [m] and triangles (t, 3).
     """
     heights = [points[ring, 2].mean() for ring in rings]
     for _ in range(RELAXATIONS):
@@ -136,17 +152,17 @@ def relax(level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[I
 
 
 def project(level: LevelSet, points: Floats) -> Floats:
-    """Move points near a surface onto it by one Newton step along the gradient, `(n, 3)` [m]."""
+    """Move points near the zero level onto it by one Newton step along the gradient; return them, shape (n, 3) [m]."""
     gradient = level.gradient(points)
     return points - (level.at(points) / (gradient**2).sum(axis=1))[:, None] * gradient
 
 
 def _cell_vertices(level: LevelSet, inside: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.int64]]:
-    """Vertices `(n, 3)` [m] and the number of each cell's vertex, -1 where the surface does not cross the cell."""
+    """Return vertices (n, 3) [m] and the number of each cell's vertex, -1 where the surface does not cross the cell."""
     values = level.values
     shape = tuple(np.array(values.shape) - 1)
-    corner = np.stack([values[_from(c, shape)] for c in CORNERS], axis=-1)
-    signs = np.stack([inside[_from(c, shape)] for c in CORNERS], axis=-1)
+    corner = np.stack([values[_shifted(c, shape)] for c in CORNERS], axis=-1)
+    signs = np.stack([inside[_shifted(c, shape)] for c in CORNERS], axis=-1)
     active = signs.any(axis=-1) & ~signs.all(axis=-1)
     number = np.full(shape, -1, np.int64)
     number[active] = np.arange(active.sum())
@@ -161,12 +177,13 @@ def _cell_vertices(level: LevelSet, inside: NDArray[np.bool_]) -> tuple[Floats, 
     return level.grid.positions(indices), number
 
 
-def _from(corner: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[slice, ...]:
+def _shifted(corner: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[slice, ...]:
+    """Return the slices that select one corner of each cell from the nodes."""
     return tuple(slice(c, c + n) for c, n in zip(corner, shape, strict=True))
 
 
 def _quads(inside: NDArray[np.bool_], number: NDArray[np.int64], axis: int) -> NDArray[np.int64]:
-    """Quadrilaterals across the crossed grid edges along an axis, outward oriented, `(q, 4)`."""
+    """Return the outward oriented quadrilaterals across the crossed grid edges along an axis, shape (q, 4)."""
     inside, number = np.moveaxis(inside, axis, 0), np.moveaxis(number, axis, 0)
     low, high = inside[:-1, 1:-1, 1:-1], inside[1:, 1:-1, 1:-1]
     around = np.stack((number[:, :-1, :-1], number[:, 1:, :-1], number[:, 1:, 1:], number[:, :-1, 1:]), axis=-1)
@@ -179,6 +196,6 @@ def _split(points: Floats, quads: NDArray[np.int64]) -> Indices:
     """Split quadrilaterals along their shorter diagonal."""
     a, b, c, d = quads.T
     first = np.linalg.norm(points[a] - points[c], axis=1) < np.linalg.norm(points[b] - points[d], axis=1)
-    one = np.where(first[:, None], np.stack((a, b, c), 1), np.stack((a, b, d), 1))
-    two = np.where(first[:, None], np.stack((a, c, d), 1), np.stack((b, c, d), 1))
-    return np.concatenate((one, two)).astype(np.int32)
+    upper = np.where(first[:, None], np.stack((a, b, c), 1), np.stack((a, b, d), 1))
+    lower = np.where(first[:, None], np.stack((a, c, d), 1), np.stack((b, c, d), 1))
+    return np.concatenate((upper, lower)).astype(np.int32)

@@ -1,4 +1,4 @@
-"""Distance of the nodes of a grid to triangles, as far as a band about them: the nodes beyond it are not visited."""
+"""Distances of grid nodes to triangles within a narrow band about them; nodes outside the band are not visited."""
 
 from math import ceil, floor, inf, sqrt
 
@@ -7,45 +7,45 @@ from numba import njit
 
 from reflowshock.particles.core.surface_measure import area_vector
 
-# Of a triangle, over its longest edge: what is less high than the root of rounding is its edges, by less than that. Of
-# the normals of such ones rounding leaves no more than that; of worse ones nothing.
+# Least height of a triangle over its longest edge, the square root of rounding. A flatter triangle is represented by
+# its edges with a smaller error; rounding leaves its normal no better.
 LEAST_HEIGHT = 1e-8
 
 
 @njit(cache=True)
-def narrow(points, triangles, origin, spacing, found):
-    """Lower the distances found `(i, j, k)` [m] at the nodes of a grid to those to triangles, where these are less.
+def lower_to_distance(points, triangles, origin, spacing, distance):
+    """Lower the distances at the nodes of a grid to the distances to triangles where these are smaller.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`.
-        origin: of the first node `(3,)` [m].
-        spacing: of the nodes [m].
-        found: the band, at first, in which they are told; its shape is that of the grid.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        origin: Position of the first node, shape (3,) [m].
+        spacing: Distance between nodes [m].
+        distance: Distances at the nodes, shape (i, j, k) [m], lowered in place; the largest is the width of the band.
     """
-    band = found.max()
+    band = distance.max()
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t]
         for d in range(3):
             least, most = min(points[a, d], points[b, d], points[c, d]), max(points[a, d], points[b, d], points[c, d])
             low[d] = max(0, ceil((least - band - origin[d]) / spacing))
-            high[d] = min(found.shape[d] - 1, floor((most + band - origin[d]) / spacing)) + 1
+            high[d] = min(distance.shape[d] - 1, floor((most + band - origin[d]) / spacing)) + 1
         plane = _plane(points, (a, b, c))
         for i in range(low[0], high[0]):
             x = origin[0] + spacing * i
             for j in range(low[1], high[1]):
                 y = origin[1] + spacing * j
                 for k in range(low[2], high[2]):
-                    place, known2 = (x, y, origin[2] + spacing * k), found[i, j, k] ** 2
-                    nearest2 = _square_of_distance(place, points, (a, b, c), plane, known2)
-                    if nearest2 < known2:
-                        found[i, j, k] = sqrt(nearest2)
+                    node, limit2 = (x, y, origin[2] + spacing * k), distance[i, j, k] ** 2
+                    nearest2 = _squared_distance(node, points, (a, b, c), plane, limit2)
+                    if nearest2 < limit2:
+                        distance[i, j, k] = sqrt(nearest2)
 
 
 @njit(cache=True)
 def _plane(points, corners):
-    """Normal of a triangle, twice its area long [m^2], and the square of that length [m^4]; zeros for mere edges."""
+    """Return the normal of a triangle, of twice its area [m^2], and its square [m^4]; zeros for a degenerate one."""
     a, b, c = corners
     nx, ny, nz = area_vector(points, a, b, c)
     size2, longest2 = nx * nx + ny * ny + nz * nz, 0.0
@@ -58,22 +58,22 @@ def _plane(points, corners):
 
 
 @njit(cache=True)
-def _square_of_distance(place, points, corners, plane, known2):
-    """Square of the distance of a place to a triangle; where its plane alone is farther than is known, infinity.
+def _squared_distance(node, points, corners, plane, limit2):
+    """Return the squared distance of a node to a triangle [m^2]; infinity if the plane alone is beyond the limit.
 
-    ``plane``: as `_plane` returns it.
+    ``plane``: As `_plane` returns it.
     """
     (nx, ny, nz), size2 = plane
     a = corners[0]
-    x, y, z = place[0] - points[a, 0], place[1] - points[a, 1], place[2] - points[a, 2]
+    x, y, z = node[0] - points[a, 0], node[1] - points[a, 1], node[2] - points[a, 2]
     across = x * nx + y * ny + z * nz
-    if across * across > known2 * size2:
+    if across * across > limit2 * size2:
         return inf
     is_above, nearest2 = size2 > 0.0, inf
     for k in range(3):
         i, j = corners[k], corners[(k + 1) % 3]
         ex, ey, ez = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
-        x, y, z = place[0] - points[i, 0], place[1] - points[i, 1], place[2] - points[i, 2]
+        x, y, z = node[0] - points[i, 0], node[1] - points[i, 1], node[2] - points[i, 2]
         is_above &= (ny * ez - nz * ey) * x + (nz * ex - nx * ez) * y + (nx * ey - ny * ex) * z >= 0.0
         length2 = ex * ex + ey * ey + ez * ez
         along = min(max((x * ex + y * ey + z * ez) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0

@@ -1,7 +1,8 @@
-"""Cross-sections of the tracked surface: equivalent radius against height, width and waist.
+"""Profile of a liquid body: equivalent radius of its horizontal cross-sections against height, width and waist.
 
-The area A(z) of the polygonal cross-sections is fitted by a polynomial. The integral of A is the volume, which the flow
-keeps exactly, so the fit is free of the bias of single vertices (outside the smooth surface) and chords (inside it).
+The areas A(z) of the polygonal cross-sections are fitted by a polynomial. The integral of A is the volume, which the
+flow conserves exactly, so the fit has neither the bias of single vertices, which lie outside the smooth surface, nor
+that of chords, which lie inside.
 """
 
 from collections.abc import Callable
@@ -13,21 +14,26 @@ from numpy.polynomial import Legendre
 
 from reflowshock.arrays import Floats, Indices
 
+# Relative heights of the cross-sections, from -1 to 1.
 NODES = np.polynomial.legendre.leggauss(64)[0]
+# Degree of the polynomial of the areas.
 DEGREE = 6
+# Heights at which a profile is sampled.
 SAMPLES = 401
+# Newton iterations for the height of an apex.
 APEX_PASSES = 4
-DIRECTIONS = 36  # over which the width is averaged
+# Horizontal directions over which the width is averaged.
+DIRECTIONS = 36
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Equivalent radius of the cross-sections.
+    """Equivalent radius of the cross-sections against height.
 
     Attributes:
-        z: `(k,)` heights from foot to head [m].
-        radius: `(k,)` radius of the disc of equal area [m].
-        areas: fitted areas of the cross-sections against their height [m^2].
+        z: Heights from bottom to top, shape (k,) [m].
+        radius: Radius of the disc of equal area, shape (k,) [m].
+        areas: Fitted areas of the cross-sections against height [m^2].
     """
 
     z: Floats
@@ -52,15 +58,16 @@ class Profile:
         return 2.0 * float(self.radius.min())
 
     def drop_height(self, walls: int) -> float:
-        """Height of a drop on a wall, or of a free one, to the apex where the fitted areas vanish [m].
+        """Return the height of a drop, between the apexes where the fitted areas vanish or from its wall [m].
 
-        As free of the bias of single vertices as the width is.
+        Args:
+            walls: Number of walls that the drop touches, 0 or 1.
         """
         foot = float(self.z[0]) if walls else self._apex(self.z[0])
         return self._apex(self.z[-1]) - foot
 
     def _apex(self, end: float) -> float:
-        """Zero of the areas next to an end [m], by Newton's method: near its apex a body is a paraboloid."""
+        """Return the zero of the areas near an end [m] by Newton's method; near its apex a body is a paraboloid."""
         slope = self.areas.deriv()
         for _ in range(APEX_PASSES):
             end = end - self.areas(end) / slope(end)
@@ -69,15 +76,17 @@ class Profile:
 
 @njit(cache=True)
 def section_areas(points, triangles, heights):
-    """Areas of the cross-sections of a surface at heights between its walls.
+    """Compute the areas of horizontal cross-sections of a surface between its walls.
+
+    The shoelace formula is summed over the cut segments, which have the liquid on their left seen from +z.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)` outward oriented.
-        heights: `(k,)` of the planes, ascending, at no vertex [m].
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        heights: Heights of the planes, ascending and not at a vertex, shape (k,) [m].
 
     Returns:
-        `(k,)` [m^2], by the shoelace formula on the cut segments, the liquid on their left seen from +z.
+        Areas, shape (k,) [m^2].
     """
     areas, ends = np.zeros(heights.shape[0]), np.empty((2, 2))
     for t in range(triangles.shape[0]):
@@ -98,13 +107,13 @@ def section_areas(points, triangles, heights):
 
 
 def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | None = None, parts: int = 1) -> Profile:
-    """Fit the equivalent radius of a free surface.
+    """Fit the profile of a free surface.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)` of the free surface, outward oriented.
-        span: heights of the fit [m]; by default from the lowest to the highest point.
-        parts: of how many such parts, about planes of symmetry through the z axis, the body consists.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles of the free surface, shape (t, 3).
+        span: Lowest and highest height of the fit [m]; by default those of the vertices.
+        parts: Number of parts like this one that planes of symmetry through the z axis make of the whole body.
     """
     z = points[np.unique(triangles), 2]
     low, high = span or (float(z.min()), float(z.max()))
@@ -112,13 +121,19 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
 
 
 def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Profile:
-    """Fit the areas `(k,)` [m^2] of cross-sections at heights `(k,)` between two [m]."""
+    """Fit the profile to a function that returns the areas (k,) [m^2] of cross-sections at heights (k,) [m].
+
+    Args:
+        areas: Function of the heights.
+        low: Lowest height [m].
+        high: Highest height [m].
+    """
     heights = 0.5 * (low + high) + 0.5 * (high - low) * NODES
     return Profile.of(Legendre.fit(heights, areas(heights), DEGREE, domain=[low, high]))
 
 
 def width(points: Floats) -> float:
-    """Horizontal width of a surface `(m, 3)` [m], the mean over directions."""
+    """Return the horizontal width of a surface with vertices (m, 3) [m], averaged over directions [m]."""
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
     return float(np.ptp(along, axis=0).mean())

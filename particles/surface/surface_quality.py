@@ -1,4 +1,4 @@
-"""Keeping the triangles of the tracked surface well shaped: tangential smoothing and Delaunay edge flips."""
+"""Quality of surface triangles: tangential smoothing and Delaunay edge flips."""
 
 from collections.abc import Sequence
 
@@ -8,16 +8,18 @@ from numba import njit
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.surface_measure import area_vector
 
+# Share of the way to the smoothed position in one pass.
 SMOOTHING = 0.3
+# Angle beyond pi from which on an edge is flipped [rad].
 FLIP_MARGIN = 1e-2
 FLIP_PASSES = 4
-# [m^2]: triangles that fold onto each other about a vertex give it no normal.
+# Area [m^2] that replaces a vanishing sum: triangles folded onto each other give their vertex no normal.
 LEAST = 1e-300
 
 
 @njit(cache=True)
 def _angle(points, apex, i, j):
-    """Angle of a triangle at its apex."""
+    """Return the angle of the triangle apex-i-j at its apex [rad]."""
     x, y, z = area_vector(points, apex, i, j)
     along = 0.0
     for d in range(3):
@@ -27,7 +29,7 @@ def _angle(points, apex, i, j):
 
 @njit(cache=True)
 def _folds(points, corners):
-    """Whether flipping the edge i j of the triangles p i j and q j i would fold the surface."""
+    """Return whether flipping the edge i-j of the triangles p-i-j and q-j-i would fold the surface."""
     p, q, i, j = corners
     before, opposite = area_vector(points, p, i, j), area_vector(points, q, j, i)
     first, second = area_vector(points, p, i, q), area_vector(points, p, q, j)
@@ -40,7 +42,7 @@ def _folds(points, corners):
 
 @njit(cache=True)
 def _centroid_offsets(points, triangles, count):
-    """Area-weighted mean of the centroids of a vertex's triangles, minus the vertex; and the vertex normal."""
+    """Return the area-weighted mean of the centroids about each vertex minus the vertex, and the unit normals."""
     offset, normal, area = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t]
@@ -61,7 +63,7 @@ def _centroid_offsets(points, triangles, count):
 
 
 def vertex_normals(points: Floats, triangles: Indices, count: int) -> Floats:
-    """Area-weighted outward unit normals of the first `count` particles, `(count, 3)`."""
+    """Return area-weighted outward unit normals of the first ``count`` points, shape (count, 3)."""
     return _centroid_offsets(points, triangles, count)[1]
 
 
@@ -72,20 +74,20 @@ def smoothing_offsets(
     rings: Sequence[Indices],
     planes: Sequence[tuple[int, Indices]] = (),
 ) -> Floats:
-    """Tangential displacements `(count, 3)` [m] that even out the triangles and leave the shape.
+    """Return tangential displacements that smooth the triangles and keep the shape, shape (count, 3) [m].
 
-    Vertices of the free surface go towards the mean of their triangles' centroids within the tangent plane,
+    Vertices of the free surface move towards the mean of their triangles' centroids within the tangent plane,
     vertices of a contact line towards the middle of their neighbours along the line.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`.
-        count: number of vertices.
-        rings: contact lines, which end on the planes of symmetry if there are any.
-        planes: axis of each plane of symmetry, and the vertices on it.
+        points: Points, shape (n, 3) [m], the vertices first.
+        triangles: Triangles, shape (t, 3).
+        count: Number of vertices.
+        rings: Contact lines, which end on the planes of symmetry if there are any.
+        planes: Axis of each plane of symmetry and the vertices on it.
     """
     offset, normal = _centroid_offsets(points, triangles, count)
-    for axis, vertices in planes:  # the other half of their triangles is behind the plane
+    for axis, vertices in planes:  # half of the triangles about these vertices is behind the plane
         offset[vertices, axis] = normal[vertices, axis] = 0.0
         normal[vertices] /= np.linalg.norm(normal[vertices], axis=1)[:, None]
     offset -= (offset * normal).sum(axis=1)[:, None] * normal
@@ -101,7 +103,7 @@ def smoothing_offsets(
 
 
 def _half_edges(triangles: Indices, count: int) -> tuple[Indices, Indices]:
-    """Keys of the half edges opposite to each corner, sorted, with the half edge numbers."""
+    """Return sorted keys of the half edges opposite to each corner, and the numbers of the half edges."""
     i, j = np.roll(triangles, -1, axis=1).astype(np.int64), np.roll(triangles, -2, axis=1)
     keys = (np.minimum(i, j) * count + np.maximum(i, j)).ravel()
     order = np.argsort(keys, kind="stable")
@@ -110,7 +112,7 @@ def _half_edges(triangles: Indices, count: int) -> tuple[Indices, Indices]:
 
 @njit(cache=True)
 def _excess_triangles(triangles, on_ring):
-    """Triangles around each vertex beyond six, on a contact line beyond three."""
+    """Return the number of triangles around each vertex minus six, on a contact line minus three."""
     result = np.empty(on_ring.shape[0])
     for vertex in range(on_ring.shape[0]):
         result[vertex] = -3.0 if on_ring[vertex] else -6.0
@@ -124,8 +126,8 @@ def _excess_triangles(triangles, on_ring):
 def _flip_pass(points, triangles, half_edges, on_ring, worth):
     """Flip edges whose opposite angles exceed pi, at most one edge a triangle; return the number of flips.
 
-    To them adds an angle `worth` for each triangle by which the flip evens out the numbers around its four vertices:
-    minus half the change of the sum of the squares of their excess. A flip back has the opposite of both.
+    The angles are increased by ``worth`` for each triangle by which the flip balances the numbers of triangles around
+    its four vertices: minus half the change of the sum of squares of their excess. A flip back has the opposite sign.
     """
     keys, order = half_edges
     touched = np.zeros(triangles.shape[0], np.bool_)
@@ -144,8 +146,8 @@ def _flip_pass(points, triangles, half_edges, on_ring, worth):
         if angles < np.pi + FLIP_MARGIN or (on_ring[p] and on_ring[q]):
             continue
         new_key = np.int64(min(p, q)) * points.shape[0] + max(p, q)
-        found = np.searchsorted(keys, new_key)
-        exists = found < keys.shape[0] and keys[found] == new_key
+        position = np.searchsorted(keys, new_key)
+        exists = position < keys.shape[0] and keys[position] == new_key
         for flip in range(flips):
             exists |= made[flip] == new_key
         if exists:
@@ -167,17 +169,17 @@ def flip_to_delaunay(
 ) -> tuple[Indices, int]:
     """Flip edges until the surface is intrinsically Delaunay up to a margin.
 
-    An edge is kept where the flip would join two vertices of contact lines, double an edge or fold the surface.
+    An edge is not flipped if that would connect two vertices of contact lines, double an edge or fold the surface.
 
     Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`.
-        rings: contact lines.
-        worth: angle [rad] beyond Delaunay's by which an edge may be flipped for each triangle that this evens out
-            between vertices with more than six and vertices with fewer.
+        points: Points, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        rings: Contact lines.
+        worth: Angle by which the Delaunay criterion is relaxed for each triangle that a flip moves from vertices with
+            more than six to vertices with fewer [rad].
 
     Returns:
-        The new triangles `(t, 3)` and the number of flips.
+        New triangles, shape (t, 3), and the number of flips.
     """
     result = triangles.copy()
     on_ring = np.zeros(len(points), np.bool_)

@@ -1,4 +1,4 @@
-"""Every file of every product, damaged in four ways, is noticed; what is damaged is made again and equals the first."""
+"""Every product file, damaged in four ways, is detected, rebuilt and equal to the first."""
 
 import json
 import random
@@ -28,8 +28,8 @@ def empty(path: Path) -> None:
 
 def flip_a_bit(path: Path) -> None:
     content = bytearray(path.read_bytes())
-    place = random.Random(f"{SEED} {path.name}").randrange(len(content))
-    content[place] ^= 1
+    position = random.Random(f"{SEED} {path.name}").randrange(len(content))
+    content[position] ^= 1
     path.write_bytes(bytes(content))
 
 
@@ -48,12 +48,12 @@ def test_damage_of_any_file_is_noticed(tmp_path, case, way):
     for stage in point.case.pipeline.stages:
         folder = store.product(point, stage.name)
         for path in [path for path in folder.rglob("*") if path.is_file()]:
-            kept = path.read_bytes()
+            original = path.read_bytes()
             WAYS[way](path)
             state = examine(store, point)[stage.name]
             assert state.stale, path
             assert path.name in state.damaged[0]
-            path.write_bytes(kept)
+            path.write_bytes(original)
     assert not any(state.stale for state in examine(store, point).values())
 
 
@@ -74,7 +74,7 @@ def test_damage_heals(drop_folder, way):
     healed = run_drop(folder)
     assert healed.returncode == 0, healed.stderr
     assert "product reflow is damaged" in healed.stderr
-    assert "ok     reflow" in healed.stdout and "ok     report" not in healed.stdout  # the same bits: the report stays
+    assert "ok     reflow" in healed.stdout and "ok     report" not in healed.stdout  # equal bits: report reused
     assert run_drop(folder, "verify").returncode == 0
     assert answers(folder) == expected
     assert (folder / "reflow/shape.h5").read_bytes() == shape

@@ -1,4 +1,4 @@
-"""The command where it is hard: no home, no locale, folders that cannot be written to, odd names, small limits."""
+"""The command in hard environments: no home, no locale, read-only folders, odd names, small limits."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ import pytest
 from reflowshock.workflow.process.kernel_folder import VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
-TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, which reads \\ as one
+TITLE = "Lötstelle [/x] [ ] [bold]b $\\\\frac{$ :smile: <b> 焊"  # in TOML, where \\ is one backslash
 NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
 ENVIRONMENTS = {
     "nothing": {},
@@ -27,10 +27,10 @@ ENVIRONMENTS = {
 
 
 @pytest.fixture
-def place():
-    """A folder that anybody may enter, with a case of few particles and an awkward title.
+def user_folder():
+    """Yield a folder open to all users, with a case of few particles and an awkward title.
 
-    It is none of pytest's own, which each session of pytest closes to other users.
+    The folders of pytest are closed to other users.
     """
     text = (ROOT / "cases/sessile_drop/case.toml").read_text(encoding="utf-8")
     text = text.replace("particles_per_edge = 11", "particles_per_edge = 5")
@@ -42,10 +42,10 @@ def place():
         yield Path(folder)
 
 
-def command(place: Path, *arguments: str, environment: dict | None = None, before: list[str] | None = None):
-    own = {"PYTHONPATH": str(ROOT)} | (environment if environment is not None else dict(os.environ))
+def command(folder: Path, *arguments: str, environment: dict | None = None, before: list[str] | None = None):
+    defaults = {"PYTHONPATH": str(ROOT)} | (environment if environment is not None else dict(os.environ))
     line = [*(before or []), sys.executable, "-m", "reflowshock", *arguments]
-    return subprocess.run(line, cwd=place, env=own, capture_output=True, timeout=300, check=False)
+    return subprocess.run(line, cwd=folder, env=defaults, capture_output=True, timeout=300, check=False)
 
 
 def is_plain(text: bytes) -> bool:
@@ -53,8 +53,8 @@ def is_plain(text: bytes) -> bool:
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_a_plan_in_any_environment(place, name):
-    done = command(place, "plan", "case.toml", "--out", "Gehäuse [x] ü", environment=ENVIRONMENTS[name])
+def test_a_plan_in_any_environment(user_folder, name):
+    done = command(user_folder, "plan", "case.toml", "--out", "Gehäuse [x] ü", environment=ENVIRONMENTS[name])
     assert (done.returncode, done.stderr.decode()) == (0, "")
     assert b"[/x] [ ] [bold]b $" in done.stdout
     assert rb"\x1b[31m" in done.stdout
@@ -64,23 +64,25 @@ def test_a_plan_in_any_environment(place, name):
 
 
 @pytest.mark.parametrize("kernels", ["given", pytest.param("to be compiled", marks=pytest.mark.long)])
-def test_a_run_of_a_user_without_anything(place, kernels):
-    """Neither a locale nor a home nor, where the test may become another user, kernels: these are long to compile.
+def test_a_run_of_a_user_without_anything(user_folder, kernels):
+    """A run needs no locale and no home; kernels are copied, since compiling them takes long.
 
-    That they are then kept in a temporary folder is tested beside `kernel_cache`.
+    Their temporary folder is tested with ``kernel_cache``.
     """
     root, out = os.geteuid() == 0, "Gehäuse [x] ü"
-    environment = ENVIRONMENTS["C"] | {"TMPDIR": str(place), "HOME": "/nonexistent"}
+    environment = ENVIRONMENTS["C"] | {"TMPDIR": str(user_folder), "HOME": "/nonexistent"}
     if kernels == "given":
-        shutil.copytree(os.environ[VARIABLE], place / "kernels")
-        for folder, _, names in os.walk(place / "kernels"):
+        shutil.copytree(os.environ[VARIABLE], user_folder / "kernels")
+        for folder, _, names in os.walk(user_folder / "kernels"):
             for path in (Path(folder), *(Path(folder, name) for name in names)):
                 path.chmod(0o777)
-        environment[VARIABLE] = str(place / "kernels")
-    done = command(place, "run", "case.toml", "--out", out, environment=environment, before=NOBODY if root else [])
+        environment[VARIABLE] = str(user_folder / "kernels")
+    done = command(
+        user_folder, "run", "case.toml", "--out", out, environment=environment, before=NOBODY if root else []
+    )
     assert (done.returncode, done.stderr.decode()) == (0, "")
     assert is_plain(done.stdout)
-    report = place / out / "report.html"
+    report = user_folder / out / "report.html"
     page = report.read_text(encoding="utf-8")
     assert "Lötstelle [/x] [ ] [bold]b $\\frac{$ :smile: &lt;b&gt; 焊\\x1b[31m" in page
     assert report.stat().st_uid == (65534 if root else os.geteuid())
@@ -91,16 +93,16 @@ def mpirun(ranks: int) -> list[str]:
     return ["mpirun", *root, "--oversubscribe", "-n", str(ranks)]
 
 
-def test_a_run_within_a_job_of_mpi(place):
+def test_a_run_within_a_job_of_mpi(user_folder):
     line = ("run", "case.toml", "--out", "out", "--until", "reflow")
-    assert command(place, *line, before=mpirun(1)).returncode == 0
+    assert command(user_folder, *line, before=mpirun(1)).returncode == 0
 
 
-def test_several_ranks_are_refused_in_one_line(place):
-    done = command(place, "run", "case.toml", "--out", "out", before=mpirun(2))
+def test_several_ranks_are_refused_in_one_line(user_folder):
+    done = command(user_folder, "run", "case.toml", "--out", "out", before=mpirun(2))
     assert done.returncode == 2
     assert done.stderr.count(b"error: started on 2 MPI ranks; start it without mpirun, it starts its own ranks") == 1
-    assert not (place / "out").exists()
+    assert not (user_folder / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -112,22 +114,22 @@ def test_several_ranks_are_refused_in_one_line(place):
         ("-f 8", b"error: only files of 0.00"),
     ],
 )
-def test_a_limit_of_the_shell_is_told_in_one_line(place, limit, words):
+def test_a_limit_of_the_shell_is_told_in_one_line(user_folder, limit, words):
     before = ["bash", "-c", f'ulimit {limit}; exec "$@"', "bash"]
-    done = command(place, "run", "case.toml", "--out", "out", before=before)
+    done = command(user_folder, "run", "case.toml", "--out", "out", before=before)
     assert done.returncode == 1
     assert done.stderr.startswith(words)
     assert done.stderr.count(b"\n") == 1
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounts a file system")
-def test_a_full_device_is_told_in_plain_words(place):
-    disk = place / "disk"
+def test_a_full_device_is_told_in_plain_words(user_folder):
+    disk = user_folder / "disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(disk)], check=False).returncode:
         pytest.skip("nothing can be mounted here")
     try:
-        done = command(place, "run", "case.toml", "--out", "disk/out")
+        done = command(user_folder, "run", "case.toml", "--out", "disk/out")
     finally:
         subprocess.run(["umount", "-l", str(disk)], check=False)
     assert done.returncode == 1

@@ -1,4 +1,4 @@
-"""Folders of any name, folders of somebody else, names that lead elsewhere."""
+"""Folders of any name, folders of other users, and names that lead elsewhere."""
 
 import os
 import shutil
@@ -30,7 +30,7 @@ def test_a_folder_of_any_name_will_do(tmp_path):
 
 
 def test_products_of_another_time_are_products(drop_folder):
-    """Times of files do not matter: neither those that lie in the future nor those of a copy."""
+    """Modification times do not matter, neither in the future nor of copies."""
     folder = drop_folder
     for path in (folder / ".store/products").rglob("*"):
         os.utime(path, (4e9, 4e9))
@@ -61,7 +61,7 @@ def test_a_folder_that_cannot_be_taken_is_told_before_anything(tmp_path):
 
 
 def test_a_report_does_not_replace_a_users(tmp_path):
-    """Where products are missing, the report is no product, and what a user has put in its place is set aside."""
+    """With missing products the report is not a product, and a user's file in its place is set aside."""
     folder = tmp_path / "run"
     assert run_drop(folder, "run", "--until", "reflow").returncode == 0
     (folder / "report.html").write_text("mine")

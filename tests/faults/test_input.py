@@ -1,4 +1,4 @@
-"""Whatever a case says, or a file that it names, reading and planning it ends in success or in one line a problem."""
+"""Reading and planning any case ends in success or in one line per problem, for cases and the files that they name."""
 
 import io
 import os
@@ -57,7 +57,7 @@ def planned(path: Path, *settings: str, force: bool = False) -> None:
 
 
 def mutant(text: str, draw: random.Random) -> bytes:
-    """Change bytes, lines, values, numbers or names of a case file."""
+    """Return a case file with changed bytes, lines, values, numbers or names."""
     lines, kind = text.split("\n"), draw.random()
     if kind < 0.1:
         content = bytearray(text.encode())
@@ -70,8 +70,8 @@ def mutant(text: str, draw: random.Random) -> bytes:
         lines.insert(draw.randrange(len(lines)), draw.choice(lines))
     else:
         for _ in range(draw.choice((1, 1, 2, 4))):
-            place = draw.choice([k for k, line in enumerate(lines) if re.match(r'\s*[\w."]+\s*=', line)])
-            lines[place] = changed(*lines[place].split("=", 1), draw)
+            line_number = draw.choice([k for k, line in enumerate(lines) if re.match(r'\s*[\w."]+\s*=', line)])
+            lines[line_number] = changed(*lines[line_number].split("=", 1), draw)
     return "\n".join(lines).encode()
 
 
@@ -106,16 +106,16 @@ def test_any_case_is_planned_or_refused(tmp_path, capsys):
 
 @pytest.fixture
 def tabulated(tmp_path) -> Path:
-    """A case whose pulse is the table pulse.csv beside it."""
+    """Return a case whose pulse is the table pulse.csv in its folder."""
     text = re.sub(r"(?m)^(peak_acceleration|pulse_duration) .*\n", "", SMALL_CASE.read_text())
     (tmp_path / "case.toml").write_text(text.replace("[shock]\n", '[shock]\ntable = "pulse.csv"\n'))
     return tmp_path / "case.toml"
 
 
-@pytest.mark.parametrize(("content", "told"), BAD_TABLES.values(), ids=BAD_TABLES.keys())
-def test_a_bad_table_is_refused_in_one_line(tabulated, content, told):
+@pytest.mark.parametrize(("content", "message"), BAD_TABLES.values(), ids=BAD_TABLES.keys())
+def test_a_bad_table_is_refused_in_one_line(tabulated, content, message):
     (tabulated.parent / "pulse.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(CaseError, match=rf"case\.toml:\d+:1: shock\.table.*{told}") as caught:
+    with pytest.raises(CaseError, match=rf"case\.toml:\d+:1: shock\.table.*{message}") as caught:
         planned(tabulated)
     assert len(caught.value.lines()) == 1
 
@@ -158,15 +158,15 @@ NO_CASES = {
     "deep tables": (b"a." * 500 + b"a = 1", "nested too deeply"),
     "too large": (b"#" * 4_100_000, "too large: 4.1 MB; allowed: up to 4 MB"),
     "a study": (b"[study]\nname = 'x'\n", "is a study, not a case; use reflowshock study"),
-    "nothing": (b"", "does not say what kind of case it is"),
+    "nothing": (b"", "has no table that identifies the kind of case"),
 }
 
 
-@pytest.mark.parametrize(("content", "told"), NO_CASES.values(), ids=NO_CASES.keys())
-def test_files_that_are_no_cases(tmp_path, content, told):
+@pytest.mark.parametrize(("content", "message"), NO_CASES.values(), ids=NO_CASES.keys())
+def test_files_that_are_no_cases(tmp_path, content, message):
     path = tmp_path / "case.toml"
     path.write_bytes(content)
-    with pytest.raises(CaseError, match=told) as caught:
+    with pytest.raises(CaseError, match=message) as caught:
         read_case(path)
     assert len(caught.value.lines()) == 1
 

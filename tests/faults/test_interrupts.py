@@ -1,6 +1,6 @@
-"""A run that is broken off anywhere, at any time, by any signal, ends the same as one that is not.
+"""A run interrupted anywhere, at any time, by any signal, ends with the results of an undisturbed one.
 
-A success that is reported has happened: whatever was broken off, the command that is repeated computes what is missing.
+A reported success is real: after any interrupt, the repeated command computes the missing products.
 """
 
 import json
@@ -17,40 +17,40 @@ from tests.support.faults import SEED, answers
 from tests.support.workflow_command import command_line, reflowshock
 
 COUNT = 50
-STAGE_START = 1.0  # [s] of a process
+STAGE_START = 1.0  # [s] for the start of a process
 CHANGED = ("shock.peak_acceleration=1000 G",)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 ROUNDING = 1e-6
-EXACTLY_ZERO, OF_ROUNDING = ("error", "residual"), 1e-9  # figures that rounding alone keeps from zero, of 1
-HEED = ("env", "--default-signal=INT")  # a job in the background of a shell ignores it
+EXACTLY_ZERO, OF_ROUNDING = ("error", "residual"), 1e-9  # figures that are zero except for rounding, relative to 1
+HEED = ("env", "--default-signal=INT")  # background jobs of a shell ignore SIGINT
 
 
 @pytest.fixture(scope="module")
 def undisturbed(first_run):
-    """Folder, and how long its stages took, with their start."""
+    """Return the folder, and the duration of its stages with their start."""
     folder, ended = first_run
     assert ended.returncode == 0, ended.stdout + ended.stderr
     seconds = json.loads((folder / "summary.json").read_text())["timings"].values()
     return folder, sum(seconds) + STAGE_START * len(seconds)
 
 
-def same(found: dict[str, object], expected: dict[str, object]) -> None:
-    assert found.keys() == expected.keys()
+def same(actual: dict[str, object], expected: dict[str, object]) -> None:
+    assert actual.keys() == expected.keys()
     for name, value in expected.items():
         if isinstance(value, float):
             least = OF_ROUNDING if any(word in name for word in EXACTLY_ZERO) else 1e-12
-            assert found[name] == pytest.approx(value, rel=ROUNDING, abs=least), name
+            assert actual[name] == pytest.approx(value, rel=ROUNDING, abs=least), name
         else:
-            assert found[name] == value, name
+            assert actual[name] == value, name
 
 
 def whom(process: subprocess.Popen, choice: random.Random) -> list[psutil.Process]:
-    """The command, a process of its Snakemake, stage, launcher or MPI ranks."""
+    """Return the command or a process of its Snakemake, stage, launcher or MPI ranks."""
     children = psutil.Process(process.pid).children(recursive=True)
     return [choice.choice([psutil.Process(process.pid), *children])]
 
 
-@pytest.mark.long  # a part of the run, broken off: tests/pipeline/test_pipeline.py
+@pytest.mark.long  # part of the interrupted run is in tests/pipeline/test_pipeline.py
 @pytest.mark.parametrize("number", range(COUNT))
 def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_path, number):
     choice = random.Random(f"{SEED} {number}")
@@ -73,7 +73,7 @@ def test_a_run_that_was_broken_off_goes_on_to_the_same_answer(undisturbed, tmp_p
 
 @pytest.mark.parametrize("end", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_old_result_is_never_reported_as_a_new_one(undisturbed, tmp_path, end):
-    """A complete run, a changed one that is broken off in its shock, and the changed one again."""
+    """A complete run, a changed one interrupted in its shock, and the changed one repeated."""
     folder = tmp_path / "small"
     shutil.copytree(undisturbed[0], folder)
     line = [*HEED, *command_line("run", folder, settings=CHANGED)]

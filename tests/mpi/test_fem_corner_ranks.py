@@ -1,4 +1,4 @@
-"""Four ranks, three of which meet at one corner of the interface: what they add up there is exact."""
+"""Sums over four ranks, three of which meet at one corner of the interface, are exact."""
 
 import pytest
 
@@ -24,7 +24,7 @@ from reflowshock.cases.hard.trials.coupled import checked, surveyed
 world = MPI.COMM_WORLD
 
 
-def quarters(points, corner):  # of the plane around a vertical edge, one for each rank
+def quarters(points, corner):  # quarters of the plane around a vertical edge, one for each rank
     side = points[:, :2] > corner + 1e-6
     return ((side[:, 0] + 2 * side[:, 1]) % world.size).astype(np.int32)
 
@@ -72,13 +72,13 @@ if world.rank == 0:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory) -> dict[int, dict]:
+def sums_by_ranks(tmp_path_factory) -> dict[int, dict]:
     return {ranks: run_script(SCRIPT, tmp_path_factory.mktemp(f"ranks{ranks}"), ranks) for ranks in (1, 4)}
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "local_steps", "gravouil_combescure"])
-def test_corner_of_the_cut_where_three_ranks_meet(found, scheme):
-    (alone, _, _), (together, holders, exact) = found[1][scheme], found[4][scheme]
+def test_corner_of_the_cut_where_three_ranks_meet(sums_by_ranks, scheme):
+    (alone, _, _), (together, holders, exact) = sums_by_ranks[1][scheme], sums_by_ranks[4][scheme]
     assert holders >= 3
     assert exact < 1e-12
     assert max(abs(a - b) for a, b in zip(alone, together, strict=True)) < 1e-10 * alone[-1]

@@ -1,4 +1,4 @@
-"""Two coupled models of a structure give the same on one rank and on several, placed either way."""
+"""Two coupled models of a structure have equal results on one rank and on several, in both placements."""
 
 import json
 from pathlib import Path
@@ -41,8 +41,8 @@ def history(directory: Path, placement: str) -> dict[str, np.ndarray]:
 def test_placements_give_what_one_rank_gives(tmp_path, scheme):
     runs = {"one": (1, "shared"), "two": (2, "shared"), "three": (3, "disjoint")}
     run_programs([(ranks, request(tmp_path / name, ranks, scheme, way)) for name, (ranks, way) in runs.items()])
-    one, *others = (history(tmp_path / name, way) for name, (_, way) in runs.items())
+    reference, *others = (history(tmp_path / name, way) for name, (_, way) in runs.items())
     for other in others:
-        for name in one.keys() - {"balance", "interface"}:  # differences of the others
-            scale = one["internal" if name == "hourglass" else name]  # of full elements it is a small difference
-            assert np.abs(one[name] - other[name]).max() <= 1e-8 * np.abs(scale).max(), name
+        for name in reference.keys() - {"balance", "interface"}:  # these are differences of the others
+            scale = reference["internal" if name == "hourglass" else name]  # small for full integration
+            assert np.abs(reference[name] - other[name]).max() <= 1e-8 * np.abs(scale).max(), name

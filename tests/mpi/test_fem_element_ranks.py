@@ -1,4 +1,4 @@
-"""Bodies of every kind of element move alike on one and on two ranks, and their fields are written."""
+"""Bodies of every kind of element move equally on one and on two ranks, and their fields are written."""
 
 import numpy as np
 import pytest
@@ -50,12 +50,12 @@ if comm.rank == 0:
 
 
 def test_two_ranks_give_the_results_of_one(tmp_path):
-    one, two = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
+    single, double = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
     for name in KINDS:
-        first, second = (np.array(run[name]["displacement"]) for run in (one, two))
+        first, second = (np.array(run[name]["displacement"]) for run in (single, double))
         assert np.abs(second - first).max() < 1e-10 * np.abs(first).max(), name
-        assert two[name]["energies"] == pytest.approx(one[name]["energies"], rel=1e-9, abs=0.0), name
-        strain, hourglass, kinetic, work = two[name]["energies"]
+        assert double[name]["energies"] == pytest.approx(single[name]["energies"], rel=1e-9, abs=0.0), name
+        strain, hourglass, kinetic, work = double[name]["energies"]
         assert strain + hourglass + kinetic == pytest.approx(work, rel=1e-9), name
         assert (hourglass > 0.0) == (name == "one_point")
         assert list(tmp_path.glob(f"{name}*.vtu"))

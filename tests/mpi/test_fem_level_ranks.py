@@ -1,4 +1,4 @@
-"""Ranks must not change the force of step levels, nor may copies of a node differ in a bit."""
+"""Step levels: the force does not depend on the ranks, and all copies of a node are equal to the bit."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ RATIOS, WINDOWS = (4, 3, 3), 20
 
 
 def moved(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
-    """Return input numbers of this rank's nodes and their displacements after some windows under loads at many."""
+    """Return input numbers of the nodes of this rank and their displacements after some windows under many loads."""
     model = levelled(joint_on_board(), ELASTIC, RATIOS, comm=comm)
     body = model.body
     nodes = np.arange(0, comm.allreduce(int(body.local.nodes.max()), MPI.MAX), 5)
@@ -31,14 +31,14 @@ def moved(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write_march(path: str) -> None:
-    """Compare the copies of all nodes bit by bit, and write one of each."""
+    """Compare the copies of all nodes bit by bit and write one of each."""
     comm = MPI.COMM_WORLD
     nodes, displacement = (comm.gather(values) for values in moved(comm))
     if comm.rank == 0:
-        found: dict[int, np.ndarray] = {}
+        displacement_of_node: dict[int, np.ndarray] = {}
         for number, value in zip(np.concatenate(nodes), np.concatenate(displacement), strict=True):
-            assert np.array_equal(found.setdefault(int(number), value), value), number
-        np.save(path, np.array([found[number] for number in sorted(found)]))
+            assert np.array_equal(displacement_of_node.setdefault(int(number), value), value), number
+        np.save(path, np.array([displacement_of_node[number] for number in sorted(displacement_of_node)]))
 
 
 @pytest.fixture(scope="module")

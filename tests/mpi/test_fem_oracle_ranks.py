@@ -43,10 +43,10 @@ if comm.rank == 0:
 
 
 def test_two_ranks_give_the_results_of_one(tmp_path):
-    one, two = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
-    scale = max(abs(value) for point in one["displacement"] for value in point)
-    for first, second in zip(one["displacement"], two["displacement"], strict=True):
+    single, double = (run_script(SCRIPT, tmp_path, ranks) for ranks in (1, 2))
+    scale = max(abs(value) for point in single["displacement"] for value in point)
+    for first, second in zip(single["displacement"], double["displacement"], strict=True):
         assert second == pytest.approx(first, abs=1e-8 * scale)
-    assert two["frequencies"] == pytest.approx(one["frequencies"], rel=1e-8)
-    assert two["energies"] == pytest.approx(one["energies"], rel=1e-8)
-    assert sum(two["energies"][:2]) == pytest.approx(two["energies"][2], rel=1e-8)
+    assert double["frequencies"] == pytest.approx(single["frequencies"], rel=1e-8)
+    assert double["energies"] == pytest.approx(single["energies"], rel=1e-8)
+    assert sum(double["energies"][:2]) == pytest.approx(double["energies"][2], rel=1e-8)

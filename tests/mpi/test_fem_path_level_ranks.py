@@ -1,6 +1,6 @@
-"""Ranks must not change what levels along a path do to solder that flows, nor may copies of a node differ in a bit.
+"""Step levels with yielding solder: results do not depend on the ranks, and copies of a node are equal to the bit.
 
-A run that is broken off goes on with other ranks.
+An interrupted run continues on other ranks.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ def begun(comm: MPI.Comm) -> ExplicitMotion:
 
 
 def continued(comm: MPI.Comm, parts: list[State]) -> ExplicitMotion:
-    """Return a motion that goes on from the states of all ranks of another division."""
+    """Return a motion continued from the states of all ranks of another division."""
     motion = begun(comm)
     state = checkpoint_state.blank({"motion": motion.state()})
     for part in parts:
@@ -51,15 +51,15 @@ def continued(comm: MPI.Comm, parts: list[State]) -> ExplicitMotion:
 def gathered(comm: MPI.Comm, motion: ExplicitMotion) -> tuple[np.ndarray, float]:
     """Return the displacement of each node on rank 0, all copies compared bit by bit, and the plastic work."""
     parts = comm.gather((motion.body.local.nodes, motion.displacement))
-    found: dict[int, np.ndarray] = {}
+    displacement_of_node: dict[int, np.ndarray] = {}
     for number, value in [pair for part in parts or [] for pair in zip(*part, strict=True)]:
-        assert np.array_equal(found.setdefault(int(number), value), value), number
+        assert np.array_equal(displacement_of_node.setdefault(int(number), value), value), number
     work = comm.allreduce(motion.internal_energy().plastic)
-    return np.array([found[number] for number in sorted(found)]), work
+    return np.array([displacement_of_node[number] for number in sorted(displacement_of_node)]), work
 
 
 def write_marches(path: str) -> None:
-    """Write what two ranks found, then those that went on from one, then one that went on from two."""
+    """Write the marches of two ranks, of two continued from one, and of one continued from two."""
     comm = MPI.COMM_WORLD
     motion = begun(comm)
     motion.take_steps(HALF)
@@ -67,10 +67,10 @@ def write_marches(path: str) -> None:
     motion.take_steps(STEPS - HALF)
     alone = begun(MPI.COMM_SELF)
     alone.take_steps(HALF)
-    found = [gathered(comm, motion), gathered(comm, continued(comm, [alone.state()]))]
+    marches = [gathered(comm, motion), gathered(comm, continued(comm, [alone.state()]))]
     if comm.rank == 0:
-        found.append(gathered(MPI.COMM_SELF, continued(MPI.COMM_SELF, parts)))
-        np.savez(path, displacement=[moved for moved, _ in found], work=[work for _, work in found])
+        marches.append(gathered(MPI.COMM_SELF, continued(MPI.COMM_SELF, parts)))
+        np.savez(path, displacement=[moved for moved, _ in marches], work=[work for _, work in marches])
 
 
 def test_flow_is_the_same_on_more_ranks_and_where_it_goes_on_with_others(tmp_path):
@@ -80,8 +80,8 @@ def test_flow_is_the_same_on_more_ranks_and_where_it_goes_on_with_others(tmp_pat
     motion = begun(MPI.COMM_SELF)
     motion.take_steps(STEPS)
     displacement, work = gathered(MPI.COMM_SELF, motion)
-    with np.load(path) as found:
-        assert len(found["work"]) == 3
-        assert np.abs(found["displacement"] - displacement).max() <= 1e-10 * np.abs(displacement).max()
-        assert np.abs(found["work"] - work).max() <= 1e-10 * work
+    with np.load(path) as marches:
+        assert len(marches["work"]) == 3
+        assert np.abs(marches["displacement"] - displacement).max() <= 1e-10 * np.abs(displacement).max()
+        assert np.abs(marches["work"] - work).max() <= 1e-10 * work
     assert work > 0.0

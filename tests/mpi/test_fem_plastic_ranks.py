@@ -1,4 +1,4 @@
-"""Solder that yields flows alike on any number of ranks."""
+"""Plastic flow of solder is equal on any number of ranks."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ SHOCK = {
 
 
 def request(meshes: list[Path], macro: int, meso: int) -> Path:
-    """Write the input of a run on some ranks, beside the meshes."""
+    """Write the input of a run on some ranks into the folder of the meshes."""
     output = meshes[0].parent / f"{macro}_{meso}"
     shock = SHOCK | {"ranks": {"total": macro + meso, "placement": "disjoint", "macro": macro}}
     scene = {"mode": "two_scale", "meshes": [str(path) for path in meshes], "shock": shock, "output": str(output)}
@@ -37,9 +37,9 @@ def test_flow_is_the_same_on_more_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
     inputs = [(1 + meso, request(meshes, 1, meso)) for meso in (1, 2)]
     run_programs(inputs)
-    (expected, result), (found, other) = (outcome(path.with_suffix("")) for _, path in inputs)
+    (expected, result), (actual, other) = (outcome(path.with_suffix("")) for _, path in inputs)
     for name in (*FLOWS, "plastic_strain_max", "von_mises_max", "plastic", "section_board", "section_package"):
         scale = np.abs(expected[name]).max()
         assert scale > 0.0
-        assert np.abs(found[name] - expected[name]).max() <= 1e-8 * scale, name
+        assert np.abs(actual[name] - expected[name]).max() <= 1e-8 * scale, name
     assert all(check["ok"] for check in (result["health"] | other["health"]).values())

@@ -1,4 +1,4 @@
-"""A rank that dies, raises or stops ends all ranks, with its message and where the run could continue."""
+"""A rank that dies, raises or stops ends all ranks, with its message and the checkpoint to continue from."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from reflowshock.workflow.process.launch import mpi_command
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_python
 
-# The program, but rank 1 does something in a window or in set-up; standard error is told of where it is.
+# The program with a failure of rank 1 in a window or in set-up, whose place is written to standard error.
 SCRIPT = """
 import os, signal, sys, time
 from pathlib import Path
@@ -78,22 +78,22 @@ def assembly(tmp_path_factory) -> Path:
 
 
 def loses_words() -> bool:
-    """Whether the launcher may lose what ranks write once one of them has died, as Open MPI 5 does."""
+    """Return whether the launcher may lose the output of ranks once one has died, as Open MPI 5 does."""
     said = subprocess.run(["mpirun", "--version"], capture_output=True, text=True, check=True).stdout
     return int(re.search(r"Open MPI\D*(\d+)", said)[1]) >= 5
 
 
 def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
-    """Return what a run with a misfortune says, in its file and on standard error, where that is not lost."""
+    """Return the error message of a run with a failing rank, in its file and, unless lost, on standard error."""
     path = checkpoints.parent / "input.json"
     path.write_text(json.dumps(json.loads((directory / "input.json").read_text()) | {"checkpoints": str(checkpoints)}))
     done = run_python([str(directory / "script.py"), str(path), what, where], 2)
     assert done.returncode != 0
     assert time.time() - float((checkpoints.parent / "begin").read_text()) < 30.0
     said = (directory / "out" / ERROR).read_text()
-    told = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
-    assert told[0] == said.splitlines()[:1], said
-    assert told[1] == told[0] or (not told[1] and what == "exit" and loses_words()), done.stderr
+    error_lines = [[line for line in text.splitlines() if line.startswith("error: ")] for text in (said, done.stderr)]
+    assert error_lines[0] == said.splitlines()[:1], said
+    assert error_lines[1] == error_lines[0] or (not error_lines[1] and what == "exit" and loses_words()), done.stderr
     return said
 
 
@@ -139,7 +139,7 @@ def test_misfortune_in_set_up_ends_all(assembly, tmp_path):
     ("raised", "words"), [("KeyboardInterrupt()", "rank 1: interrupted"), ("ImportError('libx')", "libx")]
 )
 def test_a_rank_that_fails_while_it_loads_libraries_ends_all(tmp_path, raised, words):
-    """Found by an interrupt at a random time: the other rank waited for it without end."""
+    """The other rank does not wait forever (found by an interrupt at a random time)."""
     (tmp_path / "sitecustomize.py").write_text(
         "import os, sys\n"
         "class Broken:\n"

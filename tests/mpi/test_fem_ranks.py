@@ -1,4 +1,4 @@
-"""Ranks must not change results, and an error on one rank must end all of them."""
+"""Results do not depend on the ranks, and an error on one rank ends all of them."""
 
 import json
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ SHOCK = {
     "numerics": {"kinematics": "small", "mass_scaled": ["copper"], "history_samples": 50, "field_samples": 2},
 }
 
-# A gauge across the models' interface, one whose middle lies on a plane of symmetry, a mass and another package.
+# A gauge across the interface of the models, one centred on a symmetry plane, a mass and another package.
 FITTED = {
     "watch": {"edge": {"at": [8e-3, 4e-3, 0.0]}},
     "gauges": {
@@ -44,7 +44,7 @@ FITTED = {
 
 
 def write_input(path: Path, directory: Path, **changes) -> Path:
-    """Write an input for the meshes of a directory; changes replace its keys."""
+    """Write an input for the meshes of a directory; ``changes`` replace its keys."""
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     request = {"mode": "dns", "meshes": meshes, "shock": SHOCK, "output": str(directory / "out")} | FITTED
     request |= {"materials": {"solder": "SAC405_elastic"}} | changes
@@ -54,7 +54,7 @@ def write_input(path: Path, directory: Path, **changes) -> Path:
 
 @dataclass(frozen=True)
 class Scene:
-    """A run: its model or models, and which ranks carry them, those of the macro model first."""
+    """Run with its models and the ranks of each, macro model first."""
 
     mode: str
     ranks: tuple[int, int]
@@ -62,11 +62,11 @@ class Scene:
     scheme: str = "held_velocity"
 
     def output(self, directory: Path) -> Path:
-        """Return where it writes."""
+        """Return the output folder."""
         return directory / f"{self.mode}_{self.ranks[0]}_{self.ranks[1]}_{self.placement}_{self.scheme}"
 
     def write(self, directory: Path) -> Path:
-        """Write its input beside the meshes."""
+        """Write the input into the folder of the meshes."""
         macro = {"macro": self.ranks[0]} if self.placement == "disjoint" else {}
         ranks = {"total": sum(self.ranks), "placement": self.placement} | macro
         shock = SHOCK | {"ranks": ranks, "coupling": {"scheme": self.scheme}}
@@ -74,7 +74,7 @@ class Scene:
         return write_input(output.with_suffix(".json"), directory, mode=self.mode, shock=shock, output=str(output))
 
     def history(self, directory: Path) -> dict[str, np.ndarray]:
-        """Return what it has written, if it is healthy."""
+        """Return the history of a healthy run."""
         result = json.loads((self.output(directory) / "result.json").read_text())
         assert all(check["ok"] for check in result["health"].values())
         assert result["model"]["ranks"] == sum(self.ranks)
@@ -99,7 +99,7 @@ SAME_TOO = {
 
 
 def run_all(directory: Path, pairs: Iterable[tuple[Scene, Scene]]) -> Path:
-    """Run each scene once, all of them on the ranks of one program: libraries are loaded once."""
+    """Run each scene once in one program on all ranks, which loads libraries once."""
     scenes = dict.fromkeys(scene for pair in pairs for scene in pair)
     write_small_assembly(directory)
     run_programs([(sum(scene.ranks), scene.write(directory)) for scene in scenes])
@@ -117,7 +117,7 @@ def more_runs(tmp_path_factory) -> Path:
 
 
 def arrays_of(output: Path) -> dict[str, np.ndarray]:
-    """Return the history and, by names with an @, the pictures of the interface."""
+    """Return the history and, under names with an @, the pictures of the interface."""
     with np.load(output / "history.npz") as history, np.load(output / "interface.npz") as interface:
         return {**history, **interface}
 
@@ -206,7 +206,7 @@ def test_energy_that_does_not_balance_ends_all_ranks(assembly):
 
 
 def test_crash_of_one_rank_ends_all(assembly, tmp_path):
-    """A rank that fails where nobody agrees on anything: it aborts the others."""
+    """A rank that fails outside any agreement aborts the others."""
     script = tmp_path / "crash.py"
     script.write_text(
         "import sys\n"

@@ -1,4 +1,4 @@
-"""Cooling gives the same on more ranks, and a coupled shock begins in balance."""
+"""Cooling is equal on more ranks, and a coupled shock begins in balance."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ import pytest
 from tests.support.fem_models import write_small_assembly
 from tests.support.fem_program import run_programs
 
-QUIET = 1e-6  # [m/s^2] of the pulse: what moves is what is out of balance
+QUIET = 1e-6  # [m/s^2] of the pulse: any motion shows an imbalance
 SHOCK = {
     "peak_acceleration": QUIET,
     "pulse_duration": 2e-5,
@@ -27,7 +27,7 @@ SHOCK = {
 
 
 def written(folder: Path, meshes: list[Path], name: str, ranks: int, **more: object) -> tuple[int, Path]:
-    """Return an input, after its number of ranks."""
+    """Return the number of ranks and an input."""
     shock = SHOCK | {"ranks": {"total": ranks}}
     request = {"meshes": [str(path) for path in meshes], "shock": shock, "output": str(folder / name)}
     path = folder / f"{name}.json"
@@ -41,7 +41,7 @@ def result_of(folder: Path, name: str) -> dict:
 
 @pytest.fixture(scope="module")
 def cooled(tmp_path_factory) -> tuple[Path, dict]:
-    """Folder of a cooling on two ranks, the same alone, and a shock that begins with it; the cooling's result."""
+    """Return the folder of a cooling on two ranks, on one, and of a shock that begins with it; and its result."""
     folder = tmp_path_factory.mktemp("residual")
     meshes = write_small_assembly(folder)
     cooling = [
@@ -60,20 +60,20 @@ def test_cooling_is_the_same_on_more_ranks(cooled):
     assert result["metrics"]["residual_plastic_strain"]["value"] > 1e-3
     here, there = (np.load(folder / name / "cooling.npz")["displacement"] for name in ("cooling", "alone"))
     assert np.abs(here - there).max() < 1e-8 * np.abs(there).max()
-    shown = meshio.read(folder / "cooling/residual.vtu")
-    assert shown.cell_data["von_mises"][0].max() > 40e6
-    assert (shown.point_data["displacement"] == here).all()
+    fields = meshio.read(folder / "cooling/residual.vtu")
+    assert fields.cell_data["von_mises"][0].max() > 40e6
+    assert (fields.point_data["displacement"] == here).all()
 
 
 @pytest.mark.long
 def test_a_coupled_shock_begins_in_balance(cooled):
     folder, result = cooled
-    found = result_of(folder, "two_scale")
-    assert found["coupling"]["scheme"] == "held_velocity"
+    shock = result_of(folder, "two_scale")
+    assert shock["coupling"]["scheme"] == "held_velocity"
     with np.load(folder / "two_scale/history.npz") as history:
         assert history["von_mises_package"][0] == pytest.approx(result["joints"]["von_mises_package"], rel=1e-9)
         drift = history["von_mises_package"][-1] / history["von_mises_package"][0] - 1.0
         assert np.abs(drift).max() < 1e-8
         assert np.abs(history["die_centre"]).max() < 1e-14
         assert np.abs(history["balance"]).max() < 1e-9 * history["internal"][0]
-    assert found["metrics"]["residual_stress_critical_joint"]["value"] > 30e6
+    assert shock["metrics"]["residual_stress_critical_joint"]["value"] > 30e6

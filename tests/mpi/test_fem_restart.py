@@ -1,4 +1,4 @@
-"""A run that is killed continues from its checkpoints to the same bits, on all ranks, fields included."""
+"""A killed run continues from its checkpoints to the same bits on all ranks, fields included."""
 
 import json
 import os
@@ -89,10 +89,10 @@ def test_killed_run_continues_to_the_same_bits(assembly):
     assert json.loads((broken / "result.json").read_text())["continued_from"] > 0
     shutil.rmtree(folder)
     finish(start(assembly, mode, whole, warm_python()))
-    with np.load(whole / "history.npz") as expected, np.load(broken / "history.npz") as found:
-        assert set(expected) == set(found)
+    with np.load(whole / "history.npz") as expected, np.load(broken / "history.npz") as actual:
+        assert set(expected) == set(actual)
         for name in expected:
-            assert np.array_equal(expected[name], found[name]), name
+            assert np.array_equal(expected[name], actual[name]), name
     files = sorted(whole.glob("*.vtu")) + sorted(whole.glob("*.pvd"))
     assert len(files) >= 2 * 4
     for path in files:

@@ -1,4 +1,4 @@
-"""A run that is broken off continues on other numbers of ranks, and with another placement, as if nothing had been."""
+"""An interrupted run continues on other numbers of ranks and in another placement with unchanged results."""
 
 import json
 from pathlib import Path
@@ -10,9 +10,9 @@ from tests.support.fem_models import small_assembly, write_msh
 from tests.support.fem_program import run_warm
 from tests.support.fem_structures import STEEL, write_structure
 
-# Runs the first of some inputs whole and broken off, and continues it as the others say, broken off once more on their
-# ranks. Tells of each: the largest relative difference of a history from the whole run's, the window from which it
-# continued, whose folders of checkpoints are left, and the files of its fields.
+# Runs the first input completely and interrupted, and continues it with the other inputs, interrupted again on their
+# ranks. Reports for each the largest relative difference of a history from the complete run, the window at which it
+# continued, the number of remaining checkpoint folders, and the number of field files.
 SCRIPT = """
 import json, shutil, sys, traceback
 from pathlib import Path
@@ -50,7 +50,7 @@ def go(changes, name, checkpoints=None, windows=10**9):
 
 def histories(path):
     found = {}
-    for file in path.glob("*.npz"):  # of a package also the pictures of its interface
+    for file in path.glob("*.npz"):  # for a package also the pictures of its interface
         with np.load(file) as arrays:
             found |= {name: arrays[name] for name in arrays if arrays[name].dtype.kind == "f"}
     return found
@@ -60,7 +60,7 @@ def difference(found, expected):
     scale = {name: np.abs(values).max(initial=0.0) or 1.0 for name, values in expected.items()}
     energy = max(scale[name] for name in ENERGIES)
     scale |= dict.fromkeys(ENERGIES, energy)
-    if "section_imbalance" in scale:  # zero but for rounding of the forces at the joints' ends
+    if "section_imbalance" in scale:  # rounding of the forces at the ends of the joints
         scale["section_imbalance"] = max(scale["section_board"], scale["section_package"])
     return max(np.abs(found[name] - expected[name]).max(initial=0.0) / scale[name] for name in expected)
 
@@ -68,7 +68,7 @@ def continue_otherwise():
     whole = go(inputs[0], "whole")
     go(inputs[0], "broken", folder / "checkpoints", 11)
     world.Barrier()
-    told = []
+    continuations = []
     for k, changes in enumerate(inputs[1:]):
         copy = folder / f"checkpoints{k}"
         if world.rank == 0:
@@ -81,16 +81,17 @@ def continue_otherwise():
         if world.rank == 0:
             window = json.loads((found / "result.json").read_text())["continued_from"]
             fields = len(list(found.glob("*.pvtu")) + list(found.glob("*.vtu")))
-            told.append([difference(histories(found), histories(whole)), window, len(list(copy.glob("*/"))), fields])
+            largest = difference(histories(found), histories(whole))
+            continuations.append([largest, window, len(list(copy.glob("*/"))), fields])
     if world.rank == 0:
         energies = {name: float(values[-1]) for name, values in histories(whole).items() if name in ENERGIES}
-        (folder / "told.json").write_text(json.dumps([told, energies]))
+        (folder / "continuations.json").write_text(json.dumps([continuations, energies]))
 
 try:
     for folder in sorted(Path(sys.argv[1]).glob("*/")):
         inputs = json.loads((folder / "inputs.json").read_text())
         continue_otherwise()
-except BaseException:  # the other ranks would wait for ever
+except BaseException:  # otherwise the other ranks wait forever
     traceback.print_exc()
     world.Abort(1)
 """
@@ -99,9 +100,9 @@ WEAK = STEEL | {"plasticity": {"A": 4e7, "B": 1e9, "n": 0.5, "C": 0.05, "referen
 
 
 def write_package(directory: Path) -> None:
-    """Write a package with solder that yields, and damping: two ranks, three, one, two taking turns.
+    """Write a package with yielding solder and damping, for two ranks, three, one, and two in turns.
 
-    The board is held all over its lower face: of a body that mostly falls, strains would be lost in rounding.
+    The board is held over its lower face: in a falling body, strains would be lost in rounding.
     """
     directory.mkdir()
     board, package, *joints = small_assembly(1, size=1e-3)
@@ -129,7 +130,7 @@ def write_package(directory: Path) -> None:
 
 
 def write_strip(directory: Path, solver: str, ranks: tuple[int, ...], **changes) -> None:
-    """Write a structure under pressure and prescribed motion, shaken by a large mass, damped."""
+    """Write a damped structure under pressure and prescribed motion, shaken by a large mass."""
     directory.mkdir()
     loads = {
         "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"},
@@ -156,11 +157,11 @@ def scenes(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("name, ways", [("package", 3), ("yielding", 2), ("implicit", 1)])
 def test_run_continues_on_other_ranks(scenes, name, ways):
-    told, energies = json.loads((scenes / name / "told.json").read_text())
-    assert len(told) == ways
+    continuations, energies = json.loads((scenes / name / "continuations.json").read_text())
+    assert len(continuations) == ways
     assert (energies["plastic"] > 0.0) == (name != "implicit")
-    for difference, window, folders, fields in told:
+    for difference, window, folders, fields in continuations:
         assert difference <= 1e-10
-        assert 11 < window <= 11 + 4  # the latest that is sampled before the second break
+        assert 11 < window <= 11 + 4  # the latest sampled window before the second interruption
         assert folders == 1
         assert fields >= 4

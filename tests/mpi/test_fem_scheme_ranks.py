@@ -1,4 +1,4 @@
-"""Schemes through the program: the same on one rank and on three, close to held velocity, balanced."""
+"""Coupling schemes through the program: equal on one rank and on three, close to held velocity, balanced."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ def assembly(tmp_path_factory) -> Path:
 
 
 def histories(directory: Path, *runs: tuple[str, dict]) -> list[dict[str, np.ndarray]]:
-    """Return what schemes give on their ranks."""
+    """Return the histories of schemes on their ranks."""
     inputs = [(ranks["total"], write_input(directory, scheme, ranks)) for scheme, ranks in runs]
     run_programs(inputs)
     return [history(path.with_suffix("")) for _, path in inputs]
@@ -57,7 +57,9 @@ def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> f
 @pytest.mark.parametrize("scheme", ["gravouil_combescure", pytest.param("impulse", marks=pytest.mark.long)])
 def test_a_scheme_is_the_same_on_more_ranks_and_close_to_held_velocity(assembly, scheme):
     alone, apart = {"total": 1, "placement": "shared"}, {"total": 3, "placement": "disjoint", "macro": 1}
-    one, three, held_velocity = histories(assembly, (scheme, alone), (scheme, apart), ("held_velocity", alone))
-    assert difference(one, three) <= 1e-8
-    assert np.abs(one["balance"]).max() <= 1e-3 * np.abs(one["external"]).max()
-    assert difference(one, held_velocity) <= 0.02
+    single_rank, three_ranks, held_velocity = histories(
+        assembly, (scheme, alone), (scheme, apart), ("held_velocity", alone)
+    )
+    assert difference(single_rank, three_ranks) <= 1e-8
+    assert np.abs(single_rank["balance"]).max() <= 1e-3 * np.abs(single_rank["external"]).max()
+    assert difference(single_rank, held_velocity) <= 0.02

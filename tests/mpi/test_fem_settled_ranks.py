@@ -1,4 +1,4 @@
-"""A shock of automatic duration ends at the same window when it is continued, on as many ranks or on more."""
+"""A shock of automatic duration ends at the same window when it is continued, on any number of ranks."""
 
 import json
 from pathlib import Path
@@ -15,12 +15,12 @@ NUMERICS |= {"checkpoint_seconds": 0.02}
 
 
 def pulse(time: float) -> float:
-    """Push the table up for 10 us and back for 20 us, so that the board soon returns [m/s^2]."""
+    """Return an upward acceleration [m/s^2] for 10 us and a downward one for 20 us, so that the board soon returns."""
     return 1e5 * np.sin(np.pi * time / 1e-5) if time < 1e-5 else -6e4 * np.sin(np.pi * (time - 1e-5) / 2e-5)
 
 
 def written(meshes: list[Path], name: str, ranks: int) -> Path:
-    """Return the input of a run that ends when it has settled, and continues what is there."""
+    """Return the input of a run that ends when it has settled and continues from existing checkpoints."""
     folder = meshes[0].parent
     table, shock = folder / "pulse.csv", {"duration": LONGEST, "numerics": NUMERICS, "ranks": {"total": ranks}}
     rows = (f"{time:.9g},{pulse(time):.9g}" for time in np.linspace(0.0, 3e-5, 61))
@@ -34,7 +34,7 @@ def written(meshes: list[Path], name: str, ranks: int) -> Path:
     return path
 
 
-def found(output: Path) -> tuple[dict[str, np.ndarray], dict]:
+def outcome(output: Path) -> tuple[dict[str, np.ndarray], dict]:
     """Return history and result of a run."""
     with np.load(output / "history.npz") as arrays:
         return dict(arrays), json.loads((output / "result.json").read_text())
@@ -44,7 +44,7 @@ def test_it_ends_at_the_same_window_after_a_restart_and_on_two_ranks(tmp_path):
     meshes = write_small_assembly(tmp_path)
     runs = {"one": 1, "again": 1, "two": 2}
     run_programs([(ranks, written(meshes, name, ranks)) for name, ranks in runs.items()])
-    history, result = found(tmp_path / "one")
+    history, result = outcome(tmp_path / "one")
     end = history["time"][-1]
     assert end < 0.9 * LONGEST and result["metrics"]["simulated_time"]["value"] == end
     assert np.isclose(result["model"]["window"] * result["model"]["windows"], end)
@@ -53,7 +53,7 @@ def test_it_ends_at_the_same_window_after_a_restart_and_on_two_ranks(tmp_path):
     before = {name: values[:-1] for name, values in history.items() if values.shape[:1] == rows}
     assert not is_settled(before)
     for name in ("again", "two"):
-        continued, other = found(tmp_path / name)
+        continued, other = outcome(tmp_path / name)
         assert other["continued_from"] > 0
         assert other["model"]["windows"] == result["model"]["windows"]
         scale = np.abs(history["von_mises_board"]).max()

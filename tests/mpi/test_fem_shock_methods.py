@@ -1,4 +1,4 @@
-"""A package's shock given in other ways: large mass for direct acceleration, power iteration for the DNS."""
+"""Other methods for the shock of a package: large mass for direct acceleration, power iteration for the DNS."""
 
 import json
 from pathlib import Path
@@ -52,7 +52,7 @@ def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> f
 
 
 def test_large_mass_at_the_holes_is_direct_acceleration(assembly):
-    """They differ by what a window's held velocity does to a moving frame: a DT^2 / 8, little once the board bends."""
+    """The difference is the error of held velocity in a moving frame, a DT^2 / 8, small once the board bends."""
     inputs = {"direct": {}, "large": {"method": "large_mass"}}
     for name, changes in inputs.items():
         (assembly / f"{name}.json").write_text(json.dumps(request(assembly, "two_scale", name, **changes)))

@@ -1,4 +1,4 @@
-"""A structure gives the same on one and on two ranks, and an error ends both."""
+"""A structure has equal results on one and on two ranks, and an error ends both."""
 
 import json
 from pathlib import Path
@@ -14,7 +14,7 @@ LOADS = {
     "push": {"kind": "pressure", "on": "z_max", "peak": 1e5, "pulse": "constant"},
     "pull": {"kind": "motion", "on": "x_max", "component": "x", "peak": 0.1, "duration": 4e-5},
     "poke": {"kind": "point_force", "at": [1e-4, 1e-3, 7e-4], "direction": [1.0, 2.0, 3.0], "peak": 20.0}
-    | {"duration": 4e-5},  # in an element beside the middle, which both ranks touch
+    | {"duration": 4e-5},  # in an element next to the middle, shared by both ranks
 }
 SUPPORTS = {
     "clamp": {"on": "x_min", "hold": ["x", "y", "z"]},
@@ -37,7 +37,7 @@ DYNAMICS = {
 FINITE = DYNAMICS | {"duration": 1e-5, "kinematics": "finite", "damping": {"mass_coefficient": 100.0}}
 
 
-LONGER = structure_tables_of()["structure"] | {"length": 1.2 * LENGTH}  # than the mesh
+LONGER = structure_tables_of()["structure"] | {"length": 1.2 * LENGTH}  # longer than the mesh
 OUTSIDE = {"kind": "point_force", "at": [0.55 * LENGTH, 0.0, 0.0], "direction": [0.0, 0.0, 1.0], "peak": 1.0}
 OUTSIDE |= {"pulse": "constant"}
 CRUSHED = {
@@ -66,11 +66,11 @@ def history(directory: Path, ranks: int) -> dict[str, np.ndarray]:
 )
 def test_two_ranks_give_what_one_gives(tmp_path, solver, dynamics):
     run_programs([(ranks, written(tmp_path / f"{ranks}", solver, dynamics)) for ranks in (1, 2)])
-    one, two = (history(tmp_path / f"{ranks}", ranks) for ranks in (1, 2))
-    assert np.abs(one["reaction@clamp"]).max() > 0.0 and np.abs(one["reaction@foot"][:, 1:]).max() > 0.0
-    for name in one.keys() - {"balance"}:
-        scale = one["internal" if name == "hourglass" else name]  # of full elements it is a small difference
-        assert np.abs(one[name] - two[name]).max() <= 1e-8 * np.abs(scale).max(), name
+    single, double = (history(tmp_path / f"{ranks}", ranks) for ranks in (1, 2))
+    assert np.abs(single["reaction@clamp"]).max() > 0.0 and np.abs(single["reaction@foot"][:, 1:]).max() > 0.0
+    for name in single.keys() - {"balance"}:
+        scale = single["internal" if name == "hourglass" else name]  # small for full integration
+        assert np.abs(single[name] - double[name]).max() <= 1e-8 * np.abs(scale).max(), name
 
 
 @pytest.mark.parametrize(

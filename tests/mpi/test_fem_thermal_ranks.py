@@ -1,4 +1,4 @@
-"""Heated board and package are the same on one and on two ranks; errors of one rank reach both."""
+"""Heated board and package are equal on one and on two ranks; errors of one rank end both."""
 
 from tests.support.fem_program import run_script
 
@@ -36,8 +36,8 @@ if world.rank == 0:
 
 
 def test_two_ranks_give_the_state_of_one(tmp_path):
-    found = run_script(SCRIPT, tmp_path, ranks=2)
-    assert len(found["differences"]) == 5
-    assert {name: value for name, value in found["differences"].items() if not value < 1e-10} == {}
-    assert len(set(found["messages"])) == 1
-    assert "beyond board_side" in found["messages"][0]
+    actual = run_script(SCRIPT, tmp_path, ranks=2)
+    assert len(actual["differences"]) == 5
+    assert {name: value for name, value in actual["differences"].items() if not value < 1e-10} == {}
+    assert len(set(actual["messages"])) == 1
+    assert "beyond board_side" in actual["messages"][0]

@@ -1,4 +1,4 @@
-"""Joints that MPI ranks reflow are those of processes; what fails or dies is named, and the next run continues."""
+"""Joints reflowed by MPI ranks equal those of processes; failures name the joint, and the next run continues."""
 
 import time
 
@@ -24,13 +24,13 @@ PLACES = {
 
 @pytest.fixture
 def ranks(tmp_path):
-    with Ranks(2, True, tmp_path / "ranks.jobs") as found:
-        yield found
-    assert not found.folder.exists()
+    with Ranks(2, True, tmp_path / "ranks.jobs") as pool:
+        yield pool
+    assert not pool.folder.exists()
 
 
 def jobs(folder, solder) -> dict[str, JointReflow]:
-    return {name: JointReflow(place, solder, folder / name) for name, place in PLACES.items()}
+    return {name: JointReflow(geometry, solder, folder / name) for name, geometry in PLACES.items()}
 
 
 def test_what_fails_is_named_and_all_end(ranks):
@@ -38,8 +38,8 @@ def test_what_fails_is_named_and_all_end(ranks):
     with pytest.raises(ReflowError, match=r"^joint A2: ValueError: no rest after 3 steps$"):
         ranks.run(rank_work.fail, {"A1": "sleeps", "A2": "fails"}, lambda _: None)
     assert time.monotonic() - begin < 60.0
-    left = [one.as_dict(["cmdline"])["cmdline"] for one in psutil.Process().children(recursive=True)]
-    assert not [line for line in left if line and "reflowshock.workflow.reflow" in line]  # a zombie has no line
+    left = [child.as_dict(["cmdline"])["cmdline"] for child in psutil.Process().children(recursive=True)]
+    assert not [line for line in left if line and "reflowshock.workflow.reflow" in line]  # a zombie has no command line
 
 
 def test_nothing_to_do_needs_no_rank(ranks):
@@ -51,13 +51,13 @@ def test_a_rank_that_is_killed_ends_the_run_and_the_next_one_gives_what_processe
     with pytest.raises(ReflowError, match=r"(?s)mpirun was killed.*unfinished joints: (A1, )?B1"):
         ranks.run(rank_work.be_killed, jobs(tmp_path, solder), lambda _: None)
     assert not psutil.pid_exists(int((tmp_path / "B1.pid").read_text()))
-    told = []
-    by_ranks = ranks.run(rank_work.solve, jobs(tmp_path, solder), lambda shares: told.append(dict(shares)))
+    progress = []
+    by_ranks = ranks.run(rank_work.solve, jobs(tmp_path, solder), lambda shares: progress.append(dict(shares)))
     with Processes(1, 1) as processes:
         by_processes = processes.run(rank_work.solve, jobs(tmp_path / "processes", solder), lambda _: None)
     assert list(by_ranks) == list(by_processes) == list(PLACES)
     assert [continued for _, continued in by_ranks.values()] == [True, False]
-    assert told[-1] == dict.fromkeys(PLACES, 1.0)
+    assert progress[-1] == dict.fromkeys(PLACES, 1.0)
     for name, (shape, _) in by_ranks.items():
         other = by_processes[name][0]
         for array in ("points", "velocity", "pressure", "surface_points", "triangles"):

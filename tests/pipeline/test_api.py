@@ -1,4 +1,4 @@
-"""The program from Python, on the folder of the shortened run."""
+"""Python interface of the program, on the folder of the shortened run."""
 
 import json
 import shutil
@@ -70,7 +70,7 @@ def test_plan_and_run_of_what_is_there(run_folder):
 
 
 def test_a_change_runs_what_depends_on_it_beside_modules_of_a_users_own(run_folder, tmp_path, monkeypatch):
-    """Files that are named as rooms of the program, or as modules of former versions, are not taken for them."""
+    """Files of the user with names of the program's modules are not imported."""
     before = times(run_folder)
     for name in ("workflow", "fem", "meshing", "particles", "cases", "api"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the user was imported')\n")
@@ -89,8 +89,8 @@ def test_a_run_that_fails_says_why(tmp_path):
 
 
 def test_a_run_its_metrics_and_its_report_show_themselves(run):
-    shown = run._repr_html_()
-    assert run.summary["answer"] in shown and "data:image/png;base64," in shown
+    html = run._repr_html_()
+    assert run.summary["answer"] in html and "data:image/png;base64," in html
     assert "<td>critical joint</td>" in run.metrics._repr_html_()
     frame = run.report._repr_html_()
     assert frame.startswith("<iframe") and 'sandbox="allow-scripts"' in frame and frame.count("<") == 2

@@ -1,4 +1,4 @@
-"""An overfilled array: joints that touch are reported, flowed into one, meshed as it, and never shocked."""
+"""Overfilled array: touching joints are reported, reflowed and meshed as one, and excluded from the shock."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The report of the full chain, and of a run that ended after the reflow."""
+"""Report of the full chain, and of a run that ended after the reflow."""
 
 import shutil
 
@@ -37,11 +37,7 @@ def test_a_run_that_ended_after_the_reflow_has_a_report(run_folder):
         shutil.rmtree(product)
     assert reflowshock("report", run_folder).returncode == 0
     page = (run_folder / "report.html").read_text()
-    assert (
-        "<h2>Joint shapes</h2>" in page
-        and "standoff over the array" in page
-        and "Joint shapes in the array" in page
-    )
+    assert "<h2>Joint shapes</h2>" in page and "standoff over the array" in page and "Joint shapes in the array" in page
     assert "This run is incomplete; stages not run: surface, solder_mesh, shock." in page
     assert "<h2>Joint meshes</h2>" not in page and "<h2>Shock</h2>" not in page
     assert not (run_folder / "shock").exists()

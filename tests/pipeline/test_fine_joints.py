@@ -1,4 +1,4 @@
-"""Some joints fine, all others coarse: found by a coarse run, told in summary and report, kept until a key changes."""
+"""Some fine joints among coarse ones: found by a coarse run, reported, and reused until a key changes."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ CRITICAL = ("shock.ranks.total=1", "shock.coupling.fine_joints=critical", "shock
 
 @pytest.fixture(scope="module")
 def critical_run(first_run, tmp_path_factory) -> Path:
-    """The shortened case with its most stressed joint fine."""
+    """Return a run of the shortened case with its most stressed joint fine."""
     import shutil
 
     folder = shutil.copytree(first_run[0], tmp_path_factory.mktemp("fine") / "small")
@@ -23,14 +23,14 @@ def critical_run(first_run, tmp_path_factory) -> Path:
 
 
 def test_a_coarse_run_finds_the_critical_joint_of_the_dns(critical_run):
-    found = json.loads((critical_run / "shock/fine_joints.json").read_text())
+    fine_joints = json.loads((critical_run / "shock/fine_joints.json").read_text())
     with np.load(critical_run / "shock/dns/history.npz") as dns:
         peel = np.maximum(dns["peel_board"], dns["peel_package"]).max(axis=0)
         pressed = np.maximum(dns["von_mises_board"], dns["von_mises_package"]).max(axis=0)
         names = [str(name) for name in dns["joints"]]
-    assert found["names"] == [names[np.argmax(peel)]] == ["B3"]  # under the die, which pulls
-    assert names[np.argmax(pressed)] == "A4"  # in the first 30 us the corner is pressed: peel stress leaves it out
-    assert "run with coarse joints" in found["why"]
+    assert fine_joints["names"] == [names[np.argmax(peel)]] == ["B3"]  # under the pulling die
+    assert names[np.argmax(pressed)] == "A4"  # compressed in the first 30 us, hence without peel stress
+    assert "run with coarse joints" in fine_joints["why"]
 
 
 def test_coarse_joints_have_coarse_meshes_and_checks(critical_run):

@@ -1,4 +1,4 @@
-"""A package that floats on its joints and bows as it is heated: balance, products, and a kill in the midst of it."""
+"""Floating package that bows while it is heated: balance, products, and a kill during the exchange."""
 
 import json
 import signal
@@ -43,38 +43,38 @@ def test_each_load_step_is_in_balance(folder):
 
 
 def test_pads_joints_and_structure_tell_the_same(folder):
-    """The package's pads lie where its nodes are, and joints are in the places of their pads."""
+    """The pads of the package follow its nodes, and the joints follow their pads."""
     pads, joints = read_pads(folder / "reflow/pads.json"), json.loads((folder / "reflow/joints.json").read_text())
     drawn = {pad.name: pad for pad in read_pads(folder / "geometry/pads.json")}
     structure = np.load(folder / "reflow/structure.npz")
     last = dict(zip(structure["joints"], structure["pad_motion"][-1], strict=True))
     for pad in pads:
-        place = joints[pad.name]["place"]
-        assert (pad.gap, *pad.offset, *pad.tilt) == (place["gap"], *place["offset"], *place["tilt"])
+        joint_place = joints[pad.name]["place"]
+        assert (pad.gap, *pad.offset, *pad.tilt) == (joint_place["gap"], *joint_place["offset"], *joint_place["tilt"])
         board, package = last[pad.name]
         assert pad.gap - drawn[pad.name].gap == pytest.approx(package[2] - board[2], abs=1e-8)
         assert np.hypot(*pad.tilt) > 0.0
     assert np.ptp([pad.gap for pad in pads]) > 1e-6
-    shown = meshio.read(folder / "reflow/structure.vtu")
-    assert abs(shown.point_data["displacement"][:, 2]).max() == pytest.approx(
+    pictured = meshio.read(folder / "reflow/structure.vtu")
+    assert abs(pictured.point_data["displacement"][:, 2]).max() == pytest.approx(
         abs(structure["displacement"][:, 2]).max(), rel=1e-6
     )
 
 
 @pytest.mark.long
 def test_a_kill_in_the_midst_of_an_exchange_changes_nothing(folder, tmp_path):
-    """Killed in the third exchange, by kill -9 of the stage: shapes and products are the same to the last bit."""
+    """After kill -9 of the stage in the third exchange, shapes and products are equal to the bit."""
     line = command_line("run", tmp_path, "--until", "reflow", settings=HEATED)
     break_off(line, tmp_path, signal.SIGKILL, "stage", pattern="*@2")
     result = reflowshock("run", tmp_path, "--until", "reflow", settings=HEATED)
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in " ".join(result.stdout.split())
     assert not list((tmp_path / ".store/work").iterdir())
-    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (folder, tmp_path))
-    assert found.keys() == expected.keys()
+    expected, actual = (read_shapes(run / "reflow/shapes.h5") for run in (folder, tmp_path))
+    assert actual.keys() == expected.keys()
     for name, shape in expected.items():
-        assert np.array_equal(found[name].points, shape.points)
-        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
+        assert np.array_equal(actual[name].points, shape.points)
+        assert np.array_equal(actual[name].history["energy"], shape.history["energy"])
     assert (tmp_path / "reflow/pads.json").read_bytes() == (folder / "reflow/pads.json").read_bytes()
     fields = [np.load(run / "reflow/structure.npz") for run in (folder, tmp_path)]
     for key in ("displacement", "pad_motion", "iterations", "force_residual"):

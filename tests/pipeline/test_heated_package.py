@@ -1,4 +1,4 @@
-"""A package that warps as it is heated, from its table of temperatures to joints in their places: one short run."""
+"""Package that warps while it is heated, from its table of temperatures to the joints: one short run."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from reflowshock.meshing.board.displaced_assembly import read_computed
+from reflowshock.meshing.board.displaced_assembly import read_displacement
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.pads import read_pads
 from tests.support.mesh_file import MeshFile
@@ -23,7 +23,7 @@ SHORT = (
 
 @pytest.fixture(scope="module")
 def heated_run(tmp_path_factory) -> Path:
-    """Example 4.3 of Hu et al. with 4 joints and few particles, to its report."""
+    """Return a run of example 4.3 of Hu et al. with 4 joints and few particles, to its report."""
     folder = tmp_path_factory.mktemp("heated") / "run"
     settings = [word for setting in SHORT for word in ("--set", setting)]
     result = warm_command("run", str(CASE), "--out", str(folder), *settings)
@@ -32,14 +32,14 @@ def heated_run(tmp_path_factory) -> Path:
 
 
 def underside_of(run: Path) -> PackageSide:
-    """The underside of the package by the displacement that the reflow left."""
+    """Return the underside of the package from the displacement of the reflow."""
     mesh = MeshFile(run / "geometry/assembly.msh")
     points = mesh.points[np.unique(mesh.cells("package_side", "quad"))]
-    return PackageSide.of_nodes(points, read_computed(run / "reflow/structure.npz")(points))
+    return PackageSide.of_nodes(points, read_displacement(run / "reflow/structure.npz")(points))
 
 
 def test_pads_of_the_joints_are_where_the_package_is(heated_run):
-    """Gap, offset and tilt of each joint, as means over its pads, against the displaced nodes around its centre."""
+    """Gap, offset and tilt of each joint agree with the displaced nodes around its centre."""
     side, step = underside_of(heated_run), 1e-5
     for site in read_pads(heated_run / "reflow/pads.json"):
         x, y = (
@@ -55,7 +55,7 @@ def test_pads_of_the_joints_are_where_the_package_is(heated_run):
 
 def test_the_assembly_is_displaced_by_what_the_reflow_computed(heated_run):
     flat, displaced = (MeshFile(heated_run / name) for name in ("geometry/assembly.msh", "solder_mesh/assembly.msh"))
-    move = read_computed(heated_run / "reflow/structure.npz")
+    move = read_displacement(heated_run / "reflow/structure.npz")
     for part in ("substrate", "die"):
         before, after = (mesh.points[mesh.cells(part)].reshape(-1, 3) for mesh in (flat, displaced))
         assert after == pytest.approx(before + move(before), abs=1e-15)

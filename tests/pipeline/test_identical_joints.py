@@ -1,4 +1,4 @@
-"""The shock once more with identical joints: what the real shapes change is a metric and a section of the report."""
+"""Shock repeated with identical joints: the influence of the real shapes is a metric and a section of the report."""
 
 import json
 import shutil
@@ -23,7 +23,7 @@ SETTINGS = (
 
 @pytest.fixture(scope="module")
 def identical_run(first_run, tmp_path_factory) -> Path:
-    """The shortened case with one fine joint, run again with identical ones."""
+    """Return a run of the shortened case with one fine joint, repeated with identical joints."""
     folder = shutil.copytree(first_run[0], tmp_path_factory.mktemp("identical") / "small")
     result = reflowshock("run", folder, settings=SETTINGS)
     assert result.returncode == 0, result.stdout + result.stderr

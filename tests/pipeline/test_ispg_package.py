@@ -1,4 +1,4 @@
-"""Joints of a package by the scheme ispg: each flows from its cone with inertia and rests where the default has it."""
+"""Joints of a package by ISPG: each flows from its cone with inertia and rests in the shape of the default scheme."""
 
 import json
 import signal
@@ -31,16 +31,16 @@ def by_ispg(tmp_path_factory):
 @pytest.mark.long
 def test_tilted_joints_of_real_solder_rest_with_the_shapes_of_the_default(first_run, by_ispg):
     solder = read_case(SMALL_CASE).solder
-    found, default = metrics_of(by_ispg), metrics_of(first_run[0])
-    assert found.keys() == default.keys()
-    for name, joint in found.items():
+    metrics, default = metrics_of(by_ispg), metrics_of(first_run[0])
+    assert metrics.keys() == default.keys()
+    for name, joint in metrics.items():
         assert joint["max_width"] == pytest.approx(default[name]["max_width"], rel=1e-4)
         change = joint["axial_force"] - default[name]["axial_force"]
         assert abs(change) < 1e-3 * pi * 0.24e-3 * solder.surface_tension
         assert joint["at_rest"] == 1.0 and joint["particles_lost"] == 0.0
         assert abs(joint["volume_drift"]) < 1e-9 and abs(joint["energy_imbalance"]) < 1e-6
-    told = json.loads((by_ispg / "reflow/stage.json").read_text())["metrics"]
-    assert told["joints_at_rest"]["value"] == len(found)
+    stage_metrics = json.loads((by_ispg / "reflow/stage.json").read_text())["metrics"]
+    assert stage_metrics["joints_at_rest"]["value"] == len(metrics)
 
 
 @pytest.mark.long  # joints one by one: tests/unit/particles/test_restart.py
@@ -50,12 +50,12 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bits(by_ispg, tmp_path):
     result = reflowshock("run", tmp_path, "--until", "reflow", settings=SETTINGS)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "continued from checkpoints" in " ".join(result.stdout.split())
-    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (by_ispg, tmp_path))
-    assert found.keys() == expected.keys()
+    expected, actual = (read_shapes(run / "reflow/shapes.h5") for run in (by_ispg, tmp_path))
+    assert actual.keys() == expected.keys()
     for name, shape in expected.items():
         for array in ("points", "velocity", "pressure"):
-            assert np.array_equal(getattr(found[name], array), getattr(shape, array))
-        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
+            assert np.array_equal(getattr(actual[name], array), getattr(shape, array))
+        assert np.array_equal(actual[name].history["energy"], shape.history["energy"])
 
 
 def test_the_plan_names_the_scheme_and_its_cost(tmp_path):

@@ -1,4 +1,4 @@
-"""The measured strip at a quick scale: what its records say, and the run against the record that was not fitted."""
+"""Measured strip at the quick scale: its records, and the run against the record that was not fitted."""
 
 import json
 from pathlib import Path
@@ -31,7 +31,7 @@ def filtered(impact: str) -> Acceleration:
 
 
 def test_first_frequency_and_damping_of_the_record():
-    """Phase and decay of the band around the first mode, from 4 to 8 ms after the trigger, of the fitted impact."""
+    """Phase and decay of the first mode of the fitted impact, from 4 to 8 ms after the trigger."""
     times, values = record("02", "board_g")
     band = sosfiltfilt(butter(3, (500.0, 1200.0), "bandpass", fs=2e5, output="sos"), values)
     signal, late = hilbert(band), (times > 4.5e-3) & (times < 8.5e-3)
@@ -48,7 +48,7 @@ def test_peaks_of_the_records_after_cfc_1000(impact, peaks):
 
 @pytest.mark.long
 def test_impact_that_was_not_fitted(tmp_path):
-    """The bars of the case: f1 within 5 %, first peak within 20 %, second within 10 % of the measured ones."""
+    """The limits of the case: f1 within 5 %, first peak within 20 %, second within 10 % of the measured ones."""
     settings = [item for setting in QUICK for item in ("--set", setting)]
     done = warm_command("run", str(STRIP / "case.toml"), "--out", str(tmp_path), "--until", "shock", *settings)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,4 +1,4 @@
-"""From case file to report, on a shortened case; then again, changed, broken off."""
+"""A shortened case from case file to report, then rerun, changed and interrupted."""
 
 import json
 import os
@@ -21,13 +21,13 @@ SNAKEFILE = Path(__file__).resolve().parents[2] / "workflow" / "Snakefile"
 
 
 def planned(text: str) -> set[str]:
-    """Stages that `plan` says will run."""
+    """Return the stages that ``plan`` will run."""
     rows = [line.split("│") for line in text.splitlines() if line.count("│") == 3]
     return {row[0].strip() for row in rows if row[1].strip() == "run"}
 
 
 def work(folder: Path, stage: str) -> Path | None:
-    """The folder in which a stage is at work, if one is."""
+    """Return the work folder of a running stage, or None."""
     return next(iter(folder.glob(f".store/work/{stage}-*/.{stage}.partial")), None)
 
 
@@ -66,7 +66,7 @@ def test_the_summary_has_what_scripts_read(first_run):
 
 
 def processor_seconds() -> float:
-    """Return what all processes have used that this one has started."""
+    """Return the processor seconds of all child processes."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -97,7 +97,7 @@ def test_plan_says_which_value_changed_and_what_reruns(first_run):
     ],
 )
 def test_plain_snakemake_agrees_with_plan(run_folder, setting):
-    wanted = planned(reflowshock("plan", run_folder, settings=(setting,)).stdout)
+    planned_jobs = planned(reflowshock("plan", run_folder, settings=(setting,)).stdout)
     result = subprocess.run(
         [
             sys.executable, "-m", "snakemake", "-n", "-s", str(SNAKEFILE), "--config", f"case={SMALL_CASE}",
@@ -108,7 +108,7 @@ def test_plain_snakemake_agrees_with_plan(run_folder, setting):
     assert result.returncode == 0, result.stderr
     words = [line.split() for line in (result.stdout + result.stderr).splitlines()]
     rules = {line[1].rstrip(":") for line in words if len(line) == 2 and line[0] in ("rule", "localrule")}
-    assert rules - {"all"} == wanted
+    assert rules - {"all"} == planned_jobs
 
 
 def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
@@ -141,16 +141,20 @@ def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_p
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in result.stdout
     assert not list((folder / ".store/work").iterdir())
-    expected, found = (read_shapes(run / "reflow/shapes.h5") for run in (first_run[0], folder))
-    assert found.keys() == expected.keys()
+    expected, actual = (read_shapes(run / "reflow/shapes.h5") for run in (first_run[0], folder))
+    assert actual.keys() == expected.keys()
     for name, shape in expected.items():
-        assert np.array_equal(found[name].points, shape.points)
-        assert np.array_equal(found[name].history["energy"], shape.history["energy"])
+        assert np.array_equal(actual[name].points, shape.points)
+        assert np.array_equal(actual[name].history["energy"], shape.history["energy"])
 
 
 def test_a_killed_stage_leaves_nothing(run_folder):
     process = start(run_folder, "shock.peak_acceleration=1000 G")
-    wait_until(lambda: (found := work(run_folder, "shock")) is not None and (found / "two_scale/input.json").exists())
+    wait_until(
+        lambda: (
+            (work_folder := work(run_folder, "shock")) is not None and (work_folder / "two_scale/input.json").exists()
+        )
+    )
     stages = [child for child in psutil.Process(process.pid).children(recursive=True) if "stage" in child.cmdline()]
     for stage in stages:
         os.kill(stage.pid, signal.SIGKILL)

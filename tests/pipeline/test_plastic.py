@@ -1,4 +1,4 @@
-"""Solder that yields, through the whole pipeline: both modes, energy balance, verdict, report."""
+"""Plastic solder through the whole pipeline: both modes, energy balance, verdict, report."""
 
 import json
 import shutil
@@ -9,7 +9,7 @@ import pytest
 from tests.support.workflow_command import reflowshock
 
 LIMIT = ('shock.failure.layer_plastic_work={ limit = "0.2 MJ/m^3", source = "some break" }',)
-# A pulse as short as the small case's hardly bends the board: only an absurd peak lets its solder yield.
+# The short pulse of the small case hardly bends the board: only an unrealistic peak makes the solder yield.
 SETTINGS = (
     "shock.ranks.total=1",
     "shock.numerics.plasticity=on",
@@ -21,7 +21,7 @@ SETTINGS = (
 
 @pytest.fixture(scope="module")
 def plastic_run(first_run, tmp_path_factory):
-    """The run folder, how its run ended, the summary and the histories of both modes."""
+    """Return the run folder, its completed process, the summary and the histories of both modes."""
     folder = shutil.copytree(first_run[0], tmp_path_factory.mktemp("plastic") / "small")
     result = reflowshock("run", folder, settings=SETTINGS)
     histories = {mode: dict(np.load(folder / "shock" / mode / "history.npz")) for mode in ("two_scale", "dns")}
@@ -41,18 +41,18 @@ def test_a_joint_that_breaks_is_the_verdict_of_a_healthy_run(plastic_run):
     assert "some break" in page and "plastic work density, solder layer at this pad" in page
     assert "Largest plastic work density of the layer first" in page
     failed = [name for name, joint in verdict["joints"].items() if joint["verdict"] == "FAIL"]
-    told = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]
-    assert all(name in told for name in failed) and verdict["joint"] in failed
+    verdict_text = page[page.index(f"{len(failed)} of 4 joints in the model fail") :].split("</p>")[0]
+    assert all(name in verdict_text for name in failed) and verdict["joint"] in failed
 
 
 def test_a_verdict_ends_a_run_with_3_where_that_is_asked_for(plastic_run, tmp_path):
     folder = shutil.copytree(plastic_run[0], tmp_path / "small")
-    shown = (folder / "shock/stage.json").read_text()
+    stage_text = (folder / "shock/stage.json").read_text()
     assert reflowshock("run", folder, "--fail-on-verdict", settings=SETTINGS).returncode == 3
     held = (*SETTINGS[:-1], SETTINGS[-1].replace("0.2 MJ", "3000 MJ"))
     other = reflowshock("run", folder, "--fail-on-verdict", settings=held)
     assert other.returncode == 0 and ", PASS; " in other.stdout.splitlines()[-1]
-    assert (folder / "shock/stage.json").read_text() == shown  # judged again, not computed again
+    assert (folder / "shock/stage.json").read_text() == stage_text  # the verdict changes without a new computation
     assert reflowshock("run", folder, "--fail-on-verdict", "--until", "shock", settings=SETTINGS).returncode == 2
 
 
@@ -79,7 +79,7 @@ def test_energy_balances_and_both_modes_flow_alike(plastic_run):
 
 
 def test_stress_stays_on_the_yield_surface_of_its_rate(plastic_run):
-    """No element is stressed beyond its yield stress at the largest plastic strain and 1e5 1/s."""
+    """No stress exceeds the yield stress at the largest plastic strain and 1e5 1/s."""
     history = plastic_run[3]["dns"]
     strain = history["plastic_strain_max"].max()
     assert history["von_mises_max"].max() < (38e6 + 275e6 * strain**0.71) * (1.0 + 0.0713 * np.log(1e8))

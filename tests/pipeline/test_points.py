@@ -1,4 +1,4 @@
-"""A study of a small drop, through Snakemake: killed in the middle, one point fails, the others are as by a run."""
+"""Study of a small drop through Snakemake: killed in the middle; one point fails, the others equal single runs."""
 
 import csv
 import json
@@ -46,9 +46,9 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path, monkeypatch):
     assert psutil.wait_procs([process, *children], timeout=60)[1] == []
 
     monkeypatch.setattr(sys, "executable", warm_python())
-    kept = reflow.stat().st_mtime_ns
+    modified = reflow.stat().st_mtime_ns
     assert not run_study(study, store, Machine(cores=2))
-    assert reflow.stat().st_mtime_ns == kept
+    assert reflow.stat().st_mtime_ns == modified
     with (store.folder / "results.csv").open() as file:
         lines = list(csv.DictReader(file))
     assert [line["result"] for line in lines] == ["healthy", "failed"]
@@ -60,9 +60,9 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path, monkeypatch):
     stage, run = stage_function(good.case, "reflow"), Run(tmp_path / "run", good.case, cores=1)
     record = run_stage("reflow", stage, run, tmp_path / store.product(good, "reflow").name)
     assert untimed(summary) == untimed(record)
-    found = store.record(good, "reflow")
-    assert found is not None
-    assert found["health"] == record["health"]
+    stored = store.record(good, "reflow")
+    assert stored is not None
+    assert stored["health"] == record["health"]
 
     written = (store.run_folder(good) / "report.html").stat().st_mtime_ns
     with locked(store.folder, "study", "drops") as lock:

@@ -1,4 +1,4 @@
-"""A report in a browser: it loads without errors or requests, the view turns, the slider moves, the table sorts."""
+"""Report in a browser: it loads without errors or requests, the view rotates, the slider moves, the table sorts."""
 
 import shutil
 from pathlib import Path
@@ -20,7 +20,7 @@ COLUMN = '[...document.querySelectorAll("table.joints tbody tr")].map((row) => r
 
 @pytest.fixture(scope="module")
 def page(first_run, tmp_path_factory):
-    """A browser with a copy of the shortened case's report, opened beside nothing else."""
+    """Yield a browser with a copy of the report of the shortened case in an otherwise empty folder."""
     folder = tmp_path_factory.mktemp("report")
     report = Path(shutil.copy(first_run[0] / "report.html", folder))
     with Browser() as browser:
@@ -35,8 +35,8 @@ def pixels(page: Browser) -> list:
 
 def test_it_loads_without_errors_or_requests(page):
     assert page.errors == []
-    (own,) = [url for url in page.requests if not url.startswith("data:")]
-    assert own.endswith("report.html")
+    (request,) = [url for url in page.requests if not url.startswith("data:")]
+    assert request.endswith("report.html")
     assert page.value('document.querySelectorAll(".uplot canvas").length') >= 10
     assert page.value("performance.getEntriesByType('resource').length") == 0
 
@@ -60,10 +60,10 @@ def test_the_view_turns(page):
 
 
 def test_the_slider_moves_the_time(page):
-    (before, _), told = pixels(page), page.value(f"{VIEW}.time.textContent")
+    (before, _), time_label = pixels(page), page.value(f"{VIEW}.time.textContent")
     page.value(f'{VIEW}.slider.value = 0; {VIEW}.slider.dispatchEvent(new Event("input"))')
     assert pixels(page)[0] != before
-    assert page.value(f"{VIEW}.time.textContent") == "0 ms" != told
+    assert page.value(f"{VIEW}.time.textContent") == "0 ms" != time_label
 
 
 def test_the_table_sorts_and_shows_a_joint(page):

@@ -1,4 +1,4 @@
-"""The shock of the shortened case from the stress of cooling on: products, metrics, what it changes, bad input."""
+"""Shock of the shortened case with the stress of cooling: products, metrics, differences, bad input."""
 
 import json
 import shutil
@@ -25,7 +25,7 @@ COOLED = (
 
 
 def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:
-    """Run the shock alone, on the joint meshes that are there."""
+    """Run the shock alone on existing joint meshes."""
     case = read_case(SMALL_CASE, [*COOLED, *settings])
     folder = run_folder / "shock"
     shutil.rmtree(folder, ignore_errors=True)
@@ -34,12 +34,12 @@ def shock_of(run_folder: Path, *settings: str) -> tuple[Path, Findings]:
 
 
 def test_both_modes_begin_with_one_cooling(run_folder):
-    folder, found = shock_of(run_folder)
-    assert all(check["ok"] for check in found.health.values())
-    assert {"cooling_force_residual", "cooling_unbalanced_force"} <= found.health.keys()
-    assert found.effects["residual_stress"]["on"]
-    assert "192 K" in found.effects["residual_stress"]["why"]
-    value = {name: metric["value"] for name, metric in found.metrics.items()}
+    folder, findings = shock_of(run_folder)
+    assert all(check["ok"] for check in findings.health.values())
+    assert {"cooling_force_residual", "cooling_unbalanced_force"} <= findings.health.keys()
+    assert findings.effects["residual_stress"]["on"]
+    assert "192 K" in findings.effects["residual_stress"]["why"]
+    value = {name: metric["value"] for name, metric in findings.metrics.items()}
     assert value["residual_stress_critical_joint"] > 20e6
     assert value["room_temperature_warpage"] != value["solidified_warpage"]
     assert value["cooling_iterations"] > 3
@@ -50,19 +50,19 @@ def test_both_modes_begin_with_one_cooling(run_folder):
         with np.load(folder / mode / "history.npz") as history:
             assert history["von_mises_board"][0] == pytest.approx(joints["von_mises_board"], rel=1e-6)
             assert history["plastic_strain_max"][0] == pytest.approx(joints["plastic_strain_max"], rel=1e-9)
-    assert found.metrics["critical_joint_stress_error"]["value"] < 0.05
+    assert findings.metrics["critical_joint_stress_error"]["value"] < 0.05
     continues_from_the_same_cooling(run_folder)
 
 
 def continues_from_the_same_cooling(run_folder: Path) -> None:
-    """A stage that was killed during its shock finds what cooling found, to the same bits."""
-    kept = run_folder / ".shock.checkpoints/residual/cooling.npz"
-    written, request = kept.stat().st_mtime_ns, json.loads((run_folder / "shock/dns/input.json").read_text())
+    """Check that a stage killed during its shock reuses the stored cooling, to the same bits."""
+    cooling_file = run_folder / ".shock.checkpoints/residual/cooling.npz"
+    written, request = cooling_file.stat().st_mtime_ns, json.loads((run_folder / "shock/dns/input.json").read_text())
     again = run_folder / "again"
     again.mkdir()
     request = begun(Run(run_folder, read_case(SMALL_CASE, COOLED), 2), again, request)
-    assert Path(request["cooling"]).read_bytes() == kept.read_bytes()
-    assert kept.stat().st_mtime_ns == written
+    assert Path(request["cooling"]).read_bytes() == cooling_file.read_bytes()
+    assert cooling_file.stat().st_mtime_ns == written
 
 
 @pytest.mark.parametrize(

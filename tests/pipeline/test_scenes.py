@@ -40,7 +40,7 @@ def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
 
 
 @pytest.mark.parametrize(
-    ("name", "setting", "own"),
+    ("name", "setting", "metrics"),
     [
         ("sessile_drop", COARSE_DROP, CONTACT | {"height_error"}),
         pytest.param(
@@ -50,11 +50,11 @@ def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
         ("solder_joint", COARSE_JOINT, CONTACT | {"waist", "waist_error", "axial_force", "axial_force_error"}),
     ],
 )
-def test_from_case_file_to_report(tmp_path, name, setting, own):
+def test_from_case_file_to_report(tmp_path, name, setting, metrics):
     result = run(name, tmp_path, setting)
     assert result.returncode == 0, result.stdout + result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert set(summary["metrics"]) >= ALWAYS | own
+    assert set(summary["metrics"]) >= ALWAYS | metrics
     assert all(check["ok"] for check in summary["health"].values())
     assert summary["metrics"]["verdict"]["value"] == "ok"
     assert set(summary["timings"]) == {"reflow"}
@@ -66,32 +66,32 @@ def test_from_case_file_to_report(tmp_path, name, setting, own):
 
 @pytest.mark.long
 def test_a_drop_in_a_plane_from_case_file_to_report(tmp_path):
-    """The drop of the paper as an endless ridge: at rest a segment of a circle of the area of the cube's face."""
+    """A ridge with the liquid of the paper rests as a circular segment with the area of the cube's face."""
     settings = ("drop.section=plane", "drop.particles_per_edge=8", "drop.contact_angle=120 deg")
     result = run("sessile_drop", tmp_path, *settings, "solder.effects.inertia=on", "solder.parameters=paper")
     assert result.returncode == 0, result.stdout + result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
-    found = {name: metric["value"] for name, metric in summary["metrics"].items()}
+    metrics = {name: metric["value"] for name, metric in summary["metrics"].items()}
     angle = np.radians(120.0)
     radius = 1e-3 / np.sqrt(angle - np.sin(angle) * np.cos(angle))
-    assert found["height"] == pytest.approx(radius * (1.0 - np.cos(angle)), rel=3e-3)
-    assert found["max_width"] == pytest.approx(2.0 * radius, rel=1e-3)
-    assert found["volume"] == pytest.approx(1e-9, rel=1e-12)
-    assert found["particles_lost"] == 0
+    assert metrics["height"] == pytest.approx(radius * (1.0 - np.cos(angle)), rel=3e-3)
+    assert metrics["max_width"] == pytest.approx(2.0 * radius, rel=1e-3)
+    assert metrics["volume"] == pytest.approx(1e-9, rel=1e-12)
+    assert metrics["particles_lost"] == 0
     assert "distance from the middle [mm]" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
-    "place",
+    "wall_settings",
     [pytest.param((), marks=pytest.mark.long), ("drops.contact_angle=60 deg", "drops.distance=1.3 mm")],
     ids=["free", "wall"],
 )
-def test_two_drops_from_case_file_to_report(tmp_path, place):
-    result = run("coalescence", tmp_path, "drops.spacing=0.13 mm", "gravity=off", *place)
+def test_two_drops_from_case_file_to_report(tmp_path, wall_settings):
+    result = run("coalescence", tmp_path, "drops.spacing=0.13 mm", "gravity=off", *wall_settings)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["metrics"]["drops_left"]["value"] == 1
     assert abs(summary["metrics"]["volume_drift"]["value"]) < 1e-6
-    limits = {"height_error", "max_width_error"} | (set() if place else {"radius_error"})
+    limits = {"height_error", "max_width_error"} | (set() if wall_settings else {"radius_error"})
     assert set(summary["health"]) >= limits | {"drops_not_as_meant", "volume_drift", "capillary_number_at_rest"}
     assert result.returncode == 0, result.stderr
     page = (tmp_path / "report.html").read_text()
@@ -102,8 +102,15 @@ def test_an_oscillation_from_case_file_to_report(tmp_path):
     settings = ("oscillation.particles_per_radius=2", "oscillation.periods=1.5")
     result = run("oscillating_drop", tmp_path, *settings)
     summary = json.loads((tmp_path / "summary.json").read_text())
-    own = {"period", "period_error", "decay_rate", "decay_rate_error", "volume_drift", "time_step_over_capillary_limit"}
-    assert set(summary["metrics"]) >= own | {"particles", "particle_steps_per_second"}
+    metrics = {
+        "period",
+        "period_error",
+        "decay_rate",
+        "decay_rate_error",
+        "volume_drift",
+        "time_step_over_capillary_limit",
+    }
+    assert set(summary["metrics"]) >= metrics | {"particles", "particle_steps_per_second"}
     assert set(summary["health"]) == {"period_error", "decay_rate_error", "volume_drift"}
     assert result.returncode == (0 if all(check["ok"] for check in summary["health"].values()) else 1)
     page = (tmp_path / "report.html").read_text()
@@ -114,39 +121,39 @@ MOVED = ("joint.spacing=0.07 mm", "solder.numerics.time_step_limit=100")
 
 
 def reflow_here(folder: Path, *settings: str) -> Findings:
-    """Run the reflow of the solder joint in this process; it holds its health checks."""
+    """Run the reflow of the solder joint in this process and check its health."""
     case = read_case(CASES / "solder_joint" / "case.toml", settings)
     (folder / "reflow").mkdir()
-    found = stage_function(case, "reflow")(Run(folder, case, 1), folder / "reflow")
-    assert all(check["ok"] for check in found.health.values()), found.health
-    return found
+    findings = stage_function(case, "reflow")(Run(folder, case, 1), folder / "reflow")
+    assert all(check["ok"] for check in findings.health.values()), findings.health
+    return findings
 
 
 def test_a_package_floats_to_its_collapse_height_and_centres_itself(tmp_path):
-    """Offset by 0.3 radius, under a load: where the Young-Laplace force carries it."""
-    found = reflow_here(tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
-    assert found.metrics["offset"]["value"] < 0.01 * 0.24e-3
-    assert set(found.health) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
+    """A package offset by 0.3 radius under a load settles where the Young-Laplace force carries it."""
+    findings = reflow_here(tmp_path, *MOVED, "joint.offset=0.072 mm", "joint.package.load=0.1 mN")
+    assert findings.metrics["offset"]["value"] < 0.01 * 0.24e-3
+    assert set(findings.health) >= {"collapse_height_error", "force_balance_error", "max_width_error"}
 
 
 def test_a_package_is_moved_along_a_path(tmp_path):
-    found = reflow_here(tmp_path, *MOVED, "joint.path.standoff=0.42 mm", "joint.path.steps=2")
+    findings = reflow_here(tmp_path, *MOVED, "joint.path.standoff=0.42 mm", "joint.path.steps=2")
     places = json.loads((tmp_path / "reflow" / "path.json").read_text())
-    assert [place["standoff"] for place in places] == pytest.approx([0.35e-3, 0.385e-3, 0.42e-3])
+    assert [path_point["standoff"] for path_point in places] == pytest.approx([0.35e-3, 0.385e-3, 0.42e-3])
     pull = np.pi * 0.24e-3 * 0.4985
-    for place in places:
-        assert place["axial_force"] == pytest.approx(place["axial_force_exact"], abs=0.02 * pull)
-    assert found.metrics["places"]["value"] == 3
+    for path_point in places:
+        assert path_point["axial_force"] == pytest.approx(path_point["axial_force_exact"], abs=0.02 * pull)
+    assert findings.metrics["places"]["value"] == 3
 
 
 def test_an_offset_joint_has_no_meridian(tmp_path):
-    found = reflow_here(tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
-    assert "max_width_error" not in found.metrics
-    assert "volume_drift" in found.health
+    findings = reflow_here(tmp_path, COARSE_JOINT, "joint.offset=0.07 mm")
+    assert "max_width_error" not in findings.metrics
+    assert "volume_drift" in findings.health
 
 
 def short_steps(limit: float) -> tuple[str, str]:
-    """So many steps that a run lasts longer than the interval of its checkpoints."""
+    """Return settings with a time step so short that a run outlasts the interval of its checkpoints."""
     return f"solder.numerics.time_step_limit={limit}", "solder.numerics.max_steps=2000"
 
 
@@ -178,7 +185,7 @@ def rest_of_joint(case: JointCase) -> np.ndarray:
     ],
 )
 def test_a_run_that_is_broken_off_continues_to_the_same_bits(tmp_path, name, settings, at_rest, end):
-    """Also when the command itself is killed: what it has started ends with it."""
+    """Killing the command also ends its child processes, and the run continues."""
     break_off(command(name, tmp_path, *settings), tmp_path, end, "command")
     result = run(name, tmp_path, *settings)
     assert result.returncode == 0, result.stderr
@@ -214,8 +221,8 @@ def test_a_droplet_goes_from_case_file_to_report(tmp_path, name, metrics):
 
 
 def test_drops_are_printed_from_case_file_to_report(tmp_path):
-    one = ("printing.columns=1", "printing.rows=1", "printing.layers=1", "scale=full")
-    ended = run("printing", tmp_path / "run", *one)
+    single_drop = ("printing.columns=1", "printing.rows=1", "printing.layers=1", "scale=full")
+    ended = run("printing", tmp_path / "run", *single_drop)
     assert "report: " in ended.stdout, ended.stderr
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert {"drops", "volume_error", "connected_parts_max", "roughness_sa", "volume_drift"} <= summary["metrics"].keys()

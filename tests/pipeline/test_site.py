@@ -1,4 +1,4 @@
-"""Every command that the site shows is known and runs: cheaply here, as it is written in `make test-long`."""
+"""Commands on the site are known and run: shortened here, as written in `make test-long`."""
 
 import os
 import re
@@ -32,7 +32,7 @@ KNOWN = (
 
 @pytest.fixture
 def scratch(tmp_path, monkeypatch) -> Path:
-    """A folder as a reader has it: the checkout's cases, a board of ECAD in two formats."""
+    """Return a reader's folder: the cases of the checkout, a board of ECAD in two formats."""
     for name in ("cases", "workflow"):
         (tmp_path / name).symlink_to(ROOT / name)
     ecad_files.kicad(tmp_path / "board.kicad_pcb")
@@ -59,7 +59,7 @@ def test_the_case_of_the_readme_is_complete_and_takes_what_its_scene_calls_for(t
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_commands_of_a_page_run(page, scratch, monkeypatch):
-    """In their order: what writes a case is run, what computes reads its case with all settings."""
+    """Commands that write a case are run in order; commands that compute read their case with all settings."""
     for line in shown(page):
         if not OURS.match(line):
             assert is_known(line), line
@@ -68,39 +68,39 @@ def test_commands_of_a_page_run(page, scratch, monkeypatch):
             continue
         if "gerbers" in line:
             pytest.importorskip("gerbonara")
-        command, given = parse(line) if "--install-completion" not in line else ("", {})
+        command, options = parse(line) if "--install-completion" not in line else ("", {})
         if command in WRITES_A_CASE:
             run_here(line, monkeypatch)
-        elif command in READS_A_CASE and given["case"] is not None:
-            read_case(Path(given["case"]), given["settings"] or [], True)
+        elif command in READS_A_CASE and options["case"] is not None:
+            read_case(Path(options["case"]), options["settings"] or [], True)
         elif command == "study":
-            assert read_points_of(Path(given["study"]), True, False).possible
+            assert read_points_of(Path(options["study"]), True, False).possible
 
 
 def is_known(line: str) -> bool:
-    """Whether another command is one whose files, targets or extras exist."""
+    """Return whether the files, targets or extras of another command exist."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    if found := re.fullmatch(r"make ([a-z-]+)", line):
-        return f"\n{found[1]}: " in (ROOT / "Makefile").read_text()
-    if found := re.fullmatch(r"pip install 'reflowshock\[(\w+)\]'", line):
-        return found[1] in extras
+    if match := re.fullmatch(r"make ([a-z-]+)", line):
+        return f"\n{match[1]}: " in (ROOT / "Makefile").read_text()
+    if match := re.fullmatch(r"pip install 'reflowshock\[(\w+)\]'", line):
+        return match[1] in extras
     if line.startswith("python -m "):
         return (ROOT / line.split()[2].replace("reflowshock.", "").replace(".", "/")).with_suffix(".py").exists()
-    if found := re.search(r"docs/install/\S+", line):
-        return (ROOT / found[0]).exists()
+    if match := re.search(r"docs/install/\S+", line):
+        return (ROOT / match[0]).exists()
     return line.startswith(KNOWN)
 
 
 def test_commands_of_readmes_are_taken():
-    """Each is parsed; where it names a case, the case takes its settings."""
+    """Each command is parsed, and the cases that it names accept its settings."""
     lines = {line: path for path, line in in_readmes()}
     assert len(lines) > 30
     for line, path in lines.items():
-        _, given = parse(line)
-        case = given.get("case")
+        _, options = parse(line)
+        case = options.get("case")
         if case is not None and str(case).startswith("cases/") and "/your/" not in line:
             try:
-                read_case(ROOT / case, given.get("settings") or [], True)
+                read_case(ROOT / case, options.get("settings") or [], True)
             except CaseError as error:
                 raise AssertionError(f"{path}: {line}") from error
 
@@ -113,7 +113,7 @@ def test_commands_of_a_page_run_as_written(page, scratch):
     for line in shown(page):
         if OURS.match(line) or line.startswith(("mkdir", "cp ", "python ")):
             if "--install-completion" in line:
-                continue  # it writes into the home of whoever runs the tests
+                continue  # it writes to the home folder
             done = subprocess.run(line, shell=True, env=environment, capture_output=True, text=True, check=False)
             assert done.returncode == 0, (line, done.stderr[-2000:])
 
@@ -121,7 +121,7 @@ def test_commands_of_a_page_run_as_written(page, scratch):
 @pytest.mark.long
 @pytest.mark.timeout(HOURS)
 def test_the_site_is_built_without_warnings(tmp_path):
-    """Links within the site are checked by this: one that leads nowhere is a warning."""
+    """A broken link within the site is a warning."""
     pytest.importorskip("furo", reason="the site's generator is not installed: make docs")
     options = ("--fail-on-warning", "--keep-going", "--quiet", "-c", "docs", "-d", str(tmp_path / "trees"))
     build = [sys.executable, "-m", "sphinx", *options, ".", str(tmp_path / "html")]

@@ -1,4 +1,4 @@
-"""Stages as jobs of a Slurm of one node, which the test starts; skipped, with the reason, where none can be started."""
+"""Stages as jobs of a Slurm cluster of one node, which the test starts; skipped with the reason if it cannot start."""
 
 import json
 import signal
@@ -17,15 +17,15 @@ from tests.support.workflow_command import wait_until
 
 STRUCTURE = Path(__file__).parent / "structure.toml"
 DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
-# Two ranks, few steps; the drop takes long enough to be broken off.
+# Two ranks and few steps; the drop takes long enough to be interrupted.
 SHORT = ("dynamics.ranks=2", "dynamics.solver=explicit", "dynamics.modes=0", "dynamics.duration=0.02 ms")
 LONG = ("drop.particles_per_edge=24",)
-TIMES = ("seconds", "per_second", "memory", "wall", "setup")  # in the names of metrics that no two runs share
+TIMES = ("seconds", "per_second", "memory", "wall", "setup")  # parts of the names of metrics that differ between runs
 
 
 @pytest.fixture(scope="module")
 def slurm(tmp_path_factory):
-    """A Slurm at work."""
+    """Yield a running Slurm cluster."""
     if find_spec(PLUGIN) is None:
         pytest.skip("no Slurm: Snakemake's plugin is not installed (pip install 'reflowshock[cluster]')")
     try:
@@ -46,17 +46,17 @@ def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
 
 
 def metrics(folder: Path) -> dict[str, object]:
-    found = json.loads((folder / "summary.json").read_text())["metrics"]
-    return {name: entry["value"] for name, entry in found.items() if not any(word in name for word in TIMES)}
+    metrics_by_name = json.loads((folder / "summary.json").read_text())["metrics"]
+    return {name: entry["value"] for name, entry in metrics_by_name.items() if not any(word in name for word in TIMES)}
 
 
 def at_work(folder: Path) -> bool:
-    """Whether a process of Snakemake or a stage works in the store of a run folder."""
+    """Return whether a process of Snakemake or a stage works in the store of a run folder."""
     return any(process.info["cwd"] == str(folder / ".store") for process in psutil.process_iter(["cwd"]))
 
 
 def stage_of(comment: str) -> str:
-    """Return the stage of a job; Snakemake's executor puts rule and product in the job's comment."""
+    """Return the stage of a job; the Snakemake executor writes rule and product in the comment of the job."""
     return comment.removeprefix("rule_").partition("_wildcards_")[0].removesuffix("_on_ranks")
 
 

@@ -64,7 +64,7 @@ SMALL_BAR = (
 
 
 def test_two_scales_of_a_bar_from_case_file_to_report(tmp_path):
-    """As the case, but narrower: waves are plane."""
+    """The case with a narrower bar, whose waves are plane."""
     result = command("run", "two_scale_bar", tmp_path, *SMALL_BAR)
     assert result.returncode == 0, result.stdout + result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -75,8 +75,8 @@ def test_two_scales_of_a_bar_from_case_file_to_report(tmp_path):
     result = json.loads((tmp_path / "shock" / "explicit" / "result.json").read_text())
     assert result["coupling"]["scheme"] == "local_steps" and result["model"]["substeps"] > 4
     page = (tmp_path / "report.html").read_text()
-    told = ("Two scales", "LTS-leapfrog", "Levels of time steps", "fine layers", "two-way")
-    assert all(words in page for words in told)
+    phrases = ("Two scales", "LTS-leapfrog", "Levels of time steps", "fine layers", "two-way")
+    assert all(words in page for words in phrases)
     plan = command("plan", "two_scale_bar", tmp_path, *SMALL_BAR).stdout
     assert "two models" in plan and "fine: section" in plan
 

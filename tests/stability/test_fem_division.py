@@ -1,4 +1,4 @@
-"""Divisions of hard shapes: the program's choice is stable, exact at tie and interface; what is neither is refused."""
+"""Hard divisions into macro and meso model: stable, exact at tie and interface, or rejected."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_meso_model_in_a_corner_touches_two_faces_and_an_edge():
     assert on_faces.any(axis=0).all()
     assert on_faces.all(axis=1).any()
     buffer = division.meso & scene[2].coarse
-    assert buffer.sum() == 3 * 3 * 2  # one facet of masters, and two layers around its nodes
+    assert buffer.sum() == 3 * 3 * 2  # one master facet and two layers around its nodes
 
 
 def test_meso_models_may_be_several_regions():
@@ -80,7 +80,7 @@ def test_points_a_little_outside_the_interface_are_tied_exactly(off):
     assert checked.interface_mass > 0.0
 
 
-def test_self_check_sees_a_weight_that_is_wrong():
+def test_self_check_detects_a_wrong_weight():
     models = models_of(append([board(), joint(0.5e-3, 0.5e-3)]), ELASTIC, Coupling(scheme="held_velocity"), 0.9)
     bodies = models.bodies()
     channels = InterfaceChannels.open(

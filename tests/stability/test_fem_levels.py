@@ -1,7 +1,7 @@
-"""Step levels must not grow: the largest eigenvalue of DT^2 M^-1 K_eff is at most 4, the smallest at least 0.
+"""Stability of step levels: the eigenvalues of DT^2 M^-1 K_eff lie between 0 and 4.
 
-K_eff is symmetric, so this is the spectral radius 1 of a step of leapfrog. On chains of random elements, whose levels
-change every few elements and whose steps are just those of their level, the rule for nu is tried against others.
+K_eff is symmetric, so a leapfrog step then has the spectral radius 1. On chains of random elements, whose levels
+change every few elements and whose steps are exactly the steps of their level, the rule for nu is compared with others.
 """
 
 import numpy as np
@@ -36,23 +36,23 @@ def chain_stiffness(levels: np.ndarray, stiffness: np.ndarray, chosen: int) -> n
 def chain_effective(
     levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], pace: Pace
 ) -> np.ndarray:
-    """Return K_eff of a chain by the substeps themselves, all columns at a time."""
+    """Return K_eff of a chain by executing the substeps for all columns."""
 
     def effective(number: int, around: float) -> np.ndarray:
-        own = chain_stiffness(levels, stiffness, number)
+        level_matrix = chain_stiffness(levels, stiffness, number)
         inner = around / ratios[number - 1] if number else around
-        matrix = own + (effective(number + 1, inner) if number < len(ratios) else 0.0)
+        matrix = level_matrix + (effective(number + 1, inner) if number < len(ratios) else 0.0)
         if number == 0:
             return matrix
         outer = np.zeros(ELEMENTS + 1, dtype=bool)
         outer[CELLS[levels < number]] = True
-        steps, place = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
-        change, total = np.zeros_like(place), np.zeros_like(place)
+        steps, displacement = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
+        change, total = np.zeros_like(displacement), np.zeros_like(displacement)
         for memory, rate, weight in zip(steps.memory, steps.rate, steps.weight, strict=True):
-            force = matrix @ place
+            force = matrix @ displacement
             total += weight * force
             change = memory * change - rate * around**2 * np.where(outer, 0.0, 1.0 / mass)[:, None] * force
-            place = place + change
+            displacement = displacement + change
         return total
 
     return effective(0, pace.window)
@@ -79,10 +79,10 @@ def extreme_eigenvalues(
 
 
 def grown(fraction: float, ratios: tuple[int, ...], damping: float = 0.0) -> int:
-    """Return how many of some random chains grow; damping half a step late needs z (1 + 2 damping) <= 4."""
+    """Return the number of unstable random chains; damping half a step late requires z (1 + 2 damping) <= 4."""
     random = np.random.default_rng(sum(ratios))
-    found = [extreme_eigenvalues(random, ratios, fraction, damping) for _ in range(SAMPLES)]
-    return sum(high * (1.0 + 2.0 * damping) > 4.0 or low < -4e-9 for low, high in found)
+    extremes = [extreme_eigenvalues(random, ratios, fraction, damping) for _ in range(SAMPLES)]
+    return sum(high * (1.0 + 2.0 * damping) > 4.0 or low < -4e-9 for low, high in extremes)
 
 
 @pytest.mark.parametrize("fraction", [0.5, 0.9, 0.95])
@@ -106,7 +106,7 @@ def test_chains_without_stabilisation_or_with_the_same_on_all_levels_do_grow(mon
 
 
 def of_impedance(ratio: float) -> Isotropic:
-    """Return solder as stiff and heavy as ``ratio`` times, with its wave speed."""
+    """Return solder with ``ratio`` times the stiffness and density, hence the same wave speed."""
     return Isotropic(
         density=ratio * SAC405.density, young_modulus=ratio * SAC405.young_modulus, poisson_ratio=SAC405.poisson_ratio
     )
@@ -132,18 +132,18 @@ def test_energy_stays_over_many_windows():
     body = model.body
     motion = ExplicitMotion(body, [], model.window, np.empty(0, np.int32), np.zeros(len(body.mass)))
     motion.launch(np.array([1.0, 0.5, -0.3]))
-    found = []
+    energies = []
     for _ in range(50):
-        found.append(motion.kinetic_energy() + motion.internal_energy().strain)
+        energies.append(motion.kinetic_energy() + motion.internal_energy().strain)
         for _ in range(200):
             motion.advance()
             motion.update_force()
-    assert np.ptp(found) <= 1e-10 * found[0]
+    assert np.ptp(energies) <= 1e-10 * energies[0]
 
 
 @pytest.mark.parametrize("damping", [0.006, 0.03])
-def test_damping_takes_the_energy_that_is_missing(damping):
-    """As strong as levels bear: the highest modes, to which it does most, must fall as well."""
+def test_damping_dissipates_the_missing_energy(damping):
+    """With the largest damping that levels permit, the highest modes, which it affects most, decay as well."""
     model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3), damping=damping)
     loads = [RayleighDamping.build(model.body, 0.0, damping * model.window)]
     motion = ExplicitMotion(model.body, loads, model.window, np.empty(0, np.int32), np.zeros(len(model.body.mass)))

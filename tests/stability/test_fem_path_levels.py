@@ -1,4 +1,4 @@
-"""Step levels along a path: no window grows, momentum is kept to round-off, solder flows as in one step for all."""
+"""Step levels of path-dependent elements: stability, momentum to round-off, plastic flow as with uniform steps."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ NESTED = {
     "high": Pair(6, 1.0, 2, height=6, thinnest=0.1),
     "stiff": Pair(3, 10.0, 2, height=6, thinnest=0.1, columns=4),
 }
-LAYERS = 2  # of elements that could take the larger step
+LAYERS = 2  # layers of elements that permit the larger step
 PACE = 4
 FRACTION = 0.9
 
@@ -39,19 +39,19 @@ def test_window_with_levels_does_not_grow(name):
 
 
 @pytest.mark.parametrize("name", NESTED)
-def test_window_with_levels_does_not_grow_where_it_has_turned_and_flows(name):
+def test_window_with_levels_is_stable_after_rotation_and_plastic_flow(name):
     coupled = flowing_pair(NESTED[name], SCHEMES["held_velocity, levels auto"])
     assert len(coupled.meso.motion.body.schedule) > 1
     assert coupled.spectral_radius() <= 1.0 + GROWTH
 
 
-def test_one_layer_is_as_good_as_two_that_just_take_the_larger_step():
+def test_one_layer_is_as_stable_as_two_at_their_critical_step():
     just = 0.5 * np.pi / FRACTION
     assert np.arccosh(opaque_ratio(FRACTION) * just) == pytest.approx(2.0 * np.arccosh(just), rel=1e-12)
 
 
 @pytest.mark.parametrize("ratio, grows", [(None, False), (0.0, True)], ids=["as divided", "one layer of any elements"])
-def test_one_layer_that_just_takes_the_larger_step_lets_a_resonance_through(monkeypatch, ratio, grows):
+def test_one_layer_at_its_critical_step_has_a_resonance(monkeypatch, ratio, grows):
     pair, held = Pair(3, 1.0, 8 / 3, height=6, thinnest=0.25), SCHEMES["held_velocity, levels auto"]
     if ratio is not None:
         monkeypatch.setattr(path_levels, "opaque_ratio", lambda _: ratio)
@@ -60,7 +60,7 @@ def test_one_layer_that_just_takes_the_larger_step_lets_a_resonance_through(monk
 
 
 def free_joint(pace: int) -> ExplicitMotion:
-    """Return the motion of a free joint on a piece of board whose elements act once in some steps where they can."""
+    """Return the motion of a free joint on a piece of board, with larger steps for elements that permit them."""
     mesh = joint_on_board(held=False)
     item = prepare(mesh, "dns")["dns"]
     materials = Materials(solder=SOLDER)
@@ -81,7 +81,7 @@ def free_joint(pace: int) -> ExplicitMotion:
 
 
 def thrown(pace: int, speed: float) -> ExplicitMotion:
-    """Return the same with a velocity that turns and strains it."""
+    """Return the motion with a velocity that rotates and strains the body."""
     motion = free_joint(pace)
     points = motion.body.local.points
     centred = points - points.mean(axis=0)
@@ -90,12 +90,12 @@ def thrown(pace: int, speed: float) -> ExplicitMotion:
 
 
 def momentum(motion: ExplicitMotion) -> np.ndarray:
-    """Return linear and angular momentum (6,) about the origin in the present configuration."""
-    place = motion.body.local.points + motion.displacement
-    return net_load(place, motion.body.mass[:, None] * motion.present_velocity())
+    """Return linear and angular momentum about the origin in the current configuration, shape (6,)."""
+    position = motion.body.local.points + motion.displacement
+    return net_load(position, motion.body.mass[:, None] * motion.present_velocity())
 
 
-def test_free_joint_that_flows_keeps_momentum_and_energy_and_flows_as_in_one_step_for_all():
+def test_free_plastic_joint_keeps_momentum_and_energy_and_matches_uniform_steps():
     ends, steps = {}, 1000
     for pace in (1, PACE):
         motion = thrown(pace, 30.0)
@@ -109,7 +109,7 @@ def test_free_joint_that_flows_keeps_momentum_and_energy_and_flows_as_in_one_ste
     assert ends[PACE] == pytest.approx(ends[1], rel=0.01)
 
 
-def test_restart_goes_on_with_the_same_bits():
+def test_restart_is_bitwise_identical():
     first, second = thrown(PACE, 3.0), free_joint(PACE)
     for _ in range(5):
         first.take_steps(PACE)

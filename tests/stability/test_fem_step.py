@@ -1,4 +1,4 @@
-"""Close below the critical step nothing grows in 1e5 steps; just above it the run is stopped, with its reason."""
+"""The critical step: stability over 1e5 steps just below it, a stop with its reason just above it."""
 
 import numpy as np
 import pytest
@@ -25,14 +25,14 @@ PUSH = np.array([0.6, 0.0, 0.8])
 
 
 def sandwich() -> MeshData:
-    """Return thin copper (aspect ratio 25) between layers of FR4, held at one end."""
+    """Return thin copper (aspect ratio 25) between layers of FR4, clamped at one end."""
     points, cells = grid([0.0, 0.5e-3, 1e-3], [0.0, 0.5e-3], [0.0, 0.25e-3, 0.27e-3, 0.52e-3])
     copper = np.abs(points[cells][:, :, 2].mean(axis=1) - 0.26e-3) < 1e-6
     return mesh_of(points, cells, np.where(copper, "copper", "board"), {"mounting_holes": on(0, 0.0)})
 
 
 def blocks() -> MeshData:
-    """Return a stiffness jump of 100: copper on something soft, free in space."""
+    """Return a free body with a stiffness jump of 100: copper on a soft block."""
     ticks = np.linspace(0.0, 1e-3, 3)
     points, cells = grid(ticks, ticks[:2], ticks)
     upper = points[cells][:, :, 2].mean(axis=1) > 0.5e-3
@@ -44,12 +44,12 @@ MESHES = {"sandwich": sandwich(), "blocks": blocks()}
 
 def estimates(name: str) -> tuple[Body, dict[str, float]]:
     body, element = dns_body(MESHES[name], materials=Materials(substrate=SOFT))
-    found = highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass)
-    return body, {"element": element, "power_iteration": found.critical_step}
+    estimate = highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass)
+    return body, {"element": element, "power_iteration": estimate.critical_step}
 
 
 def random_start(motion: ExplicitMotion) -> None:
-    """Put energy into all modes alike."""
+    """Excite all modes equally."""
     noise = np.random.default_rng(3).normal(size=motion.velocity.shape)
     motion.velocity[:] = np.where(motion.mobility > 0.0, noise * np.sqrt(motion.mobility), 0.0)
 
@@ -75,7 +75,7 @@ def test_energy_stays_for_1e5_steps_at_99_percent(name, estimate):
 
 
 def steps_until_stopped(body: Body, step: float, loads: list[Load], critical: float) -> tuple[int, str]:
-    """Take steps as a run does, with a look at the energies now and then; return when it was stopped, and why."""
+    """Step as a run does, with regular energy checks; return the step at which it was stopped, and the reason."""
     participant = SingleModel(explicit_motion(body, loads, step), WindowPlan(50 * step, 50, 20, 1))
     balance = EnergyBalance(limit=0.02, trivial=0.0, step=step, critical=critical)
     balance.judge(energy_sums(participant, 0.0), 0.0)
@@ -100,7 +100,7 @@ def test_step_5_percent_too_large_is_stopped_with_its_reason(name):
     assert steps_until_stopped(body, 0.99 * critical, push, critical)[0] > 1000
 
 
-def test_damping_lowers_the_critical_step_as_it_says():
+def test_damping_lowers_the_critical_step_as_predicted():
     body, steps = estimates("sandwich")
     critical = steps["power_iteration"]
     stiffness = 0.3 * critical

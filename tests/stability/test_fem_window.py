@@ -1,7 +1,7 @@
-"""The window of the two-scale scheme must not grow: spectral radii of the program's own operator, not movies.
+"""Stability of the two-scale window: spectral radii of the program's own operator.
 
 At 0.9 of the element step, with two layers of board between interface and joint, the radius is at most 1 + 1e-8; the
-naive scheme, fine elements at the interface, must be seen to fail by the same measure.
+naive scheme, with fine elements at the interface, must fail by the same measure.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ EDGE, PATCH = 2e-3, 1.5e-3
 
 
 def board(levels: np.ndarray, patch_bottom: float, edge: float = PATCH) -> MeshData:
-    """A block of board, 4 x 4 columns of 0.5 mm, held at its far side; the patch reaches down to ``patch_bottom``."""
+    """Return a block of board, 4 x 4 columns of 0.5 mm, clamped at its far side; the patch ends at ``patch_bottom``."""
     ticks = np.linspace(0, EDGE, 5)
     points, cells = grid(ticks, ticks, levels)
     centre = points[cells].mean(axis=1)
@@ -37,7 +37,7 @@ def board(levels: np.ndarray, patch_bottom: float, edge: float = PATCH) -> MeshD
 
 
 def with_joint(base: MeshData) -> MeshData:
-    """Add a joint with a lid: a box of solder between pads, free at its upper end."""
+    """Add a joint with a lid: a box of solder between pads with a free upper end."""
     joint = joint_mesh("A1", 0.5e-3, 0.5e-3, layers=2)
     facets = {name: quads for name, quads in joint.facets.items() if not name.startswith("head@")}
     return append([base, MeshData(joint.points, joint.cells, joint.part, joint.part_names, facets)])

@@ -1,8 +1,8 @@
-"""No window grows, whatever scheme the program may choose: amplification matrices of its own operators.
+"""Stability of the window for each scheme that the program can choose, by amplification matrices.
 
 A sample of the grid of benchmarks/coupling_stability.py: m up to 40, impedances a tenth to ten times the board's, mesh
-ratios up to 8, flat, distorted and curved interfaces, at the steps that the program chooses. The paper's scheme is
-measured beside them, and is seen to fail.
+ratios up to 8, flat, distorted and curved interfaces, at the steps that the program chooses. The published scheme
+is measured as well and is unstable.
 """
 
 import pytest
@@ -47,17 +47,17 @@ def test_scheme_as_printed_grows(sample):
 
 @pytest.mark.parametrize("scheme", ["held_velocity", pytest.param("impulse", marks=pytest.mark.long), "local_steps"])
 def test_energy_does_not_drift_over_many_windows(scheme):
-    """1e4 windows after the push, no damping; benchmarks/coupling_stability.py takes 1e5."""
+    """The test runs 1e4 windows after the push, without damping; benchmarks/coupling_stability.py runs 1e5."""
     coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[scheme])
     coupled.swing(PUSH)
     drift, interface = coupled.drift(windows=10_000, samples=200)
     assert drift <= 1e-3
-    assert interface <= 1e-2  # of three elements across the wave; of second order in the window
+    assert interface <= 1e-2  # for three elements across the wave; of second order in the window
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_momentum_of_a_free_pair(scheme):
-    """Kept by local steps and impulses; by the others, whose forces act in each model's own steps, to second order."""
+    """Local steps and impulses conserve momentum; the other schemes conserve it to second order."""
     errors = [momentum_error(SCHEMES[scheme], fraction) for fraction in (0.9, 0.45)]
     if scheme.startswith(("local_steps", "impulse")):
         assert max(errors) <= 1e-10

@@ -1,4 +1,4 @@
-"""Shapes, arrays and warpages that break a sweep: each keeps its volume, upright elements and its place."""
+"""Shapes, arrays and warpages that break sweeps: volume, positive Jacobians and position."""
 
 import pytest
 from hypothesis import example, given, settings
@@ -26,7 +26,7 @@ HARD = {
 
 
 def quality_of(corner=0.0, bulge=0.0, lower=0.24 * MM, upper=0.24 * MM, offset=0.0):
-    """Mesh the corner joint of the small package in a shape of its own, as high as the package is over its head."""
+    """Mesh the corner joint of the small package with the given shape and its standoff."""
     return joint_quality(mesh_warped(corner, bulge, (lower, upper), offset).mesh)
 
 
@@ -64,7 +64,7 @@ def test_random_joints(shape, corner):
 
 
 def write_whole(folder, the_package, the_board, warpage):
-    """Mesh assembly and joints; return their element counts."""
+    """Mesh assembly and joints and return their element counts."""
     counts = write_assembly(the_package, the_board, folder / "assembly.msh")
     meshes = [
         mesh_joint(barrel(site.gap, 0.02 * MM), site, the_package, side_of(warpage, the_package))
@@ -106,7 +106,7 @@ def test_single_layers_everywhere(tmp_path):
 
 @st.composite
 def assemblies(draw):
-    """A package and a board that may or may not fit each other."""
+    """Draw a package and a board that may not fit each other."""
     side, hole = draw(st.floats(4.2, 9.0)) * MM, draw(st.floats(0.8, 4.0)) * MM
     layer = {"length": side, "width": 5 * MM, "thickness": 0.4 * MM}
     the_package = package(substrate=layer, die=layer | {"length": draw(st.floats(0.2, 1.0)) * side})
@@ -133,7 +133,7 @@ def test_more_random_assemblies_are_refused_or_upright(tmp_path_factory, paramet
 
 
 def check_assembly(tmp_path_factory, parameters):
-    """Assert that an assembly is refused, or meshed with as many elements as was said."""
+    """Assert that an assembly is rejected or meshed with the estimated number of elements."""
     the_package, the_board = parameters
     if problems(the_package, the_board, Warpage()):
         return

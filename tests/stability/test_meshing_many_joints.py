@@ -1,4 +1,4 @@
-"""Every tenth of two hundred joints (all: benchmarks/remeshing.py): meshed within the bars, or refused by reason."""
+"""Every tenth of two hundred joints: meshed within limits or rejected with a reason (all: benchmarks/remeshing.py)."""
 
 import numpy as np
 import pytest
@@ -19,20 +19,22 @@ def outcomes():
 
 def test_there_are_two_hundred_of_all_kinds(outcomes):
     assert sum(COUNTS.values()) == 200
-    assert {one["kind"] for one in outcomes} == set(COUNTS)
+    assert {record["kind"] for record in outcomes} == set(COUNTS)
 
 
-def test_none_passes_that_misses_its_bars(outcomes):
-    for one in outcomes:
-        if one["method"] == "refused":
-            assert one["reason"].startswith("joint A1")
+def test_meshed_joints_are_within_the_limits(outcomes):
+    for record in outcomes:
+        if record["method"] == "refused":
+            assert record["reason"].startswith("joint A1")
             continue
-        assert max(one[name] for name in ("volume_error", "standoff_error", "contact_area_error")) <= LARGEST_ERROR, one
-        assert one["scaled_jacobian"] >= SMALLEST_JACOBIAN, one
+        assert (
+            max(record[name] for name in ("volume_error", "standoff_error", "contact_area_error")) <= LARGEST_ERROR
+        ), record
+        assert record["scaled_jacobian"] >= SMALLEST_JACOBIAN, record
 
 
-def test_what_can_be_swept_is_swept_and_the_rest_is_filled(outcomes):
-    method = {one["kind"]: one["method"] for one in outcomes}
+def test_sweepable_joints_are_swept_and_the_rest_is_filled(outcomes):
+    method = {record["kind"]: record["method"] for record in outcomes}
     swept = {"barrel", "hourglass", "shifted", "tilted", "overflow", "lobed"}
     assert method == {kind: "swept" if kind in swept else "free-form" for kind in COUNTS}
 

@@ -1,4 +1,4 @@
-"""The hard cases of the reflow: none blows up, loses volume or stops short of its exact shape."""
+"""Hard reflow cases: stability, volume and the exact shape at rest."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def check(flow, run, exact, tolerance):
 
 
 @pytest.mark.parametrize(("degrees", "count"), [pytest.param(5.0, 6, marks=pytest.mark.long), (175.0, 7)])
-def test_a_film_and_a_ball_that_hardly_touches(degrees, count):
+def test_a_film_and_a_barely_touching_ball(degrees, count):
     angle = np.radians(degrees)
     angles = {"pad_contact_angle": angle, "mask_contact_angle": np.radians(179.0)}
     flow, run = solve_drop(Solder(volume=VOLUME, effects=WEIGHTLESS, numerics=NUMERICS, **angles), count)
@@ -43,7 +43,7 @@ def test_bond_number_five(degrees):
 
 
 def test_the_smallest_volume_covers_its_pad():
-    """0.0141 mm^3 on a pad of 0.3 mm radius: V = pi h (3 a^2 + h^2) / 6 gives the height of the cap."""
+    """With 0.0141 mm^3 on a pad of 0.3 mm radius, V = pi h (3 a^2 + h^2) / 6 gives the height of the cap."""
     volume, radius = 0.0141e-9, 0.3e-3
     _, run = solve_drop(Solder(volume=volume, effects=WEIGHTLESS, numerics=NUMERICS), 7, pad_radius=radius)
     roots = np.roots([1.0, 0.0, 3.0 * radius**2, -6.0 * volume / np.pi])
@@ -67,7 +67,7 @@ def test_thin_and_thick_liquids(viscosity, inertia):
 
 
 def test_a_jittered_lattice():
-    """Every particle of the cube displaced at random by 0.2 spacings, on the wall within it."""
+    """All particles are displaced at random by 0.2 spacings, those on the wall within the wall."""
     cloud, angle = box_cloud(np.cbrt(VOLUME), 7), np.radians(60.0)
     jitter = 0.2 * cloud.spacing * np.random.default_rng(5).normal(size=cloud.points.shape)
     cloud = replace(cloud, points=cloud.points + slide(cloud.plates, cloud.wall, jitter))

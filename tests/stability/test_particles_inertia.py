@@ -1,6 +1,6 @@
-"""Drops on a wall with inertia from a violent start, a cube: they come to rest as the cap, at any viscosity.
+"""Drops with inertia that start as cubes on a wall and come to rest as caps, at any viscosity.
 
-What is long here has its like in `cases/hard`, where each file's first case is not.
+The long tests have counterparts in ``cases/hard``, where the first case of each file is short.
 """
 
 import numpy as np
@@ -15,13 +15,13 @@ EDGE = 1e-3
 
 
 def spread(per_edge, degrees=60.0, end=0.1, **values):
-    """The metrics of a drop at rest or at the end of the process, and its potential and kinetic energy at each step."""
+    """Return the metrics of the final drop and its potential and kinetic energy at each step."""
     numerics = SolderNumerics(time_step_limit=100, max_steps=1000, spacing=EDGE / (per_edge - 1))
     effects = SolderEffects(inertia="on", viscosity="on", gravity="off")
     angle = np.radians(degrees)
-    given = PAPER | values
+    parameters = PAPER | values
     solder = Solder(
-        volume=EDGE**3, pad_contact_angle=angle, process_time=end, effects=effects, numerics=numerics, **given
+        volume=EDGE**3, pad_contact_angle=angle, process_time=end, effects=effects, numerics=numerics, **parameters
     )
     flow, run = solve_drop(solder, per_edge)
     assert np.isfinite(flow.body.points).all()
@@ -33,7 +33,7 @@ def spread(per_edge, degrees=60.0, end=0.1, **values):
 @pytest.mark.long
 @pytest.mark.parametrize("degrees", [pytest.param(30, marks=pytest.mark.long), 120])
 def test_a_drop_comes_to_rest_as_the_cap(degrees):
-    """The values of Hu et al. at 100 times the capillary limit, 125 particles."""
+    """The drop has the values of Hu et al., 125 particles and steps of 100 times the capillary limit."""
     metrics, energy = spread(5, degrees)
     assert abs(metrics["height_error"]) < 0.015
     assert abs(metrics["max_width_error"]) < 0.005
@@ -43,7 +43,7 @@ def test_a_drop_comes_to_rest_as_the_cap(degrees):
 
 @pytest.mark.parametrize("viscosity", [pytest.param(1e-3, marks=pytest.mark.long), 10.0])
 def test_thin_and_thick_liquids(viscosity):
-    """At the least viscosity the drop still swings when the process ends."""
+    """At the lowest viscosity the drop still oscillates when the process ends."""
     metrics, energy = spread(5, viscosity=viscosity, end=2.5e-3)
     assert metrics["volume_drift"] < 1e-6
     assert energy.max() == energy[0]
@@ -51,7 +51,7 @@ def test_thin_and_thick_liquids(viscosity):
 
 @pytest.mark.long
 @pytest.mark.parametrize("wall", [{"wall": "no-slip"}, {"wall": "slip", "slip_length": 5e-5}])
-def test_walls_that_hold_the_liquid_do_not_change_the_rest(wall):
+def test_no_slip_walls_do_not_change_the_shape_at_rest(wall):
     metrics, _ = spread(5, **wall)
     assert abs(metrics["height_error"]) < 0.015
     assert abs(metrics["max_width_error"]) < 0.005

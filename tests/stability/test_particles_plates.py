@@ -1,4 +1,4 @@
-"""Plates that move far: the joint follows, keeps its volume and its Young-Laplace shape."""
+"""Large plate motions: the joint follows with its volume and its Young-Laplace shape."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def check(shape, gap, tolerance):
 
 
 def test_gap_squeezed_by_40_percent_in_10_steps():
-    """From a pinned barrel over the edges of the pads onto the mask."""
+    """The pinned barrel spreads over the edges of the pads onto the mask."""
     gaps = 0.31e-3 * np.linspace(1.0, 0.6, 11)
     shapes = follow(gaps)
     assert len(shapes) == len(gaps)

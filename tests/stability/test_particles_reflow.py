@@ -1,4 +1,4 @@
-"""Hard reflows: they must end at rest, with the volume kept and the energy falling, and say what happened."""
+"""Hard reflow cases: rest, conserved volume, decreasing energy and the reported outcome."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_extreme_joints(gap, board, package, volume, verdict):
 @pytest.mark.parametrize("limit", [5.0, pytest.param(20.0, marks=pytest.mark.long), 100.0])
 @pytest.mark.parametrize("spacing", [1e-4, 5e-5])
 def test_time_steps_far_beyond_the_capillary_limit(limit, spacing):
-    """An explicit surface tension breaks at 4 times the limit."""
+    """Explicit surface tension is unstable at 4 times the limit."""
     numerics = SolderNumerics(spacing=spacing, time_step_limit=limit)
     shape = solve_joint(JointGeometry(0.31e-3, RADIUS, RADIUS), Solder(volume=BALL, numerics=numerics))
     check(shape, "ok")
@@ -68,7 +68,7 @@ def test_a_joint_without_equilibrium_opens():
     assert shape.verdict == "open"
     value = {name: number for name, (number, _) in shape.metrics.items()}
     assert value["volume_board"] + value["volume_package"] == pytest.approx(solder.volume, rel=1e-9)
-    for plate in ("board", "package"):  # a cap on each pad; gravity changes its height by 0.3 %
+    for plate in ("board", "package"):  # one cap per pad; gravity changes its height by 0.3 %
         part = solder.model_copy(update={"volume": value[f"volume_{plate}"]})
         assert value[f"drop_height_{plate}"] == pytest.approx(reference_drop(part, RADIUS, 0.0).height, rel=1e-2)
     middle = 0.5 * gap
@@ -91,7 +91,7 @@ def test_too_little_solder_for_any_neck_stays_on_the_board_and_is_open():
 
 @pytest.mark.parametrize("properties", ["physical", pytest.param("paper", marks=pytest.mark.long)])
 def test_inertia_never_gains_energy(properties):
-    """With inertia and no viscosity from a violent start: the energy falls, that of the motion included."""
+    """Without viscosity and from a cube, the total of kinetic and potential energy decreases."""
     values = {"physical": {}, "paper": {"surface_tension": 4.985, "viscosity": 0.227}}[properties]
     numerics = SolderNumerics(spacing=1e-4, time_step_limit=5)
     solder = Solder(volume=BALL, numerics=numerics, effects=SolderEffects(inertia="on"), **values)
@@ -113,7 +113,7 @@ def test_inertia_never_gains_energy(properties):
 @pytest.mark.long
 @pytest.mark.parametrize("degrees", [30, 148])
 def test_extreme_contact_angles(degrees):
-    """A cube that spreads to a film of a third of its height, and one that almost rolls off its wall."""
+    """One cube spreads to a film of a third of its height, the other almost detaches from its wall."""
     numerics = SolderNumerics(time_step_limit=100)
     flow, run = solve_drop(Solder(volume=1e-9, pad_contact_angle=np.radians(degrees), numerics=numerics), 7)
     check_energy_falls(np.array([record.energy for record in run.records]))

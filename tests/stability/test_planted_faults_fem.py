@@ -1,4 +1,4 @@
-"""Faults planted in elements, steps and coupling are missed by none: hard cases keep their bounds only without them."""
+"""Detection of planted faults in elements, steps and coupling by the limits of the hard cases."""
 
 import pytest
 
@@ -17,12 +17,12 @@ def hard_case(name: str, tried: str) -> HardCase:
 
 
 def flipped(add):
-    """Return a force term's method with the other sign."""
+    """Return the method of a force term with the opposite sign."""
 
     def wrong(self, displacement, force):
-        own = 0.0 * force
-        add(self, displacement, own)
-        force -= own
+        contribution = 0.0 * force
+        add(self, displacement, contribution)
+        force -= contribution
 
     return wrong
 

@@ -1,4 +1,4 @@
-"""Faults that are planted into reflow and remesh: hard cases must miss them by the bounds that hold without."""
+"""Detection of planted faults in reflow and remeshing by the limits of the hard cases."""
 
 from dataclasses import replace
 
@@ -15,9 +15,9 @@ from reflowshock.particles.steps.inertial_step import InertialFlow
 
 
 def flip(patch, owner, name):
-    """Let a method return its result with the other sign."""
+    """Make a method return its result with the opposite sign."""
     whole = getattr(owner, name)
-    patch.setattr(owner, name, lambda *given: -whole(*given))
+    patch.setattr(owner, name, lambda *arguments: -whole(*arguments))
 
 
 def double_step(patch):
@@ -26,7 +26,7 @@ def double_step(patch):
 
 
 def flip_shear(patch):
-    """A joint's head moves away from a warped package, not towards it."""
+    """Move the head of a joint away from a warped package instead of towards it."""
     whole = JointPlace.rise
     patch.setattr(JointPlace, "rise", lambda self, points: -whole(self, points))
 
@@ -36,7 +36,7 @@ def forget_volume(patch):
 
 
 def forget_check(patch):
-    patch.setattr(user_surface, "check_triangulation", lambda *given: None)
+    patch.setattr(user_surface, "check_triangulation", lambda *arguments: None)
 
 
 FAULTS = [
@@ -56,7 +56,7 @@ IDS = ["wall adhesion", "gravity", "step", "head", "volume", "normals"]
 
 
 @pytest.mark.parametrize(("name", "tried", "fault"), FAULTS, ids=IDS)
-def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
+def test_planted_fault_is_detected(name, tried, fault, monkeypatch):
     (case,) = (case for case in read_hard_cases(HARD / f"{name}.toml") if case.tried == tried)
     assert attempt(case).ok
     fault(monkeypatch)
@@ -64,8 +64,8 @@ def test_a_planted_fault_is_a_miss(name, tried, fault, monkeypatch):
     assert not verdict.ok, verdict.checks
 
 
-def test_a_run_that_fails_is_told_in_its_own_words():
+def test_failed_run_reports_its_own_message():
     (case,) = read_hard_cases(HARD / "reflow_run.toml")
-    given = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
-    verdict = attempt(replace(case, parameters=given))
+    parameters = case.parameters.model_copy(update={"settings": {"drop": {"particles_per_edge": 1}}})
+    verdict = attempt(replace(case, parameters=parameters))
     assert "drop.particles_per_edge = 1: is out of range" in verdict.message, verdict

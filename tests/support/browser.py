@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by the DevTools protocol over a pipe: pages are opened, clicked and looked at."""
+"""Headless Chromium, driven by the DevTools protocol over a pipe."""
 
 import base64
 import json
@@ -19,7 +19,7 @@ FLAGS = (
 
 
 class Browser:
-    """A page in a browser of its own, with all that it has asked for and all errors that it has told."""
+    """Browser with one page, with the requests and errors of that page."""
 
     def __init__(self, width: int = 1300, height: int = 900) -> None:
         """Start a browser with an empty page of a size."""
@@ -52,11 +52,11 @@ class Browser:
         shutil.rmtree(self._profile, ignore_errors=True)
 
     def resize(self, width: int, height: int) -> None:
-        """Give the page a size."""
+        """Set the size of the page."""
         self._ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def open(self, path: Path) -> float:
-        """Open a report; return after how many seconds everything is drawn."""
+        """Open a report; return the seconds until everything is drawn."""
         started = time.monotonic()
         self._ask("Page.navigate", url=path.resolve().as_uri())
         self.wait('document.documentElement?.dataset.ready === "yes"')
@@ -70,13 +70,13 @@ class Browser:
             time.sleep(0.1)
 
     def value(self, expression: str) -> Any:
-        """Return what a JavaScript expression, or its promise, gives."""
-        found = self._ask("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
-        assert "exceptionDetails" not in found, found["exceptionDetails"]
-        return found["result"].get("value")
+        """Return the value of a JavaScript expression or of its promise."""
+        answer = self._ask("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Press the left button at a place of the window, move and release it at another."""
+        """Drag with the left button between two points of the window."""
         for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
             self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
@@ -111,12 +111,12 @@ class Browser:
         return json.loads(message)
 
     def _heed(self, event: dict) -> None:
-        told = event.get("params", {})
+        parameters = event.get("params", {})
         if event.get("method") == "Network.requestWillBeSent":
-            self.requests.append(told["request"]["url"][:200])
+            self.requests.append(parameters["request"]["url"][:200])
         elif event.get("method") == "Runtime.exceptionThrown":
-            self.errors.append(json.dumps(told["exceptionDetails"])[:600])
-        elif event.get("method") == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-            self.errors.append(told["entry"]["text"])
-        elif event.get("method") == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning", "assert"):
-            self.errors.append(json.dumps(told["args"])[:600])
+            self.errors.append(json.dumps(parameters["exceptionDetails"])[:600])
+        elif event.get("method") == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
+            self.errors.append(parameters["entry"]["text"])
+        elif event.get("method") == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning", "assert"):
+            self.errors.append(json.dumps(parameters["args"])[:600])

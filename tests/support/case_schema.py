@@ -1,4 +1,4 @@
-"""Case files against the JSON schema, which one test of the command line checks itself."""
+"""Validation of case files against the JSON schema."""
 
 import tomllib
 from functools import cache
@@ -15,5 +15,5 @@ def _validator() -> jsonschema.Draft202012Validator:
 
 
 def validate(table: Path | dict) -> None:
-    """Raise a ValidationError for a case file, or its table, that the schema refuses."""
+    """Raise a ValidationError if the schema rejects a case file or its table."""
     _validator().validate(tomllib.loads(table.read_text()) if isinstance(table, Path) else table)

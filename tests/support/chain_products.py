@@ -1,4 +1,4 @@
-"""Products of the full chain, made up: a structure that has bowed, identical joints, stresses at the package's pads."""
+"""Synthetic products of the full chain: a bowed structure, identical joints, stresses at the package pads."""
 
 import json
 import shutil
@@ -8,16 +8,16 @@ import numpy as np
 
 MILLI, MICRO = 1e-3, 1e-6
 STEPS = np.array([298.15, 380.0, 450.0, 490.15])  # K
-BOW = {"board": 12 * MICRO, "package": 70 * MICRO}  # over the corner, at the last step
+BOW = {"board": 12 * MICRO, "package": 70 * MICRO}  # at the corner, in the last step
 
 
 def bowed_structure(names: list[str], x: np.ndarray, y: np.ndarray, half: float = 5.5 * MILLI) -> dict[str, np.ndarray]:
-    """Return what a reflow leaves of a structure: the underside of a package and the board's top face, as paraboloids.
+    """Return the products of a reflow: package underside and top face of the board as paraboloids.
 
     Args:
-        names: of the joints.
-        x, y: their places [m].
-        half: half the length of the package [m]; a quarter of it is modelled.
+        names: Names of the joints.
+        x, y: Positions of the joints [m].
+        half: Half the length of the package [m]; a quarter of it is modelled.
     """
     step = 0.5 * MILLI
     lines = {"package": np.arange(0.0, half + 0.1 * step, step), "board": np.arange(0.0, 3 * half, step)}
@@ -47,14 +47,14 @@ def _lift(part: str, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
 def interface(
     names: list[str], x: np.ndarray, y: np.ndarray, times: np.ndarray, factor: float = 1.0
 ) -> dict[str, np.ndarray]:
-    """Return stresses [Pa] on the package's pads of joints at ``x``, ``y`` [m]: 16 faces each, more outwards."""
+    """Return stresses [Pa] on the package pads of joints at ``x``, ``y`` [m]: 16 faces each, increasing outwards."""
     line = np.linspace(-0.17 * MILLI, 0.17 * MILLI, 5)
     grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
     corner = np.arange(25).reshape(5, 5)
     quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
     arrays: dict[str, np.ndarray] = {"times": times}
-    for name, place in zip(names, np.column_stack([x, y]), strict=True):
-        points = np.column_stack([grid + place, np.full(25, 0.4 * MILLI)])
+    for name, position in zip(names, np.column_stack([x, y]), strict=True):
+        points = np.column_stack([grid + position, np.full(25, 0.4 * MILLI)])
         middle = points[quads].mean(axis=1)
         stress = factor * 2e6 * (middle[:, 0] + middle[:, 1]) / MILLI
         arrays |= {f"points@{name}": points, f"quads@{name}": quads}
@@ -63,7 +63,7 @@ def interface(
 
 
 def add_chain(run: Path) -> None:
-    """Add to a run that has dropped a package what the full chain would have left beside."""
+    """Add the products of the full chain to a run that has dropped a package."""
     pads = json.loads((run / "reflow/pads.json").read_text())
     names = [pad["name"] for pad in pads]
     x, y = (np.array([pad[axis] for pad in pads]) for axis in "xy")

@@ -1,4 +1,4 @@
-"""Command lines as the program's own parser reads them, without running them."""
+"""Parsing of command lines by the program's own parser, without running them."""
 
 import shlex
 from collections.abc import Mapping
@@ -11,13 +11,13 @@ from reflowshock.workflow import cli
 
 
 def commands() -> Mapping[str, Any]:
-    """Return the commands that a user sees, by name."""
+    """Return the visible commands by name."""
     group = typer.main.get_command(cli.app)
-    return {name: found for name, found in group.commands.items() if not found.hidden}
+    return {name: command for name, command in group.commands.items() if not command.hidden}
 
 
 def parse(line: str) -> tuple[str, dict]:
-    """Return command and parameters of a line "reflowshock COMMAND ..."; a line that cannot be parsed raises."""
+    """Return command and parameters of a line "reflowshock COMMAND ..."; raise an error if parsing fails."""
     program, command, *arguments = takewhile(lambda word: word not in ">|", shlex.split(line, comments=True))
     assert program.rpartition("/")[2] == "reflowshock", line
     context = commands()[command].make_context(command, arguments)

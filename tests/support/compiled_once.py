@@ -1,6 +1,6 @@
-"""Kernels are compiled by the first of all processes that needs them; the others wait and load what it has kept.
+"""Kernel compilation by the first process that needs a kernel; the others wait and load it from the cache.
 
-Workers that begin together, and ranks that start together, need the same ones: each would compile them all.
+Workers and ranks that start together need the same kernels; without this each would compile all of them.
 """
 
 import fcntl
@@ -14,9 +14,9 @@ _held: Counter[Path] = Counter()
 
 
 def compile_once() -> None:
-    """Let this process, and those that are forked from it, look again for a kernel when another has compiled it.
+    """Let this process and its forks look for a cached kernel again after another process has compiled it.
 
-    A kernel waits for those that it calls, which do not call it: processes never wait for each other in a circle.
+    A kernel waits only for kernels that it calls, and these do not call it: waiting processes cannot form a circle.
     """
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher
@@ -38,7 +38,7 @@ def compile_once() -> None:
 
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Hold a lock, once however often it is asked for."""
+    """Hold a lock exclusively, once for nested requests."""
     _held[path] += 1
     path.parent.mkdir(parents=True, exist_ok=True)
     lock = os.open(path, os.O_RDWR | os.O_CREAT)

@@ -1,4 +1,4 @@
-"""Drops on a wall or pad from their solder."""
+"""Drops on a wall or pad."""
 
 from math import isfinite
 
@@ -10,7 +10,7 @@ from reflowshock.particles.steps.rest import Run
 
 
 def solve_drop(solder: Solder, count: int, pad_radius: float = float("inf")) -> tuple[LiquidFlow, Run]:
-    """The flow at rest of a cube with `count` particles along an edge, on a pad or a uniform wall, and its run."""
+    """Return the flow at rest of a cube with ``count`` particles per edge on a pad or a uniform wall, and its run."""
     drop = Drop(
         volume=solder.volume,
         contact_angle=solder.pad_contact_angle,

@@ -1,6 +1,6 @@
-"""One board written in every format that is read: a 10 x 10 array at 0.8 mm, turned, off the middle, beside a coil.
+"""One board in every ECAD format: a rotated 10 x 10 array at 0.8 mm, off the centre, next to a coil.
 
-Places are in mm, y up, the board's lower left corner at (0, 0).
+Positions are in mm, y up, with the lower left corner of the board at (0, 0).
 """
 
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 from reflowshock.meshing.board.pads import joint_name
 
 LENGTH, WIDTH, THICKNESS = 80.0, 60.0, 1.55
-CENTRE = (45.0, 33.0)  # of the array
+CENTRE = (45.0, 33.0)  # centre of the array
 PITCH, PAD, OPENING = 0.8, 0.36, 0.46
 HOLES = tuple((x, y) for x in (4.0, 76.0) for y in (4.0, 56.0))
 HOLE = 3.2
@@ -20,19 +20,19 @@ NAMES = {joint_name(row, column): (row, column) for row in range(10) for column 
 
 
 def pads(quarter_turns: int = 0) -> dict[str, tuple[float, float]]:
-    """Return where the pads of U8 are, turned counterclockwise about its centre."""
-    found = {}
+    """Return the pad positions of U8, rotated counterclockwise about its centre."""
+    pad_lines = {}
     for name, (row, column) in NAMES.items():
         if name not in MISSING:
             x, y = (column - 4.5) * PITCH, (4.5 - row) * PITCH
             for _ in range(quarter_turns):
                 x, y = -y, x
-            found[name] = (CENTRE[0] + x, CENTRE[1] + y)
-    return found
+            pad_lines[name] = (CENTRE[0] + x, CENTRE[1] + y)
+    return pad_lines
 
 
 def kicad(path: Path, quarter_turns: int = 0, extra: str = "") -> Path:
-    """Write the board as KiCad 8 does; its y axis points down, footprints turn as they are seen."""
+    """Write the board as KiCad 8 does, with its y axis down and clockwise footprint rotation."""
     balls = "\n".join(
         f'(pad "{name}" smd circle (at {(column - 4.5) * PITCH:.6f} {(row - 4.5) * PITCH:.6f} {90 * quarter_turns})'
         f' (size {PAD} {PAD}) (layers "F.Cu" "F.Mask") (solder_mask_margin {0.5 * (OPENING - PAD)}))'
@@ -65,7 +65,7 @@ def kicad(path: Path, quarter_turns: int = 0, extra: str = "") -> Path:
 
 
 def gerber(folder: Path) -> Path:
-    """Write the board as Gerber X2, a drill file and a job file; the array is not turned."""
+    """Write the board as Gerber X2, a drill file and a job file; the array is not rotated."""
     folder.mkdir(exist_ok=True)
 
     def layer(function: str, body: str, aperture: float) -> str:
@@ -135,7 +135,7 @@ def ipc2581(path: Path, quarter_turns: int = 0) -> Path:
 
 
 def table(path: Path) -> Path:
-    """Write the board as a table; some lengths in micrometres."""
+    """Write the board as a table with some lengths in micrometres."""
     rows = ["kind,reference,pin,x [mm],y [mm],diameter [um],mask_opening [mm]"]
     rows += [f"outline,,,{x},{y},," for x, y in ((0, 0), (LENGTH, 0), (LENGTH, WIDTH), (0, WIDTH))]
     rows += [f"hole,,,{x},{y},{1e3 * HOLE:.0f}," for x, y in HOLES]

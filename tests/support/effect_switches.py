@@ -1,4 +1,4 @@
-"""Scenes with one effect on or off, and what a piece of work calls: for the tests of the registry of effects."""
+"""Scenes with one effect on or off, and a call counter, for the tests of the registry of effects."""
 
 import sys
 from collections import Counter
@@ -35,7 +35,7 @@ RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "ine
 RHEOLOGY = "tests/unit/particles/test_rheology.py"
 FREEZING = "tests/unit/particles/test_freezing.py"
 FLOWS, DROPLETS = (f"tests/verification/test_particles_{name}.py" for name in ("flows", "droplets"))
-# What needs a whole run is tested where there is one.
+# Effects that need a whole run are tested in tests that have one.
 ELSEWHERE_OFF = {
     "identical_joints": "tests/pipeline/test_pipeline.py::test_the_whole_path",
     "flow_viscosity": f"{FLOWS}::test_a_term_that_is_off_is_not_computed",
@@ -46,11 +46,11 @@ ELSEWHERE_OFF = {
     "freezing": f"{FREEZING}::test_light_cures_what_does_not_freeze",
 }
 ELSEWHERE_ON = {
-    "flow_viscosity": f"{FLOWS}::test_viscosity_that_is_left_out_changes_nothing",
-    "artificial_viscosity": f"{FLOWS}::test_little_artificial_viscosity_does_little",
+    "flow_viscosity": f"{FLOWS}::test_neglected_viscosity_changes_nothing",
+    "artificial_viscosity": f"{FLOWS}::test_small_artificial_viscosity_changes_little",
     "shear_dependent_viscosity": f"{RHEOLOGY}::test_an_exponent_of_one_computes_what_constant_viscosity_does",
-    "droplet_tension": f"{DROPLETS}::test_little_tension_does_little",
-    "droplet_gravity": f"{DROPLETS}::test_little_weight_does_little",
+    "droplet_tension": f"{DROPLETS}::test_small_tension_changes_little",
+    "droplet_gravity": f"{DROPLETS}::test_small_weight_changes_little",
     "freezing": f"{FREEZING}::test_little_freezing_does_little",
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
     "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
@@ -58,42 +58,44 @@ ELSEWHERE_ON = {
     "coarse_joints": "tests/pipeline/test_fine_joints.py::test_the_fine_joint_agrees_with_the_dns",
     "identical_joints": "tests/pipeline/test_identical_joints.py::test_what_the_shapes_change_is_told",
     "large_mass": "tests/mpi/test_fem_shock_methods.py::test_large_mass_at_the_holes_is_direct_acceleration",
-    "symmetry": "tests/verification/test_fem_thermal_symmetry.py::test_a_quarter_stands_for_the_whole",
+    "symmetry": "tests/verification/test_fem_thermal_symmetry.py::test_quarter_model_equals_full_model",
 }
 
 
 def calls(work: Callable[[], object]) -> Counter:
-    """Return how often each Python function is called, and how often compiled ones are, by a piece of work."""
-    found: Counter = Counter()
+    """Return the number of calls of each Python and compiled function in a piece of work."""
+    counter: Counter = Counter()
 
     def count(frame, event: str, argument) -> None:
         if event == "call":
-            found[(frame.f_globals.get("__name__", ""), frame.f_code.co_qualname)] += 1
+            counter[(frame.f_globals.get("__name__", ""), frame.f_code.co_qualname)] += 1
         elif event == "c_call":
-            found[("", getattr(argument, "__qualname__", ""))] += 1
+            counter[("", getattr(argument, "__qualname__", ""))] += 1
 
     sys.setprofile(count)
     try:
         work()
     finally:
         sys.setprofile(None)
-    return found
+    return counter
 
 
-def enters(found: Counter, place: str) -> bool:
-    """Whether any method of a class, or a function, was called, given by its dotted name."""
-    module, _, name = place.rpartition(".")
-    return any(at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in found)
+def enters(counted_calls: Counter, dotted_name: str) -> bool:
+    """Return whether a function, or any method of a class, was called, from its dotted name."""
+    module, _, name = dotted_name.rpartition(".")
+    return any(
+        at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in counted_calls
+    )
 
 
 def flow_with(acting: Mapping[str, bool], count: int = 5, solder: Solder = SOLDER) -> LiquidFlow:
-    """Return a cube of solder on a wall, at its start."""
+    """Return a cube of solder on a wall at its start."""
     cloud = box_cloud(solder.volume ** (1.0 / 3.0), count)
     return start_flow(cloud, solder, dict(acting), (contact_line(cloud, 0, np.inf, solder),))
 
 
 def without(physics: Physics, kind: type) -> Physics:
-    """Return the lists of what acts without the objects of one kind."""
+    """Return the lists of acting objects without those of one kind."""
     lists = {item.name: getattr(physics, item.name) for item in fields(physics)}
     return replace(physics, **{name: tuple(x for x in old if not isinstance(x, kind)) for name, old in lists.items()})
 
@@ -103,7 +105,7 @@ def shock(**changes) -> Shock:
 
 
 def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, float]:
-    """Return a strip of board between two held ends, and half its critical step [s]."""
+    """Return a board strip between two held ends, and half its critical step [s]."""
     lines = np.linspace(0.0, LENGTH, 21), [0.0, 2e-3], np.linspace(0.0, THICKNESS, 3)
     ends = {"mounting_holes": lambda c: on(0, 0.0)(c) | on(0, LENGTH)(c)}
     mesh = mesh_of(*grid(*lines), "board", ends)
@@ -114,14 +116,14 @@ def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, fl
     return body, 0.5 * critical
 
 
-def loads_of(body: Body, wanted: Shock) -> list[Load]:
+def loads_of(body: Body, settings: Shock) -> list[Load]:
     """Return the loads of a shock on a body without holes to shake."""
     tables: Any = SimpleNamespace(shaken=np.empty(0, np.int32))
-    return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, wanted)
+    return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, settings)
 
 
 def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:
-    """Return the motion after a duration [s], and the largest deflection of its middle [m] until then."""
+    """Return the motion after a duration [s], and the largest deflection [m] of its middle until then."""
     motion, largest = motion_of(body, step, loads), 0.0
     middle = np.argmin(np.abs(body.local.points[:, 0] - 0.5 * LENGTH))
     for _ in range(round(duration / step)):

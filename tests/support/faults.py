@@ -1,4 +1,4 @@
-"""Helpers of the fault tests: a small drop by the command, its answers, the seed of what is random."""
+"""Helpers of the fault tests: a small drop run by the command, its metrics, and the random seed."""
 
 import json
 import os
@@ -9,8 +9,8 @@ from tests.support.warm_start import warm_command
 
 DROP = Path(__file__).resolve().parents[2] / "cases/sessile_drop/case.toml"
 SMALL_DROP = ("--set", "drop.particles_per_edge=5")
-SEED = int(os.environ.get("REFLOWSHOCK_SEED", "15"))  # of whatever is random; pytest shows it in the names of tests
-# In the names of metrics that no two runs share.
+SEED = int(os.environ.get("REFLOWSHOCK_SEED", "15"))  # random seed; pytest shows it in test names
+# Parts of the names of metrics that differ between runs.
 TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core_ratio", "overhead", "busy_share")
 
 
@@ -20,6 +20,6 @@ def run_drop(folder: Path, command: str = "run", *options: str, cwd: Path | None
 
 
 def answers(folder: Path) -> dict[str, object]:
-    """Return the metrics of a run that another run must repeat."""
-    found = json.loads((folder / "summary.json").read_text())["metrics"]
-    return {name: entry["value"] for name, entry in found.items() if not any(word in name for word in TIMES)}
+    """Return the metrics that a second run must reproduce."""
+    metrics = json.loads((folder / "summary.json").read_text())["metrics"]
+    return {name: entry["value"] for name, entry in metrics.items() if not any(word in name for word in TIMES)}

@@ -1,4 +1,4 @@
-"""A bar of layers with held sides, whose strain is uniaxial, under a smooth pressure pulse: mesh, run, exact waves."""
+"""Layered bar with held sides (uniaxial strain) under a smooth pressure pulse: mesh, run and exact waves."""
 
 import json
 from collections.abc import Mapping

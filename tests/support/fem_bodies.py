@@ -1,4 +1,4 @@
-"""Models on one rank from meshes in memory, through the program's own chain."""
+"""Stiffness of models on one rank from meshes in memory."""
 
 import numpy as np
 

@@ -6,12 +6,12 @@ from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole
 
 
-def by_patch(whole: Whole, found: Survey, rules: Rules) -> Division:
-    """Give the meso model the board's patch and all that is no board."""
-    return held(whole, found, rules, whole.mesh.in_parts(lambda name: name != "board"))
+def by_patch(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Assign the board patch and everything except the board to the meso model."""
+    return held(whole, survey, rules, whole.mesh.in_parts(lambda name: name != "board"))
 
 
-def naive(whole: Whole, found: Survey, rules: Rules) -> Division:
-    """Take the window from the macro elements alone, whatever touches the cut."""
+def naive(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Take the window from the macro elements alone, ignoring elements at the cut."""
     macro = whole.mesh.in_parts("board".__eq__)
-    return in_two_steps("held_velocity", macro, ~macro, plan_windows(rules, macro, found.step))
+    return in_two_steps("held_velocity", macro, ~macro, plan_windows(rules, macro, survey.step))

@@ -21,7 +21,7 @@ FRACTION = 0.9
 
 
 def joint_on_board(solder: int = 7, edges: int = 3, held: bool = True) -> MeshData:
-    """A joint with copper pads, free at its upper end, tied to a small block of board that is held on two sides."""
+    """Return a joint with copper pads, free at its upper end, tied to a small board block that is held on two sides."""
     ticks = np.linspace(0, EDGE, 4)
     points, cells = grid(ticks, ticks, [-1.3e-3, -0.8e-3, -0.3e-3, -0.15e-3, 0.0])
     facets = {"board_side": on(2, 0.0)} | ({"mounting_holes": on(0, EDGE), "symmetry_y": on(1, 0.0)} if held else {})
@@ -32,7 +32,7 @@ def joint_on_board(solder: int = 7, edges: int = 3, held: bool = True) -> MeshDa
 
 @dataclass(frozen=True)
 class Levelled:
-    """A body with levels, the same without, and what the levels are."""
+    """Body with step levels, the same body without, and the levels."""
 
     body: Body
     plain: Body
@@ -48,7 +48,7 @@ def levelled(
     comm: MPI.Comm = MPI.COMM_SELF,
     damping: float = 0.0,
 ) -> Levelled:
-    """Return a body whose smallest elements go to what the innermost level bears; ``damping``: beta over the window."""
+    """Return a body whose smallest elements take the innermost step; ``damping``: beta over the window."""
     item = prepare(mesh, "dns")["dns"]
     alone = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
     steps = np.empty(len(alone.steps))
@@ -79,10 +79,10 @@ def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:
 
 
 def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | None = None) -> np.ndarray:
-    """Return K_eff of the elements of a level and inside, in block form by eigenvectors of the nodes that move.
+    """Return K_eff of the elements of a level and inside, in block form by eigenvectors of the moving nodes.
 
-    With A and B the blocks of the stiffness inside and beside (scaled by masses), K_eff has A phi(A), B phi(A) and
-    B ((phi - 1) / z)(A) B^T more than the block of the ring, phi(z) = (2 - 2 T_p(delta - z / omega) / T_p(delta)) / z.
+    With A and B the (mass-scaled) stiffness blocks inside and outside, K_eff exceeds the block of the ring by A phi(A),
+    B phi(A) and B ((phi - 1) / z)(A) B^T, phi(z) = (2 - 2 T_p(delta - z / omega) / T_p(delta)) / z.
     """
     step = step or model.window
     inner = step if number == 0 else step / model.ratios[number - 1]
@@ -94,19 +94,19 @@ def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | No
     moves = moving_components(model, number)
     scale = step / np.sqrt(np.repeat(model.body.mass, 3)[moves])
     values, vectors = np.linalg.eigh(scale[:, None] * matrix[np.ix_(moves, moves)] * scale)
-    beside = matrix[np.ix_(~moves, moves)] * scale @ vectors
+    coupling_block = matrix[np.ix_(~moves, moves)] * scale @ vectors
     phi, slope = filter_of(model.ratios[number - 1], stabilisation(number), values)
     back = vectors.T / scale
     result = matrix.copy()
     result[np.ix_(moves, moves)] = back.T * (values * phi) @ back
-    result[np.ix_(~moves, moves)] = beside * phi @ back
+    result[np.ix_(~moves, moves)] = coupling_block * phi @ back
     result[np.ix_(moves, ~moves)] = result[np.ix_(~moves, moves)].T
-    result[np.ix_(~moves, ~moves)] += beside * slope @ beside.T
+    result[np.ix_(~moves, ~moves)] += coupling_block * slope @ coupling_block.T
     return result
 
 
 def filter_of(count: int, nu: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return phi(z) and (phi(z) - 1) / z, the latter zero where z is: Chebyshev polynomials by NumPy's class."""
+    """Return phi(z) and (phi(z) - 1) / z, the latter zero at z = 0, by the Chebyshev polynomials of NumPy."""
     polynomial = np.polynomial.Chebyshev.basis(count)
     delta = 1.0 + nu / count**2
     omega = 2.0 * polynomial.deriv()(delta) / polynomial(delta)
@@ -117,7 +117,7 @@ def filter_of(count: int, nu: float, z: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def moving_components(model: Levelled, number: int) -> np.ndarray:
-    """Return (3n,): free components that no element of an outer level has, not even by a slave."""
+    """Return the free components (3n,) outside all elements of outer levels and their slaves."""
     body = model.body
     outer = np.zeros(len(body.mass), dtype=bool)
     for cell in body.elements.cells[model.level < number]:

@@ -1,4 +1,4 @@
-"""Small meshes for the shock tests: bars, boards, and a package of box joints that match nothing."""
+"""Small meshes for the shock tests: bars, boards, and a package with box joints on non-matching meshes."""
 
 from pathlib import Path
 
@@ -9,13 +9,13 @@ from reflowshock.cases.hard.trials.grids import COPPER, GAP, grid, joint_mesh, m
 from reflowshock.fem.cell_shape import TENSOR_ORDER
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 
-# Of cells and facets with so many nodes: Gmsh's type, and its order of our nodes.
+# Gmsh type and node order of cells and facets by their number of nodes.
 GMSH_TYPES = {8: 5, 4: 4, 10: 11}, {4: 3, 3: 2, 6: 9}
 GMSH_ORDER = {8: np.argsort(TENSOR_ORDER), 4: np.arange(4), 10: np.array([0, 1, 2, 3, 9, 6, 8, 7, 4, 5])}
 
 
 def bar(length: float, elements: int, width: float, part: str = "board") -> MeshData:
-    """Return a bar along x, one element thick, held at x = 0 across (set ``end``)."""
+    """Return a bar along x, one element thick, held at x = 0 (set ``end``)."""
     points, cells = grid(np.linspace(0, length, elements + 1), [0, width], [0, width])
     return mesh_of(points, cells, part, {"low": on(0, 0.0), "high": on(0, length)})
 
@@ -48,9 +48,9 @@ def package_mesh(size: float = 0.5e-3) -> MeshData:
     points, cells = grid(x, x, low + np.array([0.0, 0.2e-3, 0.4e-3, 0.6e-3, 0.8e-3]))
     centre = points[cells].mean(axis=1)
     die = centre[:, 2] > low + 0.4e-3
-    kept = ~die | ((centre[:, 0] < 2e-3) & (centre[:, 1] < 2e-3))
+    is_filled = ~die | ((centre[:, 0] < 2e-3) & (centre[:, 1] < 2e-3))
     facets = {"symmetry_x": on(0, 0.0), "symmetry_y": on(1, 0.0), "package_side": on(2, low)}
-    mesh = mesh_of(points, cells[kept], np.where(die, "die", "substrate")[kept], facets)
+    mesh = mesh_of(points, cells[is_filled], np.where(die, "die", "substrate")[is_filled], facets)
     return without_unused_nodes(mesh)[0]
 
 
@@ -58,7 +58,7 @@ SITES = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3),
 
 
 def small_assembly(joints: int = 4, **board: float) -> list[MeshData]:
-    """Return board, package and some joints as meshes that share no node."""
+    """Return board, package and some joints as meshes without common nodes."""
     sites = list(SITES.items())[-joints:]
     return [board_mesh(**board), package_mesh(), *(joint_mesh(name, x, y) for name, (x, y) in sites)]
 

@@ -1,4 +1,4 @@
-"""Nonlinear elements for tests, and their plain NumPy twins: one element and one point at a time, no lanes."""
+"""Nonlinear elements for tests and their plain NumPy twins, which process one element and one point at a time."""
 
 import numpy as np
 from scipy.linalg import polar
@@ -15,7 +15,7 @@ SHEAR_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 class PointTwin:
-    """One integration point."""
+    """Integration point in plain NumPy."""
 
     def __init__(self, material: Material, elasticity: np.ndarray, finite: bool, step: float) -> None:
         self.constants, self.elasticity = plastic_constants(material), elasticity
@@ -32,12 +32,12 @@ class PointTwin:
         return voigt(0.5 * (rate + rate.T)[None])[0] * SHEAR_TWICE, stretch, rotation
 
     def move(self, gradient: np.ndarray) -> None:
-        """Take the step to a gradient."""
+        """Take a step to a displacement gradient."""
         increment, self.stretch, _ = self.increment(gradient)
         self.take(increment)
 
     def take(self, increment: np.ndarray) -> None:
-        """Take the step of a strain increment (6,), engineering shear."""
+        """Take a step by a strain increment (6,) with engineering shear."""
         stress = self.stress + self.elasticity @ increment
         matrix = symmetric(stress[None])[0]
         pressure = np.trace(matrix) / 3 * np.eye(3)
@@ -47,7 +47,7 @@ class PointTwin:
         self.plastic += flow
 
     def nominal(self, gradient: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        """Return P (3, 3) of a stress (6,)."""
+        """Return the nominal stress P (3, 3) of a stress (6,)."""
         matrix = symmetric(stress[None])[0]
         if not self.finite:
             return matrix
@@ -56,7 +56,7 @@ class PointTwin:
 
 
 class HexahedronTwin:
-    """One hexahedron with incompatible modes; formulas of ``kernels.nonlinear_hexahedron``."""
+    """Hexahedron with incompatible modes in plain NumPy; formulas of ``kernels.nonlinear_hexahedron``."""
 
     def __init__(self, corners: np.ndarray, material: Material, elasticity: np.ndarray, path: Path) -> None:
         self.finite, self.elasticity, self.corners = path.finite, elasticity, corners
@@ -69,34 +69,34 @@ class HexahedronTwin:
 
     def force(self, displacement: np.ndarray) -> np.ndarray:
         """Return the internal force (8, 3) of the next step."""
-        place, rotation = self.corners + displacement, np.eye(3)
+        position, rotation = self.corners + displacement, np.eye(3)
         if self.finite:
-            rotation = polar(place.T @ self.centre @ np.linalg.inv(self.corners.T @ self.centre))[0]
-        place = place @ rotation
-        middle = 0.5 * (place + self.place) if self.finite else self.corners
-        strain = self.compatible(middle, place - self.place)
-        self.place = place
+            rotation = polar(position.T @ self.centre @ np.linalg.inv(self.corners.T @ self.centre))[0]
+        position = position @ rotation
+        middle = 0.5 * (position + self.place) if self.finite else self.corners
+        strain = self.compatible(middle, position - self.place)
+        self.place = position
         for point, increment in zip(self.points, strain + self.modes(middle, strain), strict=True):
             point.take(increment)
         stress = np.array([point.stress for point in self.points])
         pressure = stress[:, :3].mean(axis=1)
         loads = symmetric(stress + np.outer(self.fit @ pressure - pressure, [1, 1, 1, 0, 0, 0]))
-        gradients = self.gradients(place if self.finite else self.corners)
+        gradients = self.gradients(position if self.finite else self.corners)
         return np.einsum("g,gij,gaj->ai", self.weight, loads, gradients) @ rotation.T
 
-    def gradients(self, place: np.ndarray) -> np.ndarray:
+    def gradients(self, position: np.ndarray) -> np.ndarray:
         """Return the gradients (8, 8, 3) of the shape functions at the Gauss points of a deformed element."""
-        return self.derivatives @ np.linalg.inv(np.einsum("ai,gad->gid", place, self.derivatives))
+        return self.derivatives @ np.linalg.inv(np.einsum("ai,gad->gid", position, self.derivatives))
 
     def compatible(self, middle: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """Return strain increments (8, 6) with fitted dilatation, engineering shear."""
+        """Return strain increments (8, 6) with averaged dilatation, engineering shear."""
         rate = np.einsum("ai,gaj->gij", change, self.gradients(middle))
         trace = np.trace(rate, axis1=1, axis2=2)
         rate = rate + (self.fit @ trace - trace)[:, None, None] / 3 * np.eye(3)
         return voigt(0.5 * (rate + rate.transpose(0, 2, 1))) * SHEAR_TWICE
 
     def modes(self, middle: np.ndarray, strain: np.ndarray) -> np.ndarray:
-        """Return the strain increments (8, 6) of the modes: a Newton step from an elastic trial."""
+        """Return the strain increments (8, 6) of the incompatible modes: one Newton step from an elastic trial."""
         normal = np.linalg.inv(middle.T @ self.centre)
         shapes = strain_matrix(GAUSS[:, :, None] * normal / self.weight[:, None, None])
         trial = np.array([point.stress for point in self.points]) + strain @ self.elasticity

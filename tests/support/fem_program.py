@@ -1,7 +1,7 @@
-"""The fem program, and scripts, on several ranks.
+"""Runs of the fem program and of scripts on several ranks.
 
-Ranks are forked from a process that has loaded libraries, see `warm_start`. `run_python` starts them in full: for tests
-of what ends ranks.
+Ranks are forked from a process that has loaded the libraries, see ``warm_start``. ``run_python`` starts complete
+processes, for tests of failing ranks.
 """
 
 import json
@@ -13,7 +13,7 @@ from pathlib import Path
 from tests.support.warm_start import warm_python
 
 ROOT = Path(__file__).resolve().parents[2]
-# Not bound: ranks of runs side by side would share the first cores.
+# No binding to cores: ranks of concurrent runs would share the first cores.
 MPIRUN = ["mpirun", "--bind-to", "none", "--allow-run-as-root", "--oversubscribe", "-n"]
 
 
@@ -24,12 +24,12 @@ def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
 
 def run_programs(inputs: list[tuple[int, Path]]) -> None:
     """Run the fem program on several inputs, each with its number of ranks, in one start of all ranks."""
-    words = [str(word) for one in inputs for word in one]
+    words = [str(word) for arguments in inputs for word in arguments]
     run_warm(words, max(ranks for ranks, _ in inputs))
 
 
 def run_warm(words: list[str], ranks: int) -> subprocess.CompletedProcess:
-    """Run what `on_ranks` runs, to a good end."""
+    """Run the module ``on_ranks`` and require success."""
     line = ["-m", "tests.support.on_ranks", *words]
     done = run_python(line, ranks, timeout=400.0, python=warm_python())
     assert done.returncode == 0, done.stderr
@@ -37,7 +37,7 @@ def run_warm(words: list[str], ranks: int) -> subprocess.CompletedProcess:
 
 
 def run_script(text: str, directory: Path, ranks: int) -> dict:
-    """Run a script that is given the directory and prints its results as JSON."""
+    """Run a script with the directory as argument; return the JSON that it prints."""
     script = directory / "script.py"
     script.write_text(text)
     return json.loads(run_warm([str(script), str(directory)], ranks).stdout)
@@ -46,7 +46,7 @@ def run_script(text: str, directory: Path, ranks: int) -> dict:
 def run_python(
     arguments: list[str], ranks: int, timeout: float = 120.0, python: str = sys.executable
 ) -> subprocess.CompletedProcess:
-    """Run Python on several ranks, with this tree's packages."""
+    """Run Python on several ranks with the packages of this checkout."""
     return subprocess.run(
         [*MPIRUN, str(ranks), python, *arguments],
         cwd=ROOT,

@@ -1,4 +1,4 @@
-"""Bodies that have cooled down, on one rank, for tests."""
+"""Bodies after cooling on one rank."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,25 +24,30 @@ SMALL = ForceOptions()
 
 @dataclass(frozen=True)
 class Cooled:
-    """A body at rest, what cooling did to it, the body that begins with its stress.
+    """Body at rest, its equilibrium after cooling, and the body with its initial stress.
 
-    Its smallest critical step [s], and the forces (n, 3) [N] by which it would expand if nothing held it back.
+    Attributes:
+        plain: Body at rest without stress.
+        equilibrium: Equilibrium after cooling.
+        body: Body with the initial stress.
+        critical: Smallest critical step [s].
+        thrust: Thermal forces [N], shape (n, 3).
     """
 
     plain: Body
-    found: Equilibrium
+    equilibrium: Equilibrium
     body: Body
     critical: float
     thrust: np.ndarray
 
     @property
     def stress(self) -> np.ndarray:
-        """Mean stress of the elements (ne, 6) [Pa]."""
+        """Mean stress of the elements [Pa], shape (ne, 6)."""
         return StressRecovery(self.body, np.arange(len(self.body.elements.cells))).stress(np.zeros_like(self.start))
 
     @property
     def start(self) -> np.ndarray:
-        """Displacement of the body's beginning."""
+        """Initial displacement of the body."""
         return np.zeros_like(self.plain.local.points)
 
 
@@ -53,32 +58,32 @@ def cooled(
     formulation: str = "incompatible_modes",
     response: ForceOptions = SMALL,
 ) -> Cooled:
-    """Cool a mesh on its planes of symmetry, and let it begin with the stress."""
+    """Cool a mesh on its symmetry planes and return bodies without and with the initial stress."""
     item = pinned(model_inputs(joined(mesh), "dns", SYMMETRY)["dns"])
     pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
 
     def body() -> Body:
         return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
 
-    found = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
+    equilibrium = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
     plain = body()
     return Cooled(
         plain,
-        found,
-        with_initial_stress(body(), pieces.materials, found.displacement, change, path=True),
+        equilibrium,
+        with_initial_stress(body(), pieces.materials, equilibrium.displacement, change, path=True),
         float(pieces.steps.min()),
         thermal_force(plain, slice(None), pieces.materials, change),
     )
 
 
 def layered(x: np.ndarray, y: np.ndarray, layers: Mapping[str, np.ndarray], distorted: float = 0.0) -> MeshData:
-    """Return layers on top of each other from z = 0, on the planes of symmetry x = 0 and y = 0.
+    """Return stacked layers from z = 0 with symmetry planes x = 0 and y = 0.
 
     Args:
-        x: Places of nodes.
-        y: The same.
+        x: Node positions along x.
+        y: Node positions along y.
         layers: Part -> heights of its elements, lowest first.
-        distorted: Size of random moves of inner nodes, of the elements' size.
+        distorted: Size of random moves of inner nodes over the element size.
     """
     z = np.concatenate([[0.0], np.cumsum(np.concatenate(list(layers.values())))])
     names = np.repeat(list(layers), [len(heights) for heights in layers.values()])

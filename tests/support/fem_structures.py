@@ -15,7 +15,7 @@ STEEL = {"kind": "isotropic", "density": 8000.0, "young_modulus": 200e9, "poisso
 
 
 def strip_mesh(cells: tuple[int, int, int] = (8, 3, 2), layers: tuple[str, ...] = ("board",)) -> MeshData:
-    """Return a strip as ``structure_input`` describes it; its layers are of equal thickness."""
+    """Return the strip of ``structure_input`` with layers of equal thickness."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, cells[0] + 1)
     y = np.linspace(-WIDTH / 2, WIDTH / 2, cells[1] + 1)
     points, hexahedra = grid(x, y, np.linspace(0.0, THICKNESS, cells[2] + 1))
@@ -26,7 +26,7 @@ def strip_mesh(cells: tuple[int, int, int] = (8, 3, 2), layers: tuple[str, ...] 
 
 
 def structure_tables_of(**changes) -> dict:
-    """Return the input of a clamped strip of steel under a shock; ``changes`` replace whole tables."""
+    """Return the input of a clamped steel strip under a shock; ``changes`` replace whole tables."""
     tables = {
         "mode": "structure",
         "solver": "explicit",
@@ -56,7 +56,7 @@ def write_structure(directory: Path, mesh: MeshData | None = None, **changes) ->
 
 
 def structure_input(directory: Path, mesh: MeshData | None = None, **changes) -> StructureInput:
-    """Return the input of a structure whose mesh is written."""
+    """Return the input of a structure and write its mesh."""
     request = INPUT.validate_json(write_structure(directory, mesh, **changes).read_text())
     assert isinstance(request, StructureInput)
     request.output.mkdir(exist_ok=True)

@@ -1,7 +1,7 @@
-"""Pairs of models that have turned and flow: linear force terms with the tangent stiffness of the program's elements.
+"""Model pairs after rotation and flow: linear force terms with the tangent stiffness of the program's elements.
 
-Each element has gone along its path into a state, with the steps of its level; its stiffness is that of a further step
-along the same path. The window around this state has an amplification matrix, as a linear one has.
+Each element follows its path into a state with the steps of its level; its stiffness is the tangent of one further
+step. The window around this state has an amplification matrix like a linear one.
 """
 
 from dataclasses import replace
@@ -25,13 +25,13 @@ from reflowshock.materials.roles import Materials
 
 YIELD, HARDENING = 1e-3, 0.05  # yield stress and hardening modulus over Young's modulus
 AXIS, ANGLE = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5]), 0.7  # [rad]
-STRAIN = 3e-3 * np.array([[1.0, 0.6, 0.3], [0.6, -0.4, 0.5], [0.3, 0.5, -0.6]])  # at the end of the path
-STEPS = 20  # of the path
-SHIFT = 1e-7  # of a node, over the size of the mesh
+STRAIN = 3e-3 * np.array([[1.0, 0.6, 0.3], [0.6, -0.4, 0.5], [0.3, 0.5, -0.6]])  # strain at the end of the path
+STEPS = 20  # steps of the path
+SHIFT = 1e-7  # node shift for finite differences, over the mesh size
 
 
 def yielding(pair: Pair) -> Materials:
-    """Return the materials of a pair whose block yields."""
+    """Return the materials of a pair with a yielding block."""
     materials = pair.materials()
     modulus = materials.solder.young_modulus
     law = JohnsonCook(A=YIELD * modulus, B=HARDENING * modulus)
@@ -39,24 +39,24 @@ def yielding(pair: Pair) -> Materials:
 
 
 def on_path(points: np.ndarray, share: float) -> np.ndarray:
-    """Return displacements (n, 3) [m] a share of the way along the path: turned and strained alike everywhere."""
+    """Return displacements [m], shape (n, 3), at a share of the path: uniform rotation and strain."""
     rotation = Rotation.from_rotvec(share * ANGLE * AXIS).as_matrix()
     return points @ (rotation @ (np.eye(3) + share * STRAIN)).T - points
 
 
 def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
-    """Return a term with the stiffness that another one has in a step along the path; that one is then at its end."""
+    """Return linear elements with the tangent stiffness of a term at the end of the path; the term ends there."""
     for step in range(1, STEPS + 1):
         term.add(on_path(points, step / STEPS), np.zeros_like(points))
-    kept = {name: values.copy() for name, values in term.history.items()}
-    place, shift = on_path(points, 1.0 + 1.0 / STEPS), SHIFT * np.ptp(points)
+    history = {name: values.copy() for name, values in term.history.items()}
+    displacement, shift = on_path(points, 1.0 + 1.0 / STEPS), SHIFT * np.ptp(points)
     matrix = np.empty((points.size, points.size))
     for column in range(points.size):
         forces = []
         for sign in (1.0, -1.0):
-            for name, values in kept.items():
+            for name, values in history.items():
                 term.history[name][...] = values
-            moved, force = place.copy(), np.zeros_like(points)
+            moved, force = displacement.copy(), np.zeros_like(points)
             moved.reshape(-1)[column] += sign * shift
             term.add(moved, force)
             forces.append(force.ravel())
@@ -67,18 +67,18 @@ def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
 
 
 def flowing(body: Body) -> Body:
-    """Return a body whose terms have their tangents."""
+    """Return a body with the tangents of its terms."""
     return replace(body, terms=[tangent(term, body.local.points) for term in body.terms])
 
 
 def flowing_pair(pair: Pair, coupling: Coupling, fraction: float = FRACTION, formulation: str = "one_point") -> Coupled:
-    """Return both models of a pair in finite rotation, at the steps that the program chooses; the block flows."""
+    """Return both models of a pair in finite rotation with a flowing block, at the program's own steps."""
     materials = yielding(pair)
     models = models_of(pair.mesh(), materials, coupling, fraction)
     response = ForceOptions("corotational", models.division.meso_step)
     bodies = {}
     for role, (pieces, tables) in models.parts.items():
-        own = make_pieces(pieces.local, tables, materials, formulation)
-        body = make_body(MPI.COMM_SELF, own, tables, np.ones(len(own.steps)), response)
+        fresh_pieces = make_pieces(pieces.local, tables, materials, formulation)
+        body = make_body(MPI.COMM_SELF, fresh_pieces, tables, np.ones(len(fresh_pieces.steps)), response)
         bodies[role] = flowing(body)
     return Coupled(bodies, models.division.plan, scheme_of(models.division.scheme))

@@ -1,4 +1,4 @@
-"""The window of held velocity, from a mesh divided by the program or otherwise."""
+"""Window of held velocity on a mesh divided by the program or otherwise."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from reflowshock.materials.roles import Materials
 
 
 class Window(Coupled):
-    """Macro and meso model on one rank, taking turns."""
+    """Macro and meso model on one rank, advanced in turns."""
 
     def __init__(
         self,
@@ -21,6 +21,6 @@ class Window(Coupled):
         division: Divide = divide,
         loads: Sequence[Load] = (),
     ) -> None:
-        """Build both, from the program's division of the mesh or another one."""
+        """Build both models from the program's division of the mesh or another one."""
         models = models_of(mesh, materials, HELD, fraction, division)
         super().__init__(models.bodies(), models.division.plan, HeldVelocity(), loads)

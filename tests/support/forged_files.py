@@ -1,4 +1,4 @@
-"""Files that nobody may trust: broken ones, foreign ones, and pickles that would run code."""
+"""Files that must not be trusted: damaged and foreign ones, and pickles that would run code."""
 
 import io
 import json
@@ -12,7 +12,7 @@ from reflowshock.data_file import FORMAT
 
 
 class Marking:
-    """What makes a file when it is unpickled."""
+    """Object that creates a marker file when it is unpickled."""
 
     def __init__(self, marker: Path) -> None:
         self._marker = marker
@@ -22,26 +22,26 @@ class Marking:
 
 
 def forged_pickle(marker: Path) -> bytes:
-    """Return a pickle that makes a marker when it is read."""
+    """Return a pickle that creates a marker when it is read."""
     return pickle.dumps(Marking(marker))
 
 
 def forged_array(marker: Path) -> bytes:
-    """Return an npz whose only array is of an object that makes a marker when it is read."""
+    """Return an npz with one object array that creates a marker when it is read."""
     archive = io.BytesIO()
     np.savez(archive, tree=np.array([Marking(marker)], object))
     return archive.getvalue()
 
 
 def with_digest(content: bytes, rest: bytes) -> bytes:
-    """Return a file with the header of another one and some other rest, and the digest that belongs to it."""
+    """Return a file with the header of another file, a different body and a matching digest."""
     new = content.split(b"\n", 2)[1] + b"\n" + rest
     return FORMAT + sha256(new).hexdigest().encode() + b"\n" + new
 
 
-def flipped(content: bytes, place: float) -> bytes:
-    """Return a file with one bit the other way, at a share of its length."""
-    at = min(int(place * len(content)), len(content) - 1)
+def flipped(content: bytes, share: float) -> bytes:
+    """Return a file with one flipped bit at a share of its length."""
+    at = min(int(share * len(content)), len(content) - 1)
     return content[:at] + bytes([content[at] ^ 4]) + content[at + 1 :]
 
 

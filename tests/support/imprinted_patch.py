@@ -1,9 +1,9 @@
 """One joint between patches of board and substrate, tied to boxes or in columns, and its static equilibrium.
 
-The patches are 3 x 3 mm, the board 1 mm, the substrate 0.4 mm thick; a cylinder of solder of radius 0.24 and height
-0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5 mm; its
-other side moves 6 um outwards and 6 um away. Turned about the joint's axis, the same motion is that of all sides, in
-proportion to the distance from one.
+The patches are 3 x 3 mm, the board is 1 mm and the substrate 0.4 mm thick. A cylinder of solder of radius 0.24 mm and
+height 0.30 mm stands between two copper discs. The substrate is held at its sides x = -+1.5 mm, the board at x = -1.5
+mm; its other side moves 6 um outwards and 6 um away. Rotated about the axis of the joint, the same motion is prescribed
+on all sides in proportion to their distance.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,7 +49,7 @@ SAME = 1e-9  # m
 UP = np.array([0.0, 0.0, 1.0])
 HARDENING = JohnsonCook(A=40e6, B=1e9, n=1.0)
 SOLDER = Isotropic(density=7440.0, young_modulus=44.6e9, poisson_ratio=0.40)
-CONVERGED, NEAR = 1e-8, 1e-3  # of the forces: what is left out of balance, in the end and on the way
+CONVERGED, NEAR = 1e-8, 1e-3  # tolerance of the relative residual, final and intermediate
 SHARES = (0.25, 0.5, 0.75, 1.0)
 JOINT = "A1"
 TODAY = {"core": 3, "rings": 1, "layers": 6}
@@ -59,7 +59,7 @@ PADS = {"diameter": 0.48 * MM, "mask_opening": 0.58 * MM, "definition": "NSMD"}
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """How the patch is meshed: boxes as long as ``box`` [m], shifted; fields of ``package``; swept or free-form."""
+    """Mesh settings of the patch: box size [m] and shift, fields of ``package``, swept or free-form."""
 
     box: float
     joint: dict
@@ -69,34 +69,34 @@ class Mesh:
     swept: bool = True
 
     def times(self, size: float) -> "Mesh":
-        """Make every element so many times as long."""
+        """Return settings with all element sizes multiplied by ``size``."""
         numerics, imprint = JointNumerics.model_validate(self.joint), self.imprint
         names = ["core", "rings", "layers", "copper_layers", *(["pad_layers"] if numerics.pad_layer else [])]
         counts = {name: round(getattr(numerics, name) / size) for name in names}
         if imprint is not None:
-            own = Imprint.model_validate(imprint)
-            sized = {"growth": 1.0 + size * (own.growth - 1.0), "first_layer": size * own.first_layer}
-            imprint = imprint | sized | {"rings": round(own.rings / size)}
+            settings = Imprint.model_validate(imprint)
+            sized = {"growth": 1.0 + size * (settings.growth - 1.0), "first_layer": size * settings.first_layer}
+            imprint = imprint | sized | {"rings": round(settings.rings / size)}
         layers = tuple(round(count / size) for count in self.layers)
         return replace(self, box=size * self.box, joint=self.joint | counts, imprint=imprint, layers=layers)
 
 
 def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
-    """Mesh the patches, and the joint between them."""
+    """Mesh the patches and the joint between them."""
     numerics = {"element_size": mesh.box}
     layer = {"length": SIDE, "width": SIDE, "thickness": 0.4 * MM, "elements": mesh.layers[1]}
-    own = package(
+    package_of_joint = package(
         rows=1, columns=1, standoff=0.30 * MM, board_pad=PADS, package_pad=PADS, joint_numerics=mesh.joint,
         imprint=mesh.imprint, substrate=layer, numerics=numerics,
     )  # fmt: skip
     below = board(symmetry="full", numerics={"layers": mesh.layers[0], "patch_layers": 1})
     lines = box_lines(mesh)
-    levels = underside(own) + layer["thickness"] * np.arange(mesh.layers[1] + 1) / mesh.layers[1]
+    levels = underside(package_of_joint) + layer["thickness"] * np.arange(mesh.layers[1] + 1) / mesh.layers[1]
     at_rest = StructuredFace(lines, lines, np.zeros((len(lines), len(lines), 3)))
     side = PackageSide(float(levels[0]), at_rest, tuple((float(level), at_rest) for level in levels[1:]))
-    site = pad_table(own, below, Warpage())[0]
+    site = pad_table(package_of_joint, below, Warpage())[0]
     how = mesh_joint if mesh.swept else free_form_joint
-    joint = how(barrel(site.gap, 0.0), site, own, side, columns_of(site, own, below, side))
+    joint = how(barrel(site.gap, 0.0), site, package_of_joint, side, columns_of(site, package_of_joint, below, side))
     depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
     pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
     return joined(append(pieces)), joint
@@ -105,15 +105,15 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
 def free_form_joint(
     surface: ClosedSurface, site: PadSite, whole: Package, side: PackageSide, columns: tuple[Column, ...]
 ) -> JointMesh:
-    """Mesh a joint as ``mesh_joint`` does where no sweep serves, although one would."""
+    """Mesh a joint by the free-form method even if it could be swept."""
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
-    place = JointPlace.of(surface, site, side, copper.thickness)
-    build = partial(build_joint, sites=[site], copper=copper, place=place)
-    return first_good(surface, free_form(surface, whole.joint_numerics, place), site.name, build)
+    joint_place = JointPlace.of(surface, site, side, copper.thickness)
+    build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
+    return first_good(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
 
 
 def box_lines(mesh: Mesh) -> Floats:
-    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column's edges."""
+    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column edges."""
     count = round(SIDE / mesh.box)
     lines = SIDE * (np.arange(count + 1) / count - 0.5)
     if not mesh.shift:
@@ -124,13 +124,13 @@ def box_lines(mesh: Mesh) -> Floats:
 
 
 def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> MeshData:
-    """Return a block of boxes between lines [m]; its face towards the joint is a side that ``tie_joints`` knows."""
+    """Return a block of boxes between lines [m], with its face towards the joint as a side of ``tie_joints``."""
     lines = levels, x if y is None else y, x
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(line) for line in lines])
     corners = [
         number[tuple(slice(side, side - 1 or None) for side in sides)].ravel() for sides in product((0, 1), repeat=3)
-    ]  # bit d of a corner's place is its side along x, y, z
+    ]  # bit d of a corner's index is its side along x, y, z
     face = number[-1] if name == "board" else number[0]
     around = [face[:-1, :-1], face[:-1, 1:], face[1:, 1:], face[1:, :-1]]
     quads = np.column_stack([some.ravel() for some in around]).astype(np.int32)
@@ -140,30 +140,34 @@ def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> Mesh
 
 
 def data_of(joint: JointMesh) -> MeshData:
-    """Return a joint as ``fem`` reads it."""
+    """Return a joint as ``MeshData``."""
     parts = [np.full(len(cells), number, np.int32) for number, cells in enumerate(joint.cells.values())]
     cells = np.concatenate(list(joint.cells.values()))[:, HEXAHEDRON.order]
     return MeshData(joint.points, cells, np.concatenate(parts), tuple(joint.cells), joint.facets)
 
 
 class Problem:
-    """The static problem of a mesh with its prescribed motion."""
+    """Static problem of a mesh with its prescribed motion."""
 
     def __init__(
-        self, whole: Whole, yields: bool, known: dict[str, Material] | None = None, turned: float | None = None
+        self,
+        whole: Whole,
+        yields: bool,
+        materials_by_role: dict[str, Material] | None = None,
+        turned: float | None = None,
     ) -> None:
-        """Number the equations; solder yields or does not, unless the materials of all roles are given.
+        """Number the equations of a mesh with elastic or yielding solder, or with given materials.
 
         Args:
-            whole: The mesh.
-            yields: Whether solder does.
-            known: Role -> material.
+            whole: Mesh.
+            yields: Whether the solder yields.
+            materials_by_role: Role -> material; overrides ``yields``.
             turned: Angle [rad] of the motion.
         """
         mesh = whole.mesh
         solder = SOLDER.model_copy(update={"plasticity": HARDENING}) if yields else SOLDER
-        known = known or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
-        materials = [known[role_of_part(name)] for name in mesh.part_names]
+        materials_by_role = materials_by_role or {"board": FR4, "substrate": FR4, "copper": COPPER, "solder": solder}
+        materials = [materials_by_role[role_of_part(name)] for name in mesh.part_names]
         self.whole, self.yields = whole, yields
         self.elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
         self.hencky = HenckyElements.build(self.elements, materials, np.zeros((len(materials), 3)))
@@ -175,23 +179,23 @@ class Problem:
         self.free = np.flatnonzero(free.ravel())
 
     def solve(self) -> Floats:
-        """Find the displacement ``(n, 3)`` [m] by Newton's method, in shares of the motion where solder yields."""
+        """Return the displacement [m], shape (n, 3), by Newton's method, in increments if the solder yields."""
         shares = SHARES if self.yields else (1.0,)
-        place = self._spread(shares[0] * self.motion)
+        displacement = self._spread(shares[0] * self.motion)
         for share, following in pairwise((*shares, 1.0)):
-            place = self._balanced(place, CONVERGED if share == 1.0 else NEAR) * (following / share)
-        return place
+            displacement = self._balanced(displacement, CONVERGED if share == 1.0 else NEAR) * (following / share)
+        return displacement
 
-    def _balanced(self, place: Floats, tolerance: float) -> Floats:
+    def _balanced(self, displacement: Floats, tolerance: float) -> Floats:
         for _ in range(30):
-            force, tangent = self.hencky.linearised(place)
+            force, tangent = self.hencky.linearised(displacement)
             rest = (self.tie.T @ force.ravel())[self.free]
             error = float(np.linalg.norm(rest) / np.linalg.norm(force))
             if error <= tolerance:
-                return place
-            step = np.zeros(place.size)
+                return displacement
+            step = np.zeros(displacement.size)
             step[self.free] = -solution(self._reduced(tangent), rest)
-            place = place + self._spread(step.reshape(-1, 3))
+            displacement = displacement + self._spread(step.reshape(-1, 3))
         raise RuntimeError(f"forces out of balance by {error:.1e}")
 
     def _spread(self, values: Floats) -> Floats:
@@ -209,17 +213,17 @@ def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
     csr = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data)
     petsc = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
     petsc.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    factor, (place, vector) = Factorisation(petsc), petsc.createVecs()
+    factor, (vector_in, vector) = Factorisation(petsc), petsc.createVecs()
     vector.array = right
-    factor.solve(vector, place)
-    found = np.array(place.array)
+    factor.solve(vector, vector_in)
+    solution_values = np.array(vector_in.array)
     factor.free()
     petsc.destroy()
-    return found
+    return solution_values
 
 
 def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the motion ``(n, 3)`` [m] of what is held, and which components are."""
+    """Return the prescribed motion [m], shape (n, 3), and the mask of its components."""
     held = np.abs(np.abs(mesh.points[:, 0]) - 0.5 * SIDE) < SAME
     on_board = held & (mesh.points[:, 2] <= SAME) & (mesh.points[:, 0] > 0.0)
     motion = np.zeros_like(mesh.points)
@@ -231,7 +235,7 @@ def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return as ``prescribed`` the motion of all sides at an angle [rad]."""
+    """Return the motion of all sides at an angle [rad], as ``prescribed``."""
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     held = np.abs(np.abs(mesh.points[:, :2]) - 0.5 * SIDE).min(axis=1) < SAME
     share = np.where(held & (mesh.points[:, 2] <= SAME), 0.5 + mesh.points @ along / SIDE, 0.0)
@@ -239,30 +243,32 @@ def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], ND
 
 
 def half_of(whole: Whole) -> Whole:
-    """Return what lies at y >= 0 of a mesh with a line of nodes there: all is symmetric."""
+    """Return the half y >= 0 of a symmetric mesh with a line of nodes at y = 0."""
     tie, each = whole.tie, np.arange(len(whole.tie.slave))
     heaviest = tie.master[each, tie.weight.argmax(axis=1)][:, None]
-    on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # some at y < 0 weigh nothing
+    on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # zero weight at y < 0
     part = part_of(replace(whole, tie=on_plane), whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 1] > 0.0)
     return Whole(part.mesh, part.tie, whole.moved)
 
 
 def is_half(mesh: MeshData) -> bool:
-    """Whether a mesh ends at y = 0."""
+    """Return whether a mesh ends at y = 0."""
     return bool(mesh.points[:, 1].min() > -SAME)
 
 
-def ends(problem: Problem, place: Floats, layers: Sequence[float] = (LAYER,)) -> Iterator[tuple[str, dict[str, float]]]:
+def ends(
+    problem: Problem, displacement: Floats, layers: Sequence[float] = (LAYER,)
+) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield the measures of both ends: section forces [N, N m], averages over layers of a thickness [Pa, J/m^3]."""
     mesh = problem.whole.mesh
     cells = mesh.in_parts(f"solder@{JOINT}".__eq__)
     solder = replace(problem.hencky, elements=problem.elements.subset(cells))
-    response = solder.respond(place)
+    response = solder.respond(displacement)
     force = np.zeros_like(mesh.points)
     np.add.at(force, mesh.cells[cells], response.force.reshape(-1, 8, 3))
     if is_half(mesh):
         force *= [2.0, 0.0, 2.0]
-    state, corners = solder.points(place), mesh.points[mesh.cells[cells]]
+    state, corners = solder.points(displacement), mesh.points[mesh.cells[cells]]
     plastic = state.plastic_strain
     stress = von_mises(state.stress.reshape(-1, 6)).reshape(plastic.shape)
     work = HARDENING.A * plastic + HARDENING.B * plastic ** (1.0 + HARDENING.n) / (1.0 + HARDENING.n)
@@ -272,16 +278,16 @@ def ends(problem: Problem, place: Floats, layers: Sequence[float] = (LAYER,)) ->
         on_pad = force[nodes]
         arm = mesh.points[nodes] - [0.0, 0.0, level]
         moment = np.cross(arm * [1.0, 0.0, 1.0] if is_half(mesh) else arm, on_pad).sum(axis=0)
-        found = {
+        measures = {
             "axial_force": abs(float(on_pad[:, 2].sum())),
             "shear_force": float(np.linalg.norm(on_pad[:, :2].sum(axis=0))),
             "bending_moment": float(np.linalg.norm(moment[:2])),
         }
         for layer in layers:
             near = octant_volumes(corners, np.array([0.0, 0.0, level]), inward, layer)
-            found[f"von_mises:{1e6 * layer:g}um"] = float(np.average(stress, weights=near))
-            found[f"plastic_work:{1e6 * layer:g}um"] = float(np.average(work, weights=near))
-        yield name, found
+            measures[f"von_mises:{1e6 * layer:g}um"] = float(np.average(stress, weights=near))
+            measures[f"plastic_work:{1e6 * layer:g}um"] = float(np.average(work, weights=near))
+        yield name, measures
 
 
 IMPRINTED = Mesh(0.25 * MM, CHEAPEST, {"size": 1.0 * MM})

@@ -1,7 +1,7 @@
-"""An oracle for a joint's numbers: materials of ``joint_regions.py``, Newton's method, HHT-alpha steps.
+"""Independent oracle for joint measures: materials of ``joint_regions.py``, Newton's method, HHT-alpha steps.
 
-It shares no element, tie, time step or measure with the program, only the scene (``joint_patch.py``) and what hides
-the versions of DOLFINx.
+It shares no element, tie, time step or measure with the program, only the scene (``joint_patch.py``) and the adapter to
+DOLFINx versions.
 """
 
 from collections.abc import Callable
@@ -22,10 +22,10 @@ ORIENTATION = {"foot": -1.0, "head": 1.0}
 
 
 class Patch:
-    """The regions of a patch, what is held and moved, and the measures of its joint."""
+    """Regions of a patch, their supports and motion, and the measures of its joint."""
 
     def __init__(self, patch: JointPatch, lattice: Lattice, yields: bool) -> None:
-        """Take a quadratic mesh; without ``yields`` the solder is elastic."""
+        """Build the regions of a quadratic mesh; without ``yields`` the solder is elastic."""
         self.patch, self.points, kind = patch, lattice.points, {"solder": YieldingRegion} if yields else {}
         self.regions = {
             part: kind.get(part, Region)(lattice.points, cells, patch.materials[part])
@@ -52,7 +52,7 @@ class Patch:
 
     @cached_property
     def yielding(self) -> list[YieldingRegion]:
-        """Return the regions whose tangent changes."""
+        """Regions with a changing tangent."""
         return [region for region in self.regions.values() if isinstance(region, YieldingRegion)]
 
     @cached_property
@@ -74,10 +74,10 @@ class Patch:
             region.settle()
 
     def measures(self, displacement: Floats, acceleration: Floats | None = None) -> dict[str, float]:
-        """Return section resultants and layer averages of the whole joint (both halves), SI; call before ``settle``.
+        """Return section resultants and layer averages of the whole joint in SI units; call before ``settle``.
 
-        ``axial@foot`` and ``shear@foot`` [N] are the forces that pull and shear the joint, ``moment@foot`` [N m] is
-        that about y through the pad's centre, ``peel@foot`` [Pa] the mean normal traction.
+        ``axial@foot`` and ``shear@foot`` [N] are the normal and tangential section forces, ``moment@foot`` [N m] is the
+        moment about y through the centre of the pad, ``peel@foot`` [Pa] the mean normal traction.
         """
         joint = [self.regions[part] for part in ("copper", "solder")]
         force = sum(region.force(displacement) for region in joint)
@@ -101,7 +101,7 @@ class Patch:
 
 
 class Factor:
-    """Solves with a symmetric matrix by MUMPS."""
+    """MUMPS factorisation of a symmetric matrix."""
 
     def __init__(self, matrix: scipy.sparse.csr_matrix) -> None:
         """Factor the matrix."""
@@ -117,15 +117,15 @@ class Factor:
 
     def solve(self, right: Floats) -> Floats:
         """Return the solution."""
-        given, solution = self._matrix.createVecs()
-        given.array = right
-        self._solver.solve(given, solution)
-        found = solution.array.copy()
-        given.destroy(), solution.destroy()
-        return found
+        right_vector, solution = self._matrix.createVecs()
+        right_vector.array = right
+        self._solver.solve(right_vector, solution)
+        change = solution.array.copy()
+        right_vector.destroy(), solution.destroy()
+        return change
 
     def free(self) -> None:
-        """Give the memory back."""
+        """Free the memory."""
         self._solver.destroy()
         self._matrix.destroy()
 
@@ -134,32 +134,32 @@ class Newton:
     """Newton's method for c M u + k f(u) = right on the free components; a constant matrix is factored once.
 
     Attributes:
-        patch: The patch.
-        weights: c [1/s^2] of the mass, k of the internal force.
+        patch: Patch.
+        weights: Weight c [1/s^2] of the mass and k of the internal force.
     """
 
     def __init__(self, patch: Patch, weights: tuple[float, float]) -> None:
-        """Take a patch and the weights."""
+        """Store the patch and the weights."""
         self.patch, self.weights = patch, weights
         self._factor: Factor | None = None
 
     def solve(self, start: Floats, boundary: Floats, right: Floats) -> tuple[Floats, Floats]:
-        """Return displacement and internal force ``(3 n,)``.
+        """Return displacement [m] and internal force [N], shape (3 n,).
 
         Args:
-            start: ``(3 n,)`` [m] first guess.
-            boundary: ``(3 n,)`` [m], the displacement where it is prescribed.
-            right: ``(3 n,)`` [N].
+            start: First guess [m], shape (3 n,).
+            boundary: Prescribed displacement [m], shape (3 n,).
+            right: Right-hand side [N], shape (3 n,).
 
         Raises:
-            RuntimeError: No convergence.
+            RuntimeError: If the iteration does not converge.
         """
         patch, free = self.patch, self.patch.free
         force = patch.force(start)
         matrix = self._matrix()
         change = boundary - start
         change[free] = 0.0
-        # The boundary's part in the first step is linear, too: moving it alone would crush the cells beside it.
+        # The first step moves the boundary by the linear solution: moving it alone would crush adjacent cells.
         residual = self._residual(start, force, right) + matrix @ change
         moved = start + change
         for _ in range(TRIALS):
@@ -200,18 +200,18 @@ class Newton:
 
 def equilibrium(patch: Patch, steps: int = 1) -> list[dict[str, float]]:
     """Return the measures at equal shares of the full motion, at rest."""
-    displacement, nothing, found = np.zeros(len(patch.full)), np.zeros(len(patch.full)), []
+    displacement, nothing, history = np.zeros(len(patch.full)), np.zeros(len(patch.full)), []
     newton = Newton(patch, (0.0, 1.0))
     for step in range(1, steps + 1):
         displacement, _ = newton.solve(displacement, step / steps * patch.full, nothing)
-        found.append(patch.measures(displacement))
+        history.append(patch.measures(displacement))
         patch.settle()
-    return found
+    return history
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The motion of the moved side: its full motion times ``share``, from rest.
+    """Motion of the moved side: its full motion times ``share``, from rest.
 
     Attributes:
         share: Time [s] -> share of the full motion.
@@ -223,7 +223,7 @@ class Motion:
 
 
 def haversine(duration: float) -> Motion:
-    """Return the motion there and back, sin^2(pi t / T) of the full one, over a duration [s]."""
+    """Return the motion sin^2(pi t / T) times the full motion, over a duration [s]."""
     rate = np.pi / duration
     return Motion(lambda time: np.sin(rate * time) ** 2, lambda time: 2.0 * rate**2 * np.cos(2.0 * rate * time))
 
@@ -231,17 +231,17 @@ def haversine(duration: float) -> Motion:
 def steps_in_time(
     patch: Patch, motion: Motion, step: float, count: int, alpha: float = -0.05
 ) -> list[dict[str, float]]:
-    """Return the measures after each of ``count`` steps of the HHT method, beginning at rest.
+    """Return the measures after each of ``count`` steps of the HHT method, starting at rest.
 
         M a' + (1 + alpha) f(u') - alpha f(u) = 0,  u' = u + h v + h^2 ((1/2 - beta) a + beta a'),
         beta = (1 - alpha)^2 / 4,  gamma = 1/2 - alpha          (Hilber, Hughes & Taylor, EESD 5, 1977)
 
     Args:
-        patch: The patch, at rest.
-        motion: Of its moved side.
-        step: h [s].
+        patch: Patch at rest.
+        motion: Motion of its moved side.
+        step: Time step h [s].
         count: Number of steps.
-        alpha: From -1/3 to 0.
+        alpha: HHT parameter from -1/3 to 0.
     """
     beta, gamma = 0.25 * (1.0 - alpha) ** 2, 0.5 - alpha
     inertia = 1.0 / (beta * step**2)
@@ -249,30 +249,30 @@ def steps_in_time(
     displacement, velocity, force = np.zeros((3, len(patch.full)))
     acceleration = motion.acceleration(0.0) * patch.full
     acceleration[patch.free] = _first_acceleration(patch, acceleration)
-    found = []
+    history = []
     for number in range(1, count + 1):
         time = number * step
         guess = displacement + step * velocity + (0.5 - beta) * step**2 * acceleration
         right = inertia * (mass @ guess) + alpha * force
         # The prescribed acceleration enters by M; the guess of its displacement is chosen so that u' gives it.
-        boundary, given = motion.share(time) * patch.full, motion.acceleration(time) * patch.full
-        shift = inertia * (boundary - guess) - given
+        boundary, boundary_acceleration = motion.share(time) * patch.full, motion.acceleration(time) * patch.full
+        shift = inertia * (boundary - guess) - boundary_acceleration
         shift[patch.free] = 0.0
         right += mass @ shift
         displacement, force = newton.solve(displacement, boundary, right)
         new = inertia * (displacement - guess) - shift
         velocity = velocity + step * ((1.0 - gamma) * acceleration + gamma * new)
         acceleration = new
-        found.append({"time": time, **patch.measures(displacement, acceleration)})
+        history.append({"time": time, **patch.measures(displacement, acceleration)})
         patch.settle()
-    return found
+    return history
 
 
 def _first_acceleration(patch: Patch, acceleration: Floats) -> Floats:
-    """Return the acceleration of the free components at rest where the others ``(3 n,)`` [m/s^2] begin to move."""
-    given = acceleration.copy()
-    given[patch.free] = 0.0
+    """Return the free accelerations [m/s^2], shape (3 n,), at rest when the prescribed ones begin."""
+    prescribed = acceleration.copy()
+    prescribed[patch.free] = 0.0
     factor = Factor(patch.mass[patch.free][:, patch.free])
-    found = factor.solve(-(patch.mass @ given)[patch.free])
+    free_acceleration = factor.solve(-(patch.mass @ prescribed)[patch.free])
     factor.free()
-    return found
+    return free_acceleration

@@ -1,9 +1,9 @@
 """One joint between a patch of board and a patch of substrate: geometry, materials, motion, and a conforming mesh.
 
-The scene of the independent oracle (``support/joint_oracle.py``) and of the program's runs beside it. z = 0 is the
-board's face, x = y = 0 the joint's axis; only y >= 0 is meshed, the half of a body that is symmetric in y. The
-substrate is held at its sides x = -+side/2, the board at x = -side/2; its other side moves outward and away from the
-substrate. So the joint is pulled, sheared and bent at once.
+The scene of the independent oracle (``joint_oracle.py``) and of the program's runs (``joint_program.py``). z = 0 is the
+face of the board, x = y = 0 the axis of the joint; only the half y >= 0 of the symmetric body is meshed. The substrate
+is held at its sides x = -+side/2, the board at x = -side/2; its other side moves outwards and away from the substrate.
+This pulls, shears and bends the joint.
 """
 
 from collections.abc import Iterator
@@ -24,11 +24,11 @@ SOLDER = Isotropic(
 
 @dataclass(frozen=True, slots=True)
 class JointPatch:
-    """Measures [m] and materials; ``standoff`` is the height of the solder between two copper pads.
+    """Dimensions [m] and materials; ``standoff`` is the height of the solder between two copper pads.
 
     Attributes:
         stretch: Mean strain of the board at the full motion, along x.
-        lift: How far [m] the board's side moves away from the substrate; 6 um bend its ends to a fibre strain of 2e-3.
+        lift: Lift [m] of the moved side of the board; 6 um bend its ends to a fibre strain of 2e-3.
     """
 
     side: float = 3e-3
@@ -45,32 +45,32 @@ class JointPatch:
 
     @property
     def faces(self) -> Floats:
-        """Return the heights [m] of the joint's faces ``(4,)``: board and copper, copper and solder, and above."""
+        """Heights [m] of the faces of the joint, shape (4,), from board/copper to copper/substrate."""
         return np.cumsum([0.0, self.copper, self.standoff, self.copper])
 
     @property
     def pad_area(self) -> float:
-        """Return the area of a pad [m^2]."""
+        """Area of a pad [m^2]."""
         return float(np.pi * self.pad_radius**2)
 
     @property
     def full_motion(self) -> Floats:
-        """Return the displacement ``(3,)`` [m] of the board's moved side."""
+        """Displacement [m], shape (3,), of the board's moved side."""
         return np.array([self.stretch * self.side, 0.0, -self.lift])
 
 
 @dataclass(frozen=True, slots=True)
 class Fineness:
-    """How a patch is meshed: elements per eighth of the rim, and lines [m] beside edges and faces.
+    """Mesh settings of a patch: elements per eighth of the rim, and lines [m] near edges and faces.
 
     Attributes:
-        sectors: Edges on 45 degrees of the rim; the core has twice as many along x.
-        inside: Distances [m] of rings from the rim, inward.
-        outside: Distances [m] of rings from the rim, outward.
-        solder: Levels [m] from either pad up to the middle of the joint, which is a level, too.
+        sectors: Edges over 45 degrees of the rim; the core has twice this number along x.
+        inside: Distances [m] of rings from the rim, inwards.
+        outside: Distances [m] of rings from the rim, outwards.
+        solder: Levels [m] from either pad to the middle of the joint, included.
         copper: Layers of either pad.
-        board: Levels [m] below the board's face; its other face is one, too.
-        substrate: Levels [m] above the substrate's lower face; the upper is one, too.
+        board: Levels [m] below the top face of the board, bottom face included.
+        substrate: Levels [m] above the lower face of the substrate, upper face included.
     """
 
     sectors: int
@@ -82,7 +82,7 @@ class Fineness:
     substrate: tuple[float, ...]
 
 
-# Of quadratic hexahedra: forces and moments of the elastic patch change by 2 % to the next, then by 1 %.
+# Quadratic meshes: forces and moments of the elastic patch change by 2 % to the next mesh, then by 1 %.
 QUADRATIC = {
     "coarse": Fineness(
         sectors=2,
@@ -112,7 +112,7 @@ QUADRATIC = {
         substrate=(15 * UM, 50 * UM, 150 * UM),
     ),
 }
-# Of the program's hexahedra with 8 nodes.
+# Meshes of the program's 8-node hexahedra.
 TRILINEAR = {
     "coarse": Fineness(
         sectors=2,
@@ -146,11 +146,11 @@ TRILINEAR = {
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """Hexahedra of a polynomial degree d in lattice order: node a + (d + 1) b + (d + 1)^2 c has place (a, b, c) / d.
+    """Hexahedra of polynomial degree d in lattice order: node a + (d + 1) b + (d + 1)^2 c is at (a, b, c) / d.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        cells: Part -> ``(ne, (d + 1)^3)`` nodes.
+        points: Node positions [m], shape (n, 3).
+        cells: Part -> nodes, shape (ne, (d + 1)^3).
     """
 
     points: Floats
@@ -195,7 +195,7 @@ def _stack(patch: JointPatch, fineness: Fineness) -> Iterator[tuple[str, Floats]
 
 
 def _divided(lines: Floats, degree: int) -> Floats:
-    """Return lines with the nodes of a degree between them."""
+    """Return lines with the intermediate nodes of a degree."""
     return np.interp(np.arange(degree * (len(lines) - 1) + 1) / degree, np.arange(len(lines)), lines)
 
 

@@ -1,8 +1,8 @@
-"""The program's own elements, ties and steps on the scene of ``joint_patch.py``, to be held against the oracle.
+"""The program's own elements, ties and steps on the scene of ``joint_patch.py``, for comparison with the oracle.
 
-The joint is a mesh of its own, tied to board and substrate: to faces that match it node by node, or to boxes that do
-not know of it. Section forces are those of the elements on the slaves of either tie. Layer averages weigh the
-integration points of fully integrated hexahedra.
+The joint is a separate mesh, tied to matching faces of board and substrate or to boxes that ignore the joint. Section
+forces sum the element forces on the slaves of either tie. Layer averages are weighted over the integration points of
+fully integrated hexahedra.
 """
 
 import json
@@ -47,7 +47,7 @@ def matching_mesh(patch: JointPatch, fineness: Fineness) -> MeshData:
 
 
 def box_mesh(patch: JointPatch, fineness: Fineness, size: float, layers: tuple[int, int]) -> MeshData:
-    """Return the same joint tied to boxes of a size [m] that do not match it; ``layers`` of board and substrate."""
+    """Return the joint tied to non-matching boxes of a size [m]; ``layers`` of board and substrate."""
     lattice = mesh_patch(patch, fineness, 1)
     points, hexahedra = lattice.points, {part: lattice.cells[part].astype(np.int32) for part in ("copper", "solder")}
     x = np.linspace(-0.5, 0.5, round(patch.side / size) + 1) * patch.side
@@ -56,14 +56,14 @@ def box_mesh(patch: JointPatch, fineness: Fineness, size: float, layers: tuple[i
         ("board", -patch.board, 0.0, layers[0]),
         ("substrate", top, top + patch.substrate, layers[1]),
     ):
-        own, cells = grid(x, x[x > -1e-9], np.linspace(low, high, count + 1))
+        box_points, cells = grid(x, x[x > -1e-9], np.linspace(low, high, count + 1))
         hexahedra[part] = cells + np.int32(len(points))
-        points = np.concatenate([points, own])
+        points = np.concatenate([points, box_points])
     return _assembled(patch, points, hexahedra)
 
 
 def _assembled(patch: JointPatch, points: Floats, hexahedra: dict[str, NDArray[np.int32]]) -> MeshData:
-    """Part a mesh into board, joint and substrate, with facet sets for ties, supports and motions."""
+    """Split a mesh into board, joint and substrate, with facet sets for ties, supports and motions."""
     half, top = 0.5 * patch.side, patch.faces[-1]
     plane = {"y_min": on(1, 0.0)}
     sets = {
@@ -86,12 +86,12 @@ def _assembled(patch: JointPatch, points: Floats, hexahedra: dict[str, NDArray[n
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What a run does: the board's side moves there and back in a duration [s], as a haversine.
+    """Course of a run: the side of the board moves out and back as a haversine.
 
     Attributes:
-        duration: [s].
-        yields: Whether the solder does.
-        mass_scaled: Parts whose density is raised to the step of the others.
+        duration: Duration [s].
+        yields: Whether the solder yields.
+        mass_scaled: Parts with mass scaled to the step of the others.
     """
 
     duration: float = 0.2e-3
@@ -144,10 +144,10 @@ def request_of(patch: JointPatch, mesh: MeshData, course: Course, directory: Pat
 
 
 class Measures:
-    """Section resultants and layer averages of the joint in a body; names and signs as those of the oracle."""
+    """Section resultants and layer averages of the joint in a body, with the names and signs of the oracle."""
 
     def __init__(self, patch: JointPatch, body: Body) -> None:
-        """Find the slaves of both ends and the integration points of the solder's layers."""
+        """Find the slaves of both ends and the integration points of the solder layers."""
         self._patch, self._body = patch, body
         z = body.local.points[body.tie.slave][:, 2]
         self._ends = {"foot": z < 0.5 * patch.standoff, "head": z > 0.5 * patch.standoff}
@@ -156,7 +156,7 @@ class Measures:
         self._height = elements.points[elements.cells].mean(axis=1)[self._solder.lanes.element][..., 2]
 
     def take(self, slave_force: Floats) -> dict[str, float]:
-        """Return the measures at the latest force of the elements on the slaves ``(ns, 3)`` [N]."""
+        """Return the measures for the latest element forces on the slaves [N], shape (ns, 3)."""
         result, x = {}, self._body.local.points[self._body.tie.slave][:, 0]
         for end, sign in ENDS.items():
             force = -2.0 * sign * slave_force * self._ends[end][:, None]
@@ -185,10 +185,10 @@ class Measures:
 
 
 class ProgramPatch:
-    """The program's explicit run of a patch, step by step."""
+    """Explicit run of a patch by the program, step by step."""
 
     def __init__(self, patch: JointPatch, mesh: MeshData, course: Course) -> None:
-        """Build it at rest."""
+        """Build the run at rest."""
         self.patch = patch
         with tempfile.TemporaryDirectory() as directory:
             problem = StructureDynamics.read(MPI.COMM_SELF, request_of(patch, mesh, course, Path(directory)))
@@ -200,15 +200,15 @@ class ProgramPatch:
         self.measures = Measures(patch, self.body)
 
     def run(self, samples: int, share: float = 1.0) -> list[dict[str, float]]:
-        """Go through a share of the course; return the measures at about so many times."""
-        windows, found = round(share * self.plan.windows), []
+        """Run a share of the course; return about ``samples`` measures."""
+        windows, history = round(share * self.plan.windows), []
         stride = max(1, windows // samples)
         for window in range(1, windows + 1):
             self.participant.begin_window()
             self.participant.finish_window()
             if window % stride == 0 or window == windows:
-                found.append({"time": self.motion.time, **self.measures.take(self.motion.slave_force)})
-        return found
+                history.append({"time": self.motion.time, **self.measures.take(self.motion.slave_force)})
+        return history
 
     def at_rest(self) -> dict[str, float]:
         """Return the measures of linear elastic equilibrium at the full motion."""

@@ -1,8 +1,8 @@
-"""The materials of the joint oracle: quadratic hexahedra in DOLFINx forms, elastic or with J2 flow.
+"""Materials of the joint oracle: quadratic hexahedra in DOLFINx forms, elastic or with J2 flow.
 
-The displacement has 27 nodes a hexahedron, on curved ones, with 27 integration points.
-Strains are small. The flow is radial return with isotropic, linear hardening, sigma_y = A + B p (Johnson & Cook with
-n = 1, C = 0), whose closed form has an exact tangent by differentiation.
+The displacement has 27 nodes per (curved) hexahedron, with 27 integration points. Strains are small. The flow is radial
+return with linear isotropic hardening, sigma_y = A + B p (Johnson & Cook with n = 1, C = 0), whose closed form has an
+exact tangent.
 """
 
 from functools import cached_property
@@ -21,9 +21,9 @@ from reflowshock.materials.parameters import Isotropic, Material
 Floats = NDArray[np.float64]
 FLAGS = ["-O2", "-march=native"]
 DEGREE = 4  # three points along each edge
-TINY = 1.0  # Pa: there is no direction of flow where there is no stress
+TINY = 1.0  # Pa; avoids division by zero without stress
 AT_POINTS = {"stress": (3, 3), "tangent": (6, 6)}
-MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]  # of the components xx yy zz xy yz xz
+MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]  # 3 x 3 matrix of the components xx yy zz xy yz xz
 ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 DEVIATOR = np.eye(6)
 DEVIATOR[:3, :3] -= 1.0 / 3.0
@@ -40,7 +40,7 @@ def stiffness_matrix(material: Material) -> Floats:
 
 
 def lattice_order() -> NDArray[np.int64]:
-    """Return the place in ``joint_patch.Lattice`` of each node of DOLFINx's quadratic hexahedron: ``(27,)``."""
+    """Return the index in ``joint_patch.Lattice`` of each node of the quadratic DOLFINx hexahedron, shape (27,)."""
     cell, variant = basix.CellType.hexahedron, basix.LagrangeVariant.gll_warped
     places = np.rint(2 * basix.create_element(basix.ElementFamily.P, cell, 2, variant).points).astype(int)
     return places @ [1, 3, 9]
@@ -60,18 +60,18 @@ def von_mises(stress: Floats) -> Floats:
 
 
 class Region:
-    """Cells of one elastic material as a mesh of DOLFINx's, and their matrices and forces among all nodes.
+    """Cells of one elastic material as a DOLFINx mesh, with matrices and forces in the numbering of the patch.
 
     Stress and strain have the components xx yy zz xy yz xz, shear as engineering strain.
 
     Attributes:
-        dofs: ``(3 m,)`` displacement component of the patch that each degree of freedom is.
-        height: ``(ne,)`` [m] of the cells' centres.
-        weight: ``(ne, 27)`` [m^3] of the integration points.
+        dofs: Displacement component of the patch of each degree of freedom, shape (3 m,).
+        height: Heights [m] of the cell centres, shape (ne,).
+        weight: Weights [m^3] of the integration points, shape (ne, 27).
     """
 
     def __init__(self, points: Floats, cells: NDArray[np.int64], material: Material) -> None:
-        """Take cells ``(ne, 27)`` of points ``(n, 3)`` [m] in lattice order."""
+        """Build the mesh from cells, shape (ne, 27), and points [m], shape (n, 3), in lattice order."""
         used, number = np.unique(cells[:, lattice_order()], return_inverse=True)
         self.count = 3 * len(points)
         self.mesh = mesh = dolfinx_api.make_mesh(MPI.COMM_SELF, points[used], number.reshape(-1, 27))
@@ -91,8 +91,8 @@ class Region:
     def among_all(self, form: ufl.Form) -> scipy.sparse.csr_matrix:
         """Return a bilinear form as a matrix of all components of the patch."""
         matrix = dolfinx_api.assembled_csr(dolfinx_api.compiled_form(form, FLAGS)).tocoo()
-        place = self.dofs[matrix.row], self.dofs[matrix.col]
-        return scipy.sparse.coo_matrix((matrix.data, place), shape=(self.count, self.count)).tocsr()
+        row_and_column = self.dofs[matrix.row], self.dofs[matrix.col]
+        return scipy.sparse.coo_matrix((matrix.data, row_and_column), shape=(self.count, self.count)).tocsr()
 
     @cached_property
     def mass(self) -> scipy.sparse.csr_matrix:
@@ -120,7 +120,7 @@ class Region:
         return self._strain().reshape(*self.weight.shape, 6)
 
     def values(self, displacement: Floats) -> dict[str, Floats]:
-        """Return what layers are judged by at the integration points, ``(ne, 27)``: Pa, J/m^3."""
+        """Return the measures of layers at the integration points, shape (ne, 27) [Pa, J/m^3]."""
         return {"von_mises": von_mises(self.strain(displacement) @ self.elasticity)}
 
     def means(self, values: dict[str, Floats], within: tuple[float, float]) -> dict[str, float]:
@@ -130,14 +130,14 @@ class Region:
         return {name: float(np.average(value[chosen], weights=weight)) for name, value in values.items()}
 
     def settle(self) -> None:
-        """Take the latest displacement as that of a finished step."""
+        """Accept the latest displacement as a finished step."""
 
 
 class YieldingRegion(Region):
-    """Cells that yield, by radial return from the plastic strain that the latest finished step has left."""
+    """Yielding cells with radial return from the plastic strain of the latest finished step."""
 
     def __init__(self, points: Floats, cells: NDArray[np.int64], material: Material) -> None:
-        """Take cells as ``Region``, without plastic strain."""
+        """Build cells as in ``Region``, without plastic strain."""
         assert isinstance(material, Isotropic) and material.plasticity
         assert material.plasticity.n == 1.0 and not material.plasticity.C
         super().__init__(points, cells, material)
@@ -153,16 +153,16 @@ class YieldingRegion(Region):
         """Return the internal force of all components ``(3 n,)`` [N] at a displacement ``(3 n,)`` [m]."""
         self._latest = self._returned(self.strain(displacement))
         self._set("stress", self._latest[0][..., MATRIX])
-        own, result = np.zeros(len(self.dofs)), np.zeros(self.count)
-        dolfinx.fem.assemble_vector(own, self._force)
-        result[self.dofs] = own
+        local_force, result = np.zeros(len(self.dofs)), np.zeros(self.count)
+        dolfinx.fem.assemble_vector(local_force, self._force)
+        result[self.dofs] = local_force
         return result
 
     def tangent(self) -> scipy.sparse.csr_matrix:
         """Return the derivative [N/m] of the latest force."""
         self._set("tangent", self._latest[1])
-        own = ufl.dot(self._fields["tangent"], strain_of(self.trial))
-        return self.among_all(ufl.inner(own, strain_of(self.test)) * self.dx)
+        stress_change = ufl.dot(self._fields["tangent"], strain_of(self.trial))
+        return self.among_all(ufl.inner(stress_change, strain_of(self.test)) * self.dx)
 
     def _set(self, name: str, values: Floats) -> None:
         field = self._fields[name]
@@ -191,12 +191,12 @@ class YieldingRegion(Region):
         return trial - 2.0 * shear * flow[..., None] * direction, tangent
 
     def values(self, displacement: Floats) -> dict[str, Floats]:
-        """Return what layers are judged by at the integration points, ``(ne, 27)``: Pa, J/m^3."""
+        """Return the measures of layers at the integration points, shape (ne, 27) [Pa, J/m^3]."""
         stress, _ = self._returned(self.strain(displacement))
         (start, hardening), plastic = self._law, self._new["equivalent"]
         work = start * plastic + 0.5 * hardening * plastic**2
         return {"von_mises": von_mises(stress), "plastic_strain": plastic, "plastic_work": work}
 
     def settle(self) -> None:
-        """Take the plastic strains of the latest displacement."""
+        """Accept the plastic strains of the latest displacement."""
         self._state = self._new

@@ -1,4 +1,4 @@
-"""Level sets of drops, exact."""
+"""Exact level sets of drops."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from reflowshock.particles.surface.level_set import LevelSet
 
 
 def ball(grid, centre, radius, mirrored=False):
-    """Level set of a ball; mirrored: of its part above z = 0 and the mirror image of that."""
+    """Return the level set of a ball; ``mirrored``: of its part above z = 0 and the mirror image of that part."""
     nodes = np.stack(np.meshgrid(*grid.axes(), indexing="ij"), axis=-1)
     if mirrored:
         nodes[..., 2] = np.abs(nodes[..., 2])
@@ -20,6 +20,6 @@ def grid_around_ball(centre, radius, spacing):
 
 
 def cap_radius(volume, angle):
-    """Radius of the sphere of a cap of a volume and contact angle [m]."""
+    """Return the sphere radius [m] of a cap of a volume and contact angle."""
     c = np.cos(angle)
     return np.cbrt(3.0 * volume / (np.pi * (1.0 - c) ** 2 * (2.0 + c)))

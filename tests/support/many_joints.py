@@ -1,4 +1,4 @@
-"""Two hundred joints of exactly known shape, deterministic, and how their meshes turn out."""
+"""Two hundred deterministic joints of exactly known shape, and the outcome of meshing them."""
 
 import time
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ COUNTS = {
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A joint, or two that are one body, and where it goes."""
+    """Joint, or two joined ones, and their pad sites."""
 
     kind: str
     surface: ClosedSurface
@@ -40,7 +40,7 @@ class Sample:
 
 
 def samples(every: int = 1) -> Iterator[Sample]:
-    """All joints, or every so many of each kind, the first included."""
+    """Return every ``every``-th joint of each kind, including the first."""
     for seed, (kind, count) in enumerate(COUNTS.items()):
         generator = np.random.default_rng(seed)
         for number in range(count):
@@ -50,14 +50,14 @@ def samples(every: int = 1) -> Iterator[Sample]:
 
 
 def mesh(sample: Sample) -> JointMesh:
-    """Mesh a joint in its place."""
+    """Mesh a joint at its pad site."""
     return mesh_at(sample.surface, sample.sites).mesh
 
 
 def outcome(sample: Sample) -> dict:
-    """Mesh a joint; tell method, errors, quality, tries and processor seconds, or why it was refused.
+    """Mesh a joint; return method, errors, quality, attempts and processor seconds, or the reason of refusal.
 
-    Volume and smallest scaled Jacobian are measured here again, whatever the mesher says of them.
+    Volume and smallest scaled Jacobian are measured independently of the mesher.
     """
     start = time.process_time()
     try:
@@ -76,7 +76,7 @@ def outcome(sample: Sample) -> dict:
 
 
 def _revolved(generator: np.random.Generator, bulge: tuple[float, float]) -> ClosedSurface:
-    """Barrel or hourglass between discs of two radii; bulge over the smaller one."""
+    """Return a barrel or hourglass between discs of two radii; bulge over the smaller one."""
     gap, lower, upper = generator.uniform(0.2, 0.45) * MM, *generator.uniform(0.18, 0.28, 2) * MM
     share = np.linspace(0.0, 1.0, LEVELS)
     depth = generator.uniform(*bulge) * min(lower, upper)
@@ -93,14 +93,14 @@ def hourglass(generator: np.random.Generator, number: int) -> ClosedSurface:
 
 
 def shifted(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """Shifted by up to 0.3 radius, as far as that every fifth time."""
+    """Return a joint shifted by up to 0.3 radius; every fifth has the full shift."""
     shift = 0.3 * 0.18 * MM * (1.0 if number % 5 == 0 else generator.uniform())
     angle = generator.uniform(0.0, 2.0 * np.pi)
     return laid_between(_revolved(generator, (-0.3, 0.6)), (shift * np.cos(angle), shift * np.sin(angle)), (0.0, 0.0))
 
 
 def tilted(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """Tilted by up to 5 degrees, as far as that every fifth time, and shifted."""
+    """Return a shifted joint tilted by up to 5 degrees; every fifth has the full tilt."""
     angles = generator.uniform(0.0, 2.0 * np.pi, 2)
     slope = np.tan(np.radians(5.0 if number % 5 == 0 else generator.uniform(0.0, 5.0)))
     shift = 0.3 * 0.18 * MM * generator.uniform()
@@ -109,18 +109,18 @@ def tilted(generator: np.random.Generator, number: int) -> ClosedSurface:
 
 
 def overflow(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """Solder on the mask: a sphere that meets both plates at 120 to 150 degrees, beyond the pads."""
+    """Return solder on the mask: a sphere that meets both plates at 120 to 150 degrees, beyond the pads."""
     angle, gap = np.radians(generator.uniform(120.0, 150.0)), generator.uniform(0.25, 0.4) * MM
     return surfaces.overflow(gap, angle, 0.3 * MM, AROUND, LEVELS)
 
 
 def lobed(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """A barrel with two to four lobes, star-shaped."""
+    """Return a star-shaped barrel with two to four lobes."""
     return surfaces.lobed(0.3 * MM, 0.24 * MM, 2 + number % 3, generator.uniform(0.1, 0.3), LEVELS)
 
 
 def hooked(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """A joint with an arm that bends round a bay: not star-shaped."""
+    """Return a joint with an arm that bends round a bay, not star-shaped."""
     return surfaces.hooked(0.3 * MM, generator.uniform(0.35, 0.5) * MM)
 
 

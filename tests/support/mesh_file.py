@@ -1,4 +1,4 @@
-"""A Gmsh file of hexahedra as a reader sees it."""
+"""Gmsh files of hexahedra read by meshio."""
 
 import meshio
 import numpy as np
@@ -14,7 +14,7 @@ class MeshFile:
         self.points = self.mesh.points
 
     def cells(self, name, kind="hexahedron"):
-        """Cells of a physical group, by meshio's cell sets."""
+        """Return the cells of a physical group."""
         blocks = zip(self.mesh.cells, self.mesh.cell_sets[name], strict=True)
         return np.vstack([block.data[chosen] for block, chosen in blocks if block.type == kind and len(chosen)])
 

@@ -1,4 +1,4 @@
-"""What each MPI rank runs for tests: a script, or inputs of the fem program one after the other.
+"""Work of each MPI rank in tests: a script, or inputs of the fem program one after the other.
 
 mpirun -n N python -m tests.support.on_ranks SCRIPT.py WORD ...
 mpirun -n N python -m tests.support.on_ranks RANKS INPUT.json RANKS INPUT.json ...
@@ -11,7 +11,7 @@ import time
 
 
 def run_in_turn(words: list[str]) -> None:
-    """Run inputs, each on the first ranks, while the others sleep."""
+    """Run inputs in turn, each on the first ranks, while the others sleep."""
     from mpi4py import MPI
 
     from reflowshock.fem.run.program import main

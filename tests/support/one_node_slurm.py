@@ -1,4 +1,4 @@
-"""A Slurm of one node: munged, slurmctld and slurmd on loopback addresses, with all their files in one folder."""
+"""Slurm cluster of one node: munged, slurmctld and slurmd on loopback addresses, with all files in one folder."""
 
 import os
 import shutil
@@ -54,12 +54,12 @@ latency-wait: 10
 
 
 class NoSlurm(RuntimeError):
-    """No Slurm can be started here; the message says why."""
+    """Slurm cannot be started here; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class OneNode:
-    """A Slurm at work: its folder, the environment in which its commands find it, a profile for it."""
+    """Running Slurm: its folder, the environment of its commands, and a Snakemake profile."""
 
     folder: Path
     environment: dict[str, str]
@@ -71,23 +71,23 @@ class OneNode:
         ).stdout
 
     def ended(self) -> list[dict[str, str]]:
-        """Records of jobs that have ended, as key -> value, with the rule that each was for."""
+        """Return the records of ended jobs as key -> value, with the rule of each job."""
         path = self.folder / "jobs.txt"
         lines = path.read_text().splitlines() if path.is_file() else []
         return [dict(word.split("=", 1) for word in line.split() if "=" in word) for line in lines]
 
     def queue(self) -> list[list[str]]:
-        """Number, state, tasks, comment and working folder of each job that is known, in the order of submission."""
+        """Return number, state, tasks, comment and working folder of each job in the order of submission."""
         rows = self.ask("squeue", "--noheader", "--states=all", "--format=%A|%T|%C|%k|%Z").splitlines()
         return sorted((row.split("|") for row in rows), key=lambda job: int(job[0]))
 
 
 @contextmanager
 def one_node_slurm(folder: Path) -> Iterator[OneNode]:
-    """Start a Slurm, stop it in the end.
+    """Start a Slurm cluster and stop it at the end.
 
     Raises:
-        NoSlurm: a program is missing, this is not root, or a daemon does not start.
+        NoSlurm: If a program is missing, the user is not root, or a daemon does not start.
     """
     missing = [program for program in PROGRAMS if shutil.which(program, path=_path()) is None]
     if missing:
@@ -169,9 +169,9 @@ def _stop(started: list[subprocess.Popen]) -> None:
 
 def _free_ports(count: int) -> list[int]:
     sockets = [socket.socket() for _ in range(count)]
-    for one in sockets:
-        one.bind(("127.0.0.1", 0))
-    ports = [one.getsockname()[1] for one in sockets]
-    for one in sockets:
-        one.close()
+    for listener in sockets:
+        listener.bind(("127.0.0.1", 0))
+    ports = [listener.getsockname()[1] for listener in sockets]
+    for listener in sockets:
+        listener.close()
     return ports

@@ -1,4 +1,4 @@
-"""Products of a store, made up: every file that a stage is to write, with its name as content."""
+"""Synthetic products of a store: every file of a stage, with its name as content."""
 
 import shutil
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
 def make(
     store: Store, point: Point, names: Iterable[str], *, content: str = "", findings: Findings | None = None
 ) -> None:
-    """Make products of stages, one after the other, as their jobs do."""
+    """Make products of stages in order, as their jobs do."""
     for name in names:
         store.prepare_work(point, name)
         work = store.work_folder(point, name)

@@ -1,4 +1,4 @@
-"""Pieces of work for MPI ranks that reflow joints: by name, so that any process can do them."""
+"""Jobs for MPI ranks that reflow joints, importable by name in any process."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ def solve(job: JointReflow, progress: Report):
 
 
 def fail(job: str, progress: Report) -> str:
-    """Fail at one joint; the other goes on for longer than anyone waits."""
+    """Fail at one joint, while the other joint sleeps."""
     if job == "fails":
         raise ValueError("no rest after 3 steps")
     progress(0.5)
@@ -29,7 +29,7 @@ def fail(job: str, progress: Report) -> str:
 
 
 def be_killed(job: JointReflow, progress: Report):
-    """Reflow one joint; where there is no solder to reflow, be killed as soon as the other has left its checkpoint."""
+    """Reflow one joint; without solder kill the rank as soon as the other has written its checkpoint."""
     if job.checkpoint.name != "B1":
         return reflow_pool._solve(job, progress)
     while not (job.checkpoint.parent / "A1").exists():

@@ -1,7 +1,7 @@
-"""Messages across the interface written down, and given again: one side of a coupled run alone, to the same bits.
+"""Recording and replay of interface messages: one side of a coupled run alone, to the same bits.
 
-A participant of any scheme takes its channels at the start and knows nothing else of its partner, so that what it
-received is all that it needs. What it sends again is compared with what it sent.
+A participant takes its channels at the start and has no other connection to its partner; the received messages are
+therefore sufficient. Messages that it sends are compared with the recorded ones.
 """
 
 from dataclasses import dataclass, field
@@ -16,17 +16,17 @@ CHANNELS, WAYS = ("velocities", "forces"), ("sent", "received")
 
 
 class RecordingError(ValueError):
-    """Recorded messages that do not fit the participant that wants them."""
+    """Recorded messages that do not fit the participant."""
 
 
 @dataclass(slots=True)
 class Recorded:
-    """A channel whose messages are written down.
+    """Channel that records its messages.
 
     Attributes:
-        channel: The channel.
+        channel: Channel.
         rows: Local interface nodes of the participant.
-        sent: Values ``(k, 3)`` at them, message by message; ``received`` as well.
+        sent: Values at them, shape (k, 3), message by message; ``received`` likewise.
     """
 
     channel: Messages
@@ -36,7 +36,7 @@ class Recorded:
 
     @property
     def clock(self) -> MessageClock:
-        """Return the clock of the channel."""
+        """Clock of the channel."""
         return self.channel.clock
 
     def send(self, values: NDArray[np.float64]) -> None:
@@ -56,12 +56,12 @@ class Recorded:
 
 @dataclass(slots=True)
 class Replayed:
-    """A channel that gives what was received once.
+    """Channel that replays received messages.
 
     Attributes:
         rows: Local interface nodes of the participant.
-        sent: Values ``(w, k, 3)`` of the recorded messages, and ``received``.
-        deviation: Largest difference of what is sent now from what was sent then.
+        sent: Values of the recorded messages, shape (w, k, 3); ``received`` likewise.
+        deviation: Largest difference between sent and recorded values.
     """
 
     rows: NDArray[np.int32]
@@ -73,13 +73,13 @@ class Replayed:
     _taken: int = 0
 
     def send(self, values: NDArray[np.float64]) -> None:
-        """Compare with the next message that was sent."""
+        """Compare with the next recorded message."""
         difference = values[self.rows] - self._next(self.sent, self._taken)
         self.deviation = max(self.deviation, float(np.abs(difference).max(initial=0.0)))
         self._taken += 1
 
     def receive(self, values: NDArray[np.float64]) -> None:
-        """Take the next message that was received."""
+        """Return the next received message."""
         values[self.rows] = self._next(self.received, self._given)
         self._given += 1
 
@@ -89,17 +89,17 @@ class Replayed:
     @staticmethod
     def _next(messages: NDArray[np.float64], number: int) -> NDArray[np.float64]:
         if number >= len(messages):
-            raise RecordingError(f"the recording has {len(messages)} messages, another one is wanted")
+            raise RecordingError(f"the recording has {len(messages)} messages, the participant asks for another one")
         return messages[number]
 
 
 def record(channels: InterfaceChannels, rows: NDArray[np.int32]) -> InterfaceChannels:
-    """Return channels of a participant that record what goes through them; ``rows`` are its local interface nodes."""
+    """Return channels that record the messages of a participant; ``rows`` are its local interface nodes."""
     return InterfaceChannels(Recorded(channels.velocities, rows), Recorded(channels.forces, rows))
 
 
 def save_recording(channels: InterfaceChannels, path: Path) -> None:
-    """Write what channels of ``record`` have written down (``.npz``)."""
+    """Write the messages of channels of ``record`` (``.npz``)."""
     arrays = {}
     for name in CHANNELS:
         channel = getattr(channels, name)
@@ -109,10 +109,10 @@ def save_recording(channels: InterfaceChannels, path: Path) -> None:
 
 
 def replay(path: Path, rows: NDArray[np.int32]) -> InterfaceChannels:
-    """Return channels that give again what a participant with the same interface nodes received.
+    """Return channels that replay recorded messages to a participant with the same interface nodes.
 
     Raises:
-        RecordingError: The recording is of another interface.
+        RecordingError: If the recording is of another interface.
     """
     with np.load(path) as arrays:
         sent, received = ({name: arrays[f"{name}_{way}"] for name in CHANNELS} for way in WAYS)

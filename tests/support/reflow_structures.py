@@ -1,4 +1,4 @@
-"""Board and package as formulas, and joints computed in this process: what a coupled reflow works with in tests."""
+"""Board and package as formulas, and joints computed in this process, for tests of the coupled reflow."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -9,19 +9,19 @@ from reflowshock.workflow.reflow.array import JointArray
 
 
 class HerePool:
-    """A pool that computes in this process; counts what it was asked for, may fail on the way."""
+    """Pool that computes in this process, counts its jobs, and may fail on request."""
 
     def __init__(self, fail=None):
         self.asked, self.fail = [], fail
 
     def run(self, work, jobs, progress):
-        found = {}
+        results = {}
         for name, job in jobs.items():
             self.asked.append((name, job.now.number))
             if self.fail == len(self.asked):
                 raise KeyboardInterrupt
-            found[name] = work(job, lambda share: None)
-        return found
+            results[name] = work(job, lambda share: None)
+        return results
 
 
 def joints_here(solder, folder, fail=None):
@@ -42,7 +42,7 @@ NAMES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")
 
 
 def rigid_modes(centres, names, weight, at=(0.0, 0.0)):
-    """Motions of pads at `centres (joints, 3)`, turns about the origin, of a weight [N] at x, y [m]."""
+    """Return the modes of pads at ``centres``, shape (joints, 3): rotations about the origin, weight [N] at x, y."""
     motions, weights, load = [], [], np.array([0.0, 0.0, -weight])
     for name in names:
         number = NAMES.index(name)
@@ -59,9 +59,9 @@ def rigid_modes(centres, names, weight, at=(0.0, 0.0)):
 
 
 class Bow:
-    """A package that bows by its temperature, w = bow (T - 300 K) (x^2 + y^2), and gives way to forces on its pads.
+    """Package that bows with temperature, w = bow (T - 300 K) (x^2 + y^2), with compliant pads.
 
-    Each pad lies on a spring of its own: `compliance` [m/N] and [rad/(N m)] / radius^2.
+    Each pad lies on its own spring: ``compliance`` [m/N] and [rad/(N m)] / radius^2.
     """
 
     def __init__(self, centres, modes, bow=0.0, compliance=0.0):

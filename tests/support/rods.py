@@ -1,4 +1,4 @@
-"""A trial for tests of the collector, also a plugin of pytest: processes that load it know rods, too."""
+"""Trial for tests of the collector, also a pytest plugin that registers rods as a trial."""
 
 import math
 import os
@@ -14,14 +14,14 @@ from reflowshock.quantity import Quantity
 
 
 class Rod(Parameters):
-    """A rod that is stretched."""
+    """Rod under tension."""
 
     length: Annotated[float, Quantity("mm")] = Field(gt=0)
     fate: str = "holds"
 
 
 def stretch(rod: Rod) -> dict[str, Measured]:
-    """Do what the rod's fate is."""
+    """Return, fail or hang as the fate of the rod requires."""
     if rod.fate == "hangs":
         time.sleep(60.0)
     if rod.fate == "dies":

@@ -1,7 +1,7 @@
-"""Participants that are functions: in place of a macro or a meso model, for tests and for finding faults.
+"""Scripted participants in place of a macro or a meso model, for tests and for locating errors.
 
-They go through the windows of ``held_velocity`` (``local_steps`` too), or of ``one_way``, with a real partner. Their
-interface nodes are numbered as those of the partner's interface: its number k is their node k.
+They take part in the windows of ``held_velocity`` (also ``local_steps``) or ``one_way`` with a real partner. Their
+interface nodes are numbered like the interface of the partner.
 """
 
 from collections.abc import Callable
@@ -23,10 +23,10 @@ def scripted_interface(count: int) -> NDArray[np.int32]:
 
 
 class ScriptedDriver:
-    """A macro model that moves the interface and takes nothing back, as ``one_way.Driver``.
+    """Macro model with a prescribed interface motion and no feedback, as ``one_way.Driver``.
 
     Attributes:
-        time: [s].
+        time: Time [s].
     """
 
     def __init__(
@@ -35,16 +35,16 @@ class ScriptedDriver:
         """Start at time zero.
 
         Args:
-            points: ``(nc, 3)`` [m] the interface nodes.
-            velocity: Of the interface; asked for at the middle of each window.
+            points: Interface nodes [m], shape (nc, 3).
+            velocity: Velocity of the interface, evaluated at the middle of each window.
             plan: Windows.
-            channels: To the meso model.
+            channels: Channels to the meso model.
         """
         self.time, self._points, self._velocity = 0.0, points, velocity
         self._plan, self._channels = plan, channels
 
     def begin_window(self) -> None:
-        """Send the interface's velocity."""
+        """Send the velocity of the interface."""
         middle = self.time + 0.5 * self._plan.window
         self._channels.velocities.send(np.broadcast_to(self._velocity(middle, self._points), self._points.shape).copy())
         self.time += self._plan.window
@@ -54,33 +54,33 @@ class ScriptedDriver:
 
 
 class ScriptedMacro(ScriptedDriver):
-    """A macro model that moves the interface, as ``held_velocity.HeldVelocityMacro``.
+    """Macro model with a prescribed interface motion, as ``held_velocity.HeldVelocityMacro``.
 
     Attributes:
-        mass: ``(nc, 3)`` [kg] of the meso model at the interface.
-        force: ``(nc, 3)`` [N] that it has given back last.
+        mass: Mass of the meso model at the interface [kg], shape (nc, 3).
+        force: Latest force of the meso model [N], shape (nc, 3).
     """
 
     def __init__(
         self, points: NDArray[np.float64], velocity: VelocityScript, plan: WindowPlan, channels: InterfaceChannels
     ) -> None:
-        """Receive the interface mass; a ``HeldVelocityMeso`` must have sent it. Arguments as ``ScriptedDriver``."""
+        """Receive the interface mass, which a ``HeldVelocityMeso`` must have sent; arguments as ``ScriptedDriver``."""
         super().__init__(points, velocity, plan, channels)
         self.mass, self.force = np.zeros_like(points), np.zeros_like(points)
         channels.forces.receive(self.mass)
 
     def finish_window(self) -> None:
-        """Receive the meso model's force."""
+        """Receive the force of the meso model."""
         self._channels.forces.receive(self.force)
 
 
 class ScriptedMeso:
-    """A meso model that answers with a force, as ``held_velocity.HeldVelocityMeso``: a spring, a dashpot, a table.
+    """Meso model that answers with a prescribed force law, as ``held_velocity.HeldVelocityMeso``.
 
     Attributes:
-        time: [s].
-        displacement: ``(nc, 3)`` [m] of the interface, ``velocity`` [m/s] that over the window.
-        force: ``(nc, 3)`` [N] that was given back last.
+        time: Time [s].
+        displacement: Displacement of the interface [m], shape (nc, 3).
+        force: Latest sent force [N], shape (nc, 3).
     """
 
     def __init__(
@@ -89,17 +89,17 @@ class ScriptedMeso:
         """Send the interface mass and start at rest.
 
         Args:
-            mass: ``(nc,)`` [kg] at the interface.
-            force: On the interface; asked for at the end of each window.
+            mass: Mass at the interface [kg], shape (nc,).
+            force: Force law of the interface, evaluated at the end of each window.
             plan: Windows.
-            channels: To the macro model.
+            channels: Channels to the macro model.
         """
         self.time, self._script, self._plan, self._channels = 0.0, force, plan, channels
         self.displacement, self.velocity, self.force = np.zeros((3, len(mass), 3))
         channels.forces.send(np.repeat(mass[:, None], 3, axis=1))
 
     def begin_window(self) -> None:
-        """Move with the received velocity of the interface, then send the force on it."""
+        """Move with the received velocity of the interface, then send its force."""
         self._channels.velocities.receive(self.velocity)
         self.displacement += self._plan.window * self.velocity
         self.time += self._plan.window

@@ -1,4 +1,4 @@
-"""Runs that several tests need: the first of all workers that asks makes one, and all of them read it."""
+"""Runs shared by several tests: the first worker that asks makes the run, all others read it."""
 
 import fcntl
 import pickle
@@ -14,18 +14,18 @@ RUNS = {"small": lambda folder: reflowshock("run", folder), "drop": run_drop}
 
 
 def shared_run(name: str, factory: pytest.TempPathFactory, worker: str) -> tuple[Path, CompletedProcess]:
-    """Return the folder of a run that nobody changes, and how it ended.
+    """Return the folder of a read-only run and its completed process.
 
     Args:
-        name: of the run, among `RUNS`.
-        factory: of pytest, whose folders of all workers lie side by side.
-        worker: which of pytest-xdist this is; "master" without it.
+        name: Name of the run in ``RUNS``.
+        factory: Factory of temporary folders, whose parents are shared by all workers.
+        worker: Name of the pytest-xdist worker; "master" without xdist.
     """
     base = factory.getbasetemp() if worker == "master" else factory.getbasetemp().parent
-    folder, told = base / "shared" / name, base / "shared" / f"{name}.pickle"
-    told.parent.mkdir(exist_ok=True)
-    with told.with_suffix(".lock").open("w") as lock:
+    folder, record = base / "shared" / name, base / "shared" / f"{name}.pickle"
+    record.parent.mkdir(exist_ok=True)
+    with record.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not told.exists():
-            told.write_bytes(pickle.dumps(RUNS[name](folder)))
-    return folder, pickle.loads(told.read_bytes())
+        if not record.exists():
+            record.write_bytes(pickle.dumps(RUNS[name](folder)))
+    return folder, pickle.loads(record.read_bytes())

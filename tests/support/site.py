@@ -1,4 +1,4 @@
-"""Commands that the site shows: those of its pages, and those of READMEs, which are pages of it as they are."""
+"""Commands on the site: commands of its pages and of the READMEs, which are also pages."""
 
 import re
 from collections.abc import Iterator
@@ -14,18 +14,18 @@ OURS = re.compile(rf"^(\S*/)?reflowshock ({'|'.join(commands())}|--)")
 
 
 def pages() -> list[Path]:
-    """Return the pages that are written by hand."""
+    """Return the hand-written pages."""
     return sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "generated")
 
 
 def shown(page: Path) -> list[str]:
-    """Return the command lines of a page, in their order."""
+    """Return the command lines of a page in order."""
     lines = "".join(FENCE.findall(page.read_text())).splitlines()
     return [line.partition("  #")[0].rstrip() for line in lines]
 
 
 def in_readmes() -> Iterator[tuple[Path, str]]:
-    """Yield the program's commands in the READMEs at the top, of the rooms and of the cases."""
+    """Yield the program's commands in the READMEs of the top folder, of rooms and of cases."""
     rooms = ("benchmarks", "cases", "fem", "meshing", "particles", "workflow")
     for path in (*ROOT.glob("*.md"), *(page for room in rooms for page in (ROOT / room).rglob("*.md"))):
         for line in INDENTED.findall(path.read_text()):

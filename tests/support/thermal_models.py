@@ -1,4 +1,4 @@
-"""Boards and packages for tests of thermoelasticity: layered strips and plates over a plain board, and their pads."""
+"""Boards and packages for tests of thermoelasticity: layered strips and plates above a plain board, and their pads."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from reflowshock.materials.parameters import Isotropic
 from reflowshock.materials.roles import ELASTIC, Materials
 from tests.support.fem_models import SITES, write_msh, write_small_assembly
 
-LIFT = 1e-3  # height of the layers' lower face
+LIFT = 1e-3  # height of the lower face of the layers
 REFERENCE = 298.15
 STIFF = Isotropic(density=2330.0, young_modulus=130e9, poisson_ratio=0.0, thermal_expansion=2e-6)
 SOFT = Isotropic(density=1900.0, young_modulus=25e9, poisson_ratio=0.0, thermal_expansion=16e-6)
@@ -25,7 +25,7 @@ SOFT = Isotropic(density=1900.0, young_modulus=25e9, poisson_ratio=0.0, thermal_
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """A quarter of a plate [m]: substrate below, die above, ``cells`` along x, y and through either layer."""
+    """Quarter of a plate [m]: substrate below, die above, ``cells`` along x, y and through either layer."""
 
     length: float
     width: float
@@ -50,11 +50,11 @@ class Layers:
 def structure_of(
     mesh: MeshData, folder: Path, pads: Pads, materials: Mapping, thermal: Mapping | None = None
 ) -> ThermalStructure:
-    """Return the structure of a mesh; materials of roles as in a case."""
+    """Return the structure of a mesh with materials by role as in a case."""
     path = folder / "assembly.msh"
     write_msh(mesh, path)
-    given = Materials.model_validate(dict(materials))
-    assembly = Assembly(path, pads, given, Thermal.model_validate(dict(thermal or {})), gravity=0.0)
+    materials_of_roles = Materials.model_validate(dict(materials))
+    assembly = Assembly(path, pads, materials_of_roles, Thermal.model_validate(dict(thermal or {})), gravity=0.0)
     return ThermalStructure.build(MPI.COMM_SELF, assembly)
 
 
@@ -72,6 +72,6 @@ def small_pads(radius: float = 0.2e-3) -> Pads:
 
 
 def small_structure(folder: Path, gravity: float = 9.81, **thermal) -> Assembly:
-    """Write the quarter package on its board of ``fem_models``; fields of ``Thermal`` as keywords."""
+    """Write the quarter package on its board of ``fem_models`` with fields of ``Thermal`` as keywords."""
     mesh = write_small_assembly(folder)[0]
     return Assembly(mesh, small_pads(), ELASTIC, Thermal.model_validate(thermal), gravity)

@@ -1,4 +1,4 @@
-"""Asks the server of `warm_start` for a process: loads little, since each Snakemake and each stage begins with it."""
+"""Client of the server of ``warm_start``; it imports little, since each Snakemake and each stage begins with it."""
 
 import json
 import os
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 
 def ask(address: str, words: Sequence[str], streams: Sequence[int], cwd: str | None = None) -> int:
-    """Have a module run with its arguments and these standard streams, until it has ended or this process ends.
+    """Have the server run a module with arguments and standard streams, until it or this process ends.
 
     Returns:
-        Its exit code, or minus the signal that ended it.
+        Exit code of the module, or minus the signal that ended it.
     """
     request = {"words": words, "cwd": cwd or os.getcwd(), "environment": dict(os.environ)}
     with socket.socket(socket.AF_UNIX) as connection:

@@ -1,7 +1,7 @@
-"""Commands without their start-up: a server that has loaded the libraries forks a process for each.
+"""Commands without start-up time: a server with loaded libraries forks a process for each command.
 
-The Snakemake, the stages and the MPI ranks that it starts are forked, too: the Python that it calls asks the server.
-What a start of its own may change (environments, signals, a first word) is tested with `python -m reflowshock`.
+Snakemake, stages and MPI ranks are forked as well, since the Python that they call asks the server. Tests of
+environments, signals and the first command use ``python -m reflowshock`` instead.
 """
 
 import atexit
@@ -23,7 +23,7 @@ from tests.support.compiled_once import compile_once
 from tests.support.warm_client import ask
 
 ROOT = Path(__file__).resolve().parents[2]
-# What commands, stages and ranks load; not MPI, nor what loads it: a process that has begun it cannot be forked.
+# Modules of commands, stages and ranks, except MPI and its users: a process with MPI initialised cannot be forked.
 LIBRARIES = (
     "ffcx", "gmsh", "matplotlib.backends.backend_agg", "matplotlib.pyplot", "meshio", "numba", "pandas",
     "pyvista.plotting", "scipy.signal", "scipy.sparse.linalg", "scipy.spatial", "snakemake.cli", "ufl",
@@ -33,7 +33,7 @@ LIBRARIES = (
     "reflowshock.workflow.status",
 )  # fmt: skip
 MODULES = ("snakemake", "reflowshock", "reflowshock.fem", "reflowshock.workflow.reflow", "tests.support.on_ranks")
-# A Python that lets the server fork what it is to run, and is Python where that is something else.
+# A Python that asks the server to fork known modules, and otherwise runs Python itself.
 CLIENT = """#!{python} -IS
 import os, sys
 words = sys.argv[1:]
@@ -49,7 +49,7 @@ sys.exit(code)
 
 
 def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    """Run a command of the program to its end, as `python -m reflowshock` would."""
+    """Run a command of the program to its end, equivalent to ``python -m reflowshock``."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
         streams = [file.fileno() for file in (nothing, out, err)]
         code = ask(str(_server() / "socket"), ["reflowshock", *arguments], streams, cwd and str(cwd))
@@ -58,7 +58,7 @@ def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.Complet
 
 
 def warm_python() -> str:
-    """Return the path of a Python that has the server fork what it knows, in place of a start."""
+    """Return the path of a Python that asks the server to fork known modules."""
     return str(_server() / "python")
 
 
@@ -66,19 +66,24 @@ def warm_python() -> str:
 def _server() -> Path:
     """Start a server that ends with this process; return its folder."""
     folder = tempfile.TemporaryDirectory()
-    place, support = Path(folder.name), Path(__file__).parent
-    names = {"python": sys.executable, "support": str(support), "address": str(place / "socket"), "modules": MODULES}
+    server_folder, support = Path(folder.name), Path(__file__).parent
+    names = {
+        "python": sys.executable,
+        "support": str(support),
+        "address": str(server_folder / "socket"),
+        "modules": MODULES,
+    }
     client = CLIENT.format(**names)
-    (place / "python").write_text(client)
-    (place / "python").chmod(0o755)
+    (server_folder / "python").write_text(client)
+    (server_folder / "python").chmod(0o755)
     with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(str(place / "socket"))
+        listener.bind(str(server_folder / "socket"))
         listener.listen()
-        line = [sys.executable, "-m", "tests.support.warm_start", str(place / "python"), str(listener.fileno())]
+        line = [sys.executable, "-m", "tests.support.warm_start", str(server_folder / "python"), str(listener.fileno())]
         server = subprocess.Popen(line, stdin=subprocess.PIPE, cwd=ROOT, pass_fds=[listener.fileno()])
     atexit.register(folder.cleanup)
     atexit.register(server.communicate)
-    return place
+    return server_folder
 
 
 def serve(client: str, listener: socket.socket) -> None:
@@ -99,8 +104,8 @@ def serve(client: str, listener: socket.socket) -> None:
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
     compile_once()
-    numba.njit(lambda value: value)(0)  # what the first kernel of a process has Numba load
-    gc.freeze()  # to look at what is loaded would copy its memory
+    numba.njit(lambda value: value)(0)  # loads the parts of Numba for first kernels
+    gc.freeze()  # garbage collection would copy shared memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:
         connection, _ = listener.accept()
         if os.fork() == 0:
@@ -112,7 +117,7 @@ def serve(client: str, listener: socket.socket) -> None:
 
 
 def answer(connection: socket.socket, client: str) -> None:
-    """Fork what is asked for, end it when nobody waits for it any longer, and send how it ended."""
+    """Fork the requested module, end it if the client disconnects, and send its exit code."""
     _, streams, _, _ = socket.recv_fds(connection, 1, 3)
     request = json.loads(connection.makefile().readline())
     process = os.fork()
@@ -128,7 +133,7 @@ def answer(connection: socket.socket, client: str) -> None:
 
 
 def become(request: dict, streams: list[int], client: str) -> None:
-    """Be the process of a request, to its end."""
+    """Run the module of a request in this process, to its end."""
     import numba
 
     os.chdir(request["cwd"])
@@ -150,7 +155,7 @@ def become(request: dict, streams: list[int], client: str) -> None:
         stream.flush()
     if "mpi4py.MPI" in sys.modules:
         sys.modules["mpi4py.MPI"].Finalize()
-    os._exit(int(code or 0))  # to free what the server has loaded takes longer than most commands
+    os._exit(int(code or 0))  # freeing loaded libraries takes longer than most commands
 
 
 if __name__ == "__main__":

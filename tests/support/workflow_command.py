@@ -1,4 +1,4 @@
-"""The command line as a subprocess, run to its end or broken off, and the shortened case of the pipeline's tests."""
+"""The command line as a subprocess, run to its end or interrupted, and the shortened case of the pipeline tests."""
 
 import signal
 import subprocess
@@ -12,7 +12,7 @@ import psutil
 from reflowshock.workflow.package.case import BOARD_DROP
 from tests.support.warm_start import warm_command
 
-# Belong to no stage: results are the same to the last bit, so that nothing is to be done again when they change.
+# Settings without influence on results: changing them must not rerun any stage.
 WHO_COMPUTES = {"reflow.ranks"}
 SMALL_CASE = Path(__file__).resolve().parents[1] / "pipeline" / "small.toml"
 
@@ -30,13 +30,13 @@ def reflowshock(
 
 
 def times(folder: Path) -> dict[str, int]:
-    """Return when the record of each stage of the shortened case was written [ns], of those that are there."""
+    """Return the modification time [ns] of the record of each completed stage of the shortened case."""
     records = {stage.name: folder / stage.record for stage in BOARD_DROP.stages}
     return {name: path.stat().st_mtime_ns for name, path in records.items() if path.exists()}
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = 400.0) -> None:
-    """Wait for a condition: long, for a machine that does other work too."""
+    """Wait for a condition, long enough for a loaded machine."""
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "waited too long"
@@ -44,9 +44,9 @@ def wait_until(condition: Callable[[], bool], seconds: float = 400.0) -> None:
 
 
 def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str, *, pattern: str = "*") -> None:
-    """Start a run and, as soon as its reflow has such a checkpoint, send a signal to the "command" or to its "stage".
+    """Start a run and signal the "command" or its "stage" as soon as the reflow has a matching checkpoint.
 
-    Nothing that it started may be left, and the command fails.
+    The command must fail and leave no child process.
     """
     checkpoints = ".store/work/reflow-*/.reflow.checkpoints"
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

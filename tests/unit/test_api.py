@@ -1,4 +1,4 @@
-"""Importing the program, loading and planning cases from Python; what a wheel and a source distribution hold."""
+"""The program from Python: loading and planning cases; contents of wheel and source distribution."""
 
 import shutil
 import subprocess
@@ -110,6 +110,6 @@ def test_a_wheel_has_no_other_name_at_its_top(distributions):
 
 def test_a_case_and_a_plan_show_themselves_and_nothing_of_them_is_markup(tmp_path):
     case = reflowshock.Case.load(BGA, {"case.title": "<script>alert(1)</script>"})
-    shown = case._repr_html_() + case.plan(tmp_path / "run")._repr_html_()
-    assert "<script" not in shown and "&lt;script&gt;" in shown
-    assert all(f"<td>{words}</td>" in shown for words in ("package.pitch", "1 mm", "solder_mesh", "finite rotation"))
+    markup = case._repr_html_() + case.plan(tmp_path / "run")._repr_html_()
+    assert "<script" not in markup and "&lt;script&gt;" in markup
+    assert all(f"<td>{words}</td>" in markup for words in ("package.pitch", "1 mm", "solder_mesh", "finite rotation"))

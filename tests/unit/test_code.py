@@ -38,8 +38,8 @@ def test_import_rules():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_file_that_is_read_can_run_code(package):
-    """Pickles and their like are code; `np.load` takes none unless it is asked to, and nothing asks it."""
-    found = []
+    """Pickles and their like are code; `np.load` takes none unless `allow_pickle` is set, and nothing sets it."""
+    violations = []
     for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -49,8 +49,8 @@ def test_no_file_that_is_read_can_run_code(package):
                 odd += ["allow_pickle"] * (getattr(node.value, "value", None) is not False)
             if isinstance(node, ast.Attribute | ast.Name):
                 odd += [name for name in (getattr(node, "attr", ""), getattr(node, "id", "")) if name in UNPICKLING]
-            found += [f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}" for name in odd]
-    assert not found
+            violations += [f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}" for name in odd]
+    assert not violations
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -78,7 +78,7 @@ def test_import_is_light(module):
 
 
 def test_plans_are_light():
-    """A report tells costs beside its pictures, and VTK draws no text in a process that has loaded DOLFINx."""
+    """A report predicts costs and draws pictures, and VTK draws no text in a process that has loaded DOLFINx."""
     lines = [
         "import sys; from pathlib import Path; from rich.console import Console",
         "from reflowshock.workflow.pipeline.reader import read_case; from reflowshock.workflow.plan import show_plan",

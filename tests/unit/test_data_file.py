@@ -34,55 +34,55 @@ def test_a_value_comes_back_as_it_was(tmp_path):
     }
     write_data(tmp_path / "file", {"owner": "me", "window": 3}, value)
     assert read_header(tmp_path / "file") == {"owner": "me", "window": 3}
-    found = read_data(tmp_path / "file")
-    assert [*found["numbers"]] == [1, -2.5e-300, True, None, float("inf"), 0.1, 7]
-    assert {name: found[name] for name in ("text", "pair", "path")} == {
+    restored = read_data(tmp_path / "file")
+    assert [*restored["numbers"]] == [1, -2.5e-300, True, None, float("inf"), 0.1, 7]
+    assert {name: restored[name] for name in ("text", "pair", "path")} == {
         name: value[name] for name in ("text", "pair", "path")
     }
-    assert found["nested"]["nothing"] == {}
-    arrays = [found["nested"]["a/b"], found["nested"]["a"]["b"], *found["again"]]
-    for one, other in zip(arrays, [shared, shared + 1.0, *value["again"]], strict=True):
-        assert one.dtype == other.dtype
-        assert one.flags.f_contiguous == other.flags.f_contiguous
-        np.testing.assert_array_equal(one, other)
-    assert found["again"][0] is found["nested"]["a/b"]
+    assert restored["nested"]["nothing"] == {}
+    arrays = [restored["nested"]["a/b"], restored["nested"]["a"]["b"], *restored["again"]]
+    for actual, other in zip(arrays, [shared, shared + 1.0, *value["again"]], strict=True):
+        assert actual.dtype == other.dtype
+        assert actual.flags.f_contiguous == other.flags.f_contiguous
+        np.testing.assert_array_equal(actual, other)
+    assert restored["again"][0] is restored["nested"]["a/b"]
 
 
 def test_records_come_back_where_the_reader_takes_them(tmp_path):
     cart = Cart((Wheel(0.5, np.ones(3)), Wheel(0.7, np.zeros(2))), "hay")
     solder = Solder(volume=1e-10, numerics=SolderNumerics(spacing=1e-4))
     write_data(tmp_path / "file", {}, [cart, solder])
-    found, melted = read_data(tmp_path / "file", (Cart, Wheel, Solder))
+    restored, melted = read_data(tmp_path / "file", (Cart, Wheel, Solder))
     assert melted == solder
-    assert isinstance(found, Cart)
-    assert found.name == "hay"
-    assert [wheel.radius for wheel in found.wheels] == [0.5, 0.7]
-    np.testing.assert_array_equal(found.wheels[0].spokes, np.ones(3))
+    assert isinstance(restored, Cart)
+    assert restored.name == "hay"
+    assert [wheel.radius for wheel in restored.wheels] == [0.5, 0.7]
+    np.testing.assert_array_equal(restored.wheels[0].spokes, np.ones(3))
     with pytest.raises(NotData, match="Wheel"):
         read_data(tmp_path / "file", (Cart, Solder))
 
 
 def test_rows_become_a_table_and_rows_again():
-    told = [{"time": 0.5 * k, "flips": k, "binding": "growth", "strain": np.arange(2.0) * k} for k in range(3)]
-    found = rows(columns(told))
-    assert [{**row, "strain": row["strain"].tolist()} for row in found] == [
-        {**row, "strain": row["strain"].tolist()} for row in told
+    records = [{"time": 0.5 * k, "flips": k, "binding": "growth", "strain": np.arange(2.0) * k} for k in range(3)]
+    restored = rows(columns(records))
+    assert [{**row, "strain": row["strain"].tolist()} for row in restored] == [
+        {**row, "strain": row["strain"].tolist()} for row in records
     ]
-    assert type(found[1]["time"]) is float
+    assert type(restored[1]["time"]) is float
     assert rows(columns([])) == []
 
 
 @pytest.mark.parametrize(
-    "value, what",
+    "value, message",
     [
-        ({"work": print}, "no data"),
-        ([np.array([None])], "value/0: an array of objects"),
-        ({1: "wall"}, "1 is no name"),
-        ({"@": "array"}, "'@' is no name"),
+        ({"work": print}, "not a supported type"),
+        ([np.array([None])], "value/0: arrays of objects"),
+        ({1: "wall"}, "1 is not a valid name"),
+        ({"@": "array"}, "'@' is not a valid name"),
     ],
 )
-def test_what_is_no_data_is_not_written(tmp_path, value, what):
-    with pytest.raises(TypeError, match=what):
+def test_unsupported_values_are_rejected(tmp_path, value, message):
+    with pytest.raises(TypeError, match=message):
         write_data(tmp_path / "file", {}, value)
     assert not list(tmp_path.iterdir())
 

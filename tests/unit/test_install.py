@@ -1,4 +1,4 @@
-"""Recipes that install the program without `make setup` know what it needs, and name files that exist."""
+"""Recipes for installation without `make setup` list all dependencies and existing files."""
 
 import re
 import subprocess
@@ -16,14 +16,14 @@ FROM_DEBIAN = {"fenics-dolfinx", "petsc4py", "slepc4py", "mpi4py", "openmpi", "h
 
 def test_the_conda_environment_has_all_that_the_program_needs():
     listed = yaml.safe_load((INSTALL / "environment.yml").read_text())["dependencies"]
-    flat = [one for entry in listed for one in (entry["pip"] if isinstance(entry, dict) else [entry])]
-    found = {re.split(r"[<>=]", one)[0]: one for one in flat}
-    for wanted in PROJECT["dependencies"]:
-        name, _, least = re.match(r"([\w-]+)(>=([\d.]+))?", wanted).groups()
-        assert ON_CONDA.get(name, name) in found, wanted
+    flat = [requirement for entry in listed for requirement in (entry["pip"] if isinstance(entry, dict) else [entry])]
+    packages = {re.split(r"[<>=]", requirement)[0]: requirement for requirement in flat}
+    for dependency in PROJECT["dependencies"]:
+        name, _, least = re.match(r"([\w-]+)(>=([\d.]+))?", dependency).groups()
+        assert ON_CONDA.get(name, name) in packages, dependency
         if least and name != "numpy":
-            assert f">={least}" in found[ON_CONDA.get(name, name)], wanted
-    assert found.keys() >= FROM_DEBIAN
+            assert f">={least}" in packages[ON_CONDA.get(name, name)], dependency
+    assert packages.keys() >= FROM_DEBIAN
 
 
 def test_the_containers_take_the_script_of_make_setup(tmp_path):

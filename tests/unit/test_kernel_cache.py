@@ -22,13 +22,13 @@ def test_digest_changes_with_any_file(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "materials").mkdir()
     source = tmp_path / "particles" / "sph" / "constants.py"
     source.parent.mkdir(parents=True)
-    found = []
+    digests = []
     for text in ("REPRODUCING = 2\n", "REPRODUCING = 3\n"):
         source.write_text(text)
         kernel_cache.digest.cache_clear()
-        found.append(kernel_cache.digest())
+        digests.append(kernel_cache.digest())
     kernel_cache.digest.cache_clear()
-    assert found[0] != found[1]
+    assert digests[0] != digests[1]
 
 
 def test_tests_use_it() -> None:
@@ -78,6 +78,6 @@ def test_programs_that_this_one_starts_are_told_no_class() -> None:
     """One of another Python could not load it, and each `njit(cache=True)` of its would fail."""
     from reflowshock.workflow.process.environment import complete
 
-    found = {"HOME": os.environ["HOME"]}
-    complete(found)
-    assert "NUMBA_CACHE_LOCATOR_CLASSES" not in found
+    environment = {"HOME": os.environ["HOME"]}
+    complete(environment)
+    assert "NUMBA_CACHE_LOCATOR_CLASSES" not in environment

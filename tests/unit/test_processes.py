@@ -37,7 +37,7 @@ def sleep(note: Path) -> None:
 
 
 def fall() -> None:
-    """End as a process does for which there is no memory."""
+    """End like a process that has run out of memory."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -73,7 +73,7 @@ def test_how_a_process_ended_is_said():
             assert pool.ending() == "exit code -9: it was killed, as the system does when memory is short"
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda one: one.name)
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda item: item.name)
 def test_processes_end_with_their_parent(how, tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
@@ -86,8 +86,8 @@ def test_processes_end_with_their_parent(how, tmp_path):
     parent.send_signal(how)
     _, said = parent.communicate(timeout=60)
     gone, alive = psutil.wait_procs(workers, timeout=30)
-    for one in alive:
-        one.kill()
+    for item in alive:
+        item.kill()
     assert not alive
     assert len(gone) == len(workers)
     assert said.count(b"KeyboardInterrupt") <= 1

@@ -91,10 +91,11 @@ def test_a_pure_number_is_not_an_angle(unit):
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "unit"), [("0.04 mm", "40 um", "m"), ("2.3 ms", "2300 us", "s"), ("0.07 mm^3", "7e7 um^3", "mm^3")]
+    ("first", "second", "unit"),
+    [("0.04 mm", "40 um", "m"), ("2.3 ms", "2300 us", "s"), ("0.07 mm^3", "7e7 um^3", "mm^3")],
 )
-def test_the_same_quantity_is_the_same_number_in_any_unit(one, other, unit):
-    assert to_si(one, unit) == to_si(other, unit)
+def test_the_same_quantity_is_the_same_number_in_any_unit(first, second, unit):
+    assert to_si(first, unit) == to_si(second, unit)
 
 
 @given(st.text(max_size=30))

@@ -1,4 +1,4 @@
-"""Every effect of the registry: off it costs nothing, and on where it does not matter it changes next to nothing."""
+"""Every registered effect: no cost when off, and a negligible change when on in a case that does not need it."""
 
 import ast
 from collections.abc import Callable
@@ -65,31 +65,31 @@ def on(*names: str) -> Callable[[Check], Check]:
 
 @pytest.mark.parametrize("name", registry())
 def test_off_costs_nothing(name, tmp_path):
-    found = ELSEWHERE_OFF.get(name)
-    exists(found) if found else OFF[name](registry()[name], tmp_path)
+    covering_test = ELSEWHERE_OFF.get(name)
+    exists(covering_test) if covering_test else OFF[name](registry()[name], tmp_path)
 
 
 @pytest.mark.parametrize("name", registry())
-def test_on_where_it_does_not_matter_changes_nothing(name, tmp_path):
-    found = ELSEWHERE_ON.get(name)
-    exists(found) if found else ON[name](registry()[name], tmp_path)
+def test_irrelevant_effect_changes_almost_nothing(name, tmp_path):
+    covering_test = ELSEWHERE_ON.get(name)
+    exists(covering_test) if covering_test else ON[name](registry()[name], tmp_path)
 
 
 @pytest.mark.parametrize("name", registry())
-def test_the_object_lives_where_the_registry_says(name):
+def test_object_is_at_its_registered_location(name):
     module, _, attribute = registry()[name].place.rpartition(".")
     assert hasattr(import_module(module), attribute)
 
 
 def exists(test: str) -> None:
-    """Assert that a test is there, by its file and name."""
+    """Assert that a test exists, given as file and name."""
     path, _, name = test.partition("::")
     defined = ast.walk(ast.parse((ROOT / path).read_text()))
     assert any(isinstance(item, ast.FunctionDef) and item.name == name for item in defined), test
 
 
 def steps_of(motion) -> dict:
-    """Return what some steps of a motion call, once all is compiled."""
+    """Return the calls of some steps of a compiled motion."""
     scene.step_of(motion)
     return scene.calls(lambda: [scene.step_of(motion) for _ in range(STEPS)])
 
@@ -99,14 +99,14 @@ def steps_of(motion) -> dict:
 
 @off("gravity", "surface_tension", "wall_adhesion", "inertia", "viscosity")
 def _(effect, _folder):
-    """A step takes as many calls as with lists from which the object was taken, and enters nothing of it."""
+    """A step makes the same calls as with lists without the object and enters none of its code."""
     module, _, kind = effect.place.rpartition(".")
-    # Wetting pins by all other forces, so that their lists cannot be compared.
+    # Wetting pins vertices by all other forces, so their lists cannot be compared.
     others = scene.RESTING | ({"wall_adhesion": False} if effect.name in ("gravity", "surface_tension") else {})
     acting, taken, left_out = (scene.flow_with(others | {effect.name: on}) for on in (True, False, False))
     taken.physics = scene.without(acting.physics, getattr(import_module(module), kind))
     for acts in (True, False):
-        scene.flow_with(others | {effect.name: acts}).step()  # compiled before it is counted
+        scene.flow_with(others | {effect.name: acts}).step()  # compile before counting
     counts = [scene.calls(flow.step) for flow in (taken, left_out, acting)]
     assert counts[0] == counts[1]
     assert not scene.enters(counts[1], effect.place)
@@ -116,8 +116,8 @@ def _(effect, _folder):
 @on("gravity")
 def _(_effect, _folder):
     light = scene.SOLDER.model_copy(update={"gravity": 0.25})
-    told = decide_drop(light, is_free=False)["gravity"]
-    assert not told["on"]
+    decision = decide_drop(light, is_free=False)["gravity"]
+    assert not decision["on"]
     switched = light.model_copy(update={"effects": SolderEffects(gravity="on")})
     heights = [solve_drop(solder, 6)[1].history(1.0)["height"][-1] for solder in (light, switched)]
     assert 0.0 < 1.0 - heights[1] / heights[0] < NEGLIGIBLE_SHAPE_CHANGE
@@ -128,7 +128,7 @@ THICK = {"pad_contact_angle": 0.5 * np.pi, "viscosity": 0.5, "gravity": 0.0}
 
 @cache
 def thick_heights(process_time: float) -> list[float]:
-    """Heights of a thick drop at rest, without inertia and viscosity, and with both."""
+    """Return the heights of a thick drop at rest, without inertia and viscosity and with both."""
     thick = scene.SOLDER.model_copy(update=THICK | {"process_time": process_time})
     both = thick.model_copy(update={"effects": SolderEffects(inertia="on", viscosity="on")})
     return [solve_drop(solder, 5)[1].history(1.0)["height"][-1] for solder in (thick, both)]
@@ -136,7 +136,7 @@ def thick_heights(process_time: float) -> list[float]:
 
 @on("inertia", "viscosity")
 def _(effect, _folder):
-    """A drop of 90 deg, whose process is long enough to be called quasi-static: less changes than by resolution."""
+    """In a quasi-static process a drop of 90 degrees changes less than by resolution."""
     thick = scene.SOLDER.model_copy(update=THICK)
     numbers = drop_numbers(thick)
     slowest = max(numbers.capillary_time, numbers.viscous_time)
@@ -149,7 +149,7 @@ def _(effect, _folder):
 
 @on("surface_tension", "wall_adhesion")
 def _(effect, _folder):
-    """Where the Bond number calls for neither, weight pushes more than ten times harder."""
+    """Where the Bond number requires neither effect, gravity is more than ten times stronger."""
     heavy = scene.SOLDER.model_copy(update={"gravity": 6.0e3})
     assert not decide_drop(heavy, is_free=False)[effect.name]["on"]
     flow = scene.flow_with(scene.RESTING, solder=heavy)
@@ -163,7 +163,7 @@ def _(effect, _folder):
 
 @off("thermal")
 def _(effect, _folder):
-    """Without a rise all load steps are one, flat at the reference."""
+    """Without a temperature rise there is one load step, flat at the reference."""
     flat = Thermal.model_validate(dict.fromkeys(("reference", "peak", "melting", "solidification", "final"), 298.15))
     assert {step.temperature for step in load_steps(flat)} == {298.15}
     assert effect.threshold is None
@@ -178,7 +178,7 @@ def _(_effect, folder):
 
 @off("flexible")
 def _(effect, folder):
-    """Rigid plates: no structure is built, none is asked."""
+    """With rigid plates no structure is built or evaluated."""
     assembly = small_structure(folder)
     rigid = RigidPlates(assembly)
     called = scene.calls(lambda: rigid.solve(473.15, 0.0, np.zeros((4, 2, 6)), np.zeros(1)))
@@ -188,7 +188,7 @@ def _(effect, folder):
 
 @off("solder_force")
 def _(_effect, folder):
-    """Wrenches that do not bend anything cost what no wrenches cost."""
+    """Wrenches that bend nothing cost as much as no wrenches."""
     counts = []
     for switch, force in (("off", 1e-3), ("on", 0.0)):
         structure = ThermalStructure.build(MPI.COMM_SELF, small_structure(folder, effects={"solder_force": switch}))
@@ -223,7 +223,7 @@ def terms(material, kinematics="small") -> list:
 
 @off("plasticity", "strain_rate", "thermal_softening")
 def _(_effect, _folder):
-    """Solder that does not yield is computed by the terms of elastic elements, without an array of history."""
+    """Elastic solder is computed by the terms of elastic elements, without history arrays."""
     elastic = terms(SAC305.elastic)
     assert not any(isinstance(term, NonlinearElements) or term.history for term in elastic)
     assert [type(term) for term in elastic] == [type(term) for term in terms(FR4)]
@@ -232,7 +232,7 @@ def _(_effect, _folder):
 
 @on("plasticity")
 def _(_effect, _folder):
-    """Far below the yield stress the force is that of elastic elements, to rounding."""
+    """Far below the yield stress the force equals the force of elastic elements to round-off."""
     body = scene.strip()[0]
     small = 1e-7 * np.random.default_rng(0).normal(size=body.local.points.shape)
     forces = []
@@ -246,15 +246,15 @@ def _(_effect, _folder):
 
 @on("strain_rate")
 def _(_effect, _folder):
-    """Flow below the reference rate is flow without a rate, whatever C."""
+    """Plastic flow below the reference rate is independent of the rate for any C."""
     law = SAC305.plasticity.model_copy(update={"reference_rate": 1e12})
     laws = [law, law.model_copy(update={"C": 0.0})]
     forces = []
     for item in laws:
-        found = terms(SAC305.model_copy(update={"plasticity": item}))[0]
+        plastic_term = terms(SAC305.model_copy(update={"plasticity": item}))[0]
         stretch = 2e-3 * scene.strip()[0].local.points[:, :1] * [1.0, 0.0, 0.0]
         forces.append(np.zeros_like(stretch))
-        found.add(stretch, forces[-1])
+        plastic_term.add(stretch, forces[-1])
     assert np.array_equal(*forces)
 
 
@@ -270,7 +270,7 @@ def _(_effect, _folder):
 
 @off("gravity_in_the_shock", "damping", "large_mass")
 def _(effect, _folder):
-    """The list of loads of a plain drop is the pulse alone; a step calls what it calls with that list by hand."""
+    """A plain drop has only the pulse as a load, and a step makes the same calls as with this list given explicitly."""
     body, step = scene.strip()
     plain = scene.loads_of(body, scene.shock())
     switched = {
@@ -298,10 +298,10 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    given = scene.shock(damping=Damping(mass_coefficient=rate))
-    drop = SimpleNamespace(shock=given, duration=duration, expected=SimpleNamespace(omega=1.5e4))
+    damped = scene.shock(damping=Damping(mass_coefficient=rate))
+    drop = SimpleNamespace(shock=damped, duration=duration, expected=SimpleNamespace(omega=1.5e4))
     predicted = RayleighEffect().decide(drop)["influence"]
-    both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), given)]
+    both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), damped)]
     assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 
 
@@ -315,7 +315,7 @@ def _(_effect, _folder):
 
 @on("finite_rotation")
 def _(_effect, _folder):
-    """Between held ends, at the deflection up to which kinematics are small, and at one thickness."""
+    """The ends are clamped; deflections are the limit of small kinematics and one thickness."""
     changes = {}
     for peak in (30.0 * G, 3000.0 * G):
         drop = scene.shock(peak_acceleration=peak)
@@ -350,7 +350,7 @@ def _(_effect, _folder):
 
 @on("mass_scaling")
 def _(_effect, _folder):
-    """A thousandth of mass added everywhere changes a free vibration by half of it in frequency."""
+    """A thousandth of added mass lowers the frequency of a free vibration by half of that."""
     body, step = scene.strip()
     heavier = replace(body, mass=1.001 * body.mass)
     both = [scene.moved(item, step, scene.loads_of(item, scene.shock()), 3e-4)[1] for item in (body, heavier)]
@@ -370,7 +370,7 @@ def _(_effect, _folder):
 
 @on("failure")
 def _(_effect, _folder):
-    """Judging changes no history."""
+    """The verdict does not change the history."""
     rng = np.random.default_rng(0)
     arrays = {name: rng.random((5, 2)) for name in ("peel_board", "peel_package")} | {"joints": np.array(["A1", "B1"])}
     arrays["time"] = np.arange(5.0)

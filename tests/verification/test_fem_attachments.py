@@ -1,4 +1,4 @@
-"""Elastic supports and lumped masses against exact solutions: a body on springs with damping, a beam with both."""
+"""Elastic supports and lumped masses against exact solutions: a damped body on springs and a beam with a mass."""
 
 import json
 from pathlib import Path
@@ -31,17 +31,17 @@ def run(directory: Path, cells: tuple[int, int, int], **changes) -> tuple[dict, 
     structure = {"length": LENGTH, "width": WIDTH, "cells": cells[:2]} | {
         "layers": {"board": {"material": "steel", "thickness": THICKNESS, "cells": cells[2]}}
     }
-    given = {"structure": structure, "materials": {"steel": BEAM}, "loads": {}, "watch": {}} | changes
-    request = structure_input(directory, strip(cells), **given)
+    inputs = {"structure": structure, "materials": {"steel": BEAM}, "loads": {}, "watch": {}} | changes
+    request = structure_input(directory, strip(cells), **inputs)
     run_structure(MPI.COMM_SELF, request)
     with np.load(request.output / "history.npz") as arrays:
         return json.loads((request.output / "result.json").read_text()), dict(arrays)
 
 
 def beam_frequency(rotation: float, mass: float, modes: int) -> list[float]:
-    """Frequencies [Hz] of a beam whose ends cannot move and have springs [N m/rad], a mass [kg] at its middle.
+    """Return the frequencies [Hz] of a pinned beam with end springs [N m/rad] and a central mass [kg].
 
-    Symmetric half: w = a (sin b s - sinh b s) + c ... at the end w = 0, E I w'' = k w'; at the middle w' = 0 and
+    Symmetric half: at the end w = 0 and E I w'' = k w'; at the middle w' = 0 and
     E I w''' = m w^2 w / 2. Antisymmetric half: w = w'' = 0 at the middle.
     """
     bending, linear = BEAM["young_modulus"] * INERTIA, BEAM["density"] * AREA
@@ -49,7 +49,7 @@ def beam_frequency(rotation: float, mass: float, modes: int) -> list[float]:
 
     def rows(beta: float, symmetric: bool) -> float:
         def shape(x: float, order: int) -> np.ndarray:
-            """Derivative of cos, sin, cosh, sinh."""
+            """Return the derivative of cos, sin, cosh and sinh."""
             s, c = np.sin(beta * x), np.cos(beta * x)
             trig = [[c, s], [-s, c], [-c, -s], [s, -c]][order % 4]
             hyper = [np.cosh(beta * x), np.sinh(beta * x)][:: 1 if order % 2 == 0 else -1]
@@ -65,19 +65,19 @@ def beam_frequency(rotation: float, mass: float, modes: int) -> list[float]:
         matrix = np.array([*end, *middle])
         return float(np.linalg.det(matrix / np.abs(matrix).max(axis=1)[:, None]))
 
-    found = []
+    frequencies = []
     for symmetric in (True, False):
         grid_of = np.linspace(0.5, 14.0, 2000) / LENGTH
         values = [rows(beta, symmetric) for beta in grid_of]
         for k in np.flatnonzero(np.diff(np.sign(values))):
-            beta = brentq(lambda one, even=symmetric: rows(one, even), grid_of[k], grid_of[k + 1])
-            found.append(beta**2 * np.sqrt(bending / linear) / (2 * np.pi))
-    return sorted(found)[:modes]
+            beta = brentq(lambda wave_number, even=symmetric: rows(wave_number, even), grid_of[k], grid_of[k + 1])
+            frequencies.append(beta**2 * np.sqrt(bending / linear) / (2 * np.pi))
+    return sorted(frequencies)[:modes]
 
 
 @pytest.mark.parametrize(("softness", "share"), [(1e-9, 0.0), (1.0, 0.0), (1.0, 0.5), (5.0, 0.3)])
 def test_beam_with_springs_at_its_ends_and_a_mass(tmp_path, softness, share):
-    """Bending in x-z only; ``softness`` is E I / (k L), ``share`` the mass over the beam's."""
+    """The beam bends in x-z only; ``softness`` is E I / (k L), ``share`` the mass over the mass of the beam."""
     rotation = BEAM["young_modulus"] * INERTIA / LENGTH / softness
     mass = share * BEAM["density"] * AREA * LENGTH
     per_area = min(rotation / INERTIA, 1e17)
@@ -95,15 +95,15 @@ def test_beam_with_springs_at_its_ends_and_a_mass(tmp_path, softness, share):
     modes = json.loads((tmp_path / "out" / "modes.json").read_text())
     bending = [mode["frequency"] for mode in modes if mode["mass_fraction"]["y"] < 1e-6]
     exact = beam_frequency(rotation, mass, 2)
-    found = [min(bending, key=lambda one, wanted=wanted: abs(one - wanted)) for wanted in exact]
-    assert found == pytest.approx(exact, rel=0.012)  # Timoshenko's shear takes 0.5 % at mode 1 of this beam, 1 % at 2
+    nearest = [min(bending, key=lambda frequency, target=target: abs(frequency - target)) for target in exact]
+    assert nearest == pytest.approx(exact, rel=0.012)  # shear lowers mode 1 by 0.5 %, mode 2 by 1 %
     assert result["metrics"]["first_frequency"]["value"] == pytest.approx(modes[0]["frequency"])
     total = BEAM["density"] * AREA * LENGTH + mass
     assert result["metrics"]["model_mass"]["value"] == pytest.approx(total)
 
 
 def test_damped_body_on_springs_and_its_reaction(tmp_path):
-    """A block with a mass on a bedding swings as one mass: frequency, decay, and the springs' force."""
+    """A block with a mass on a bedding oscillates as one mass: frequency, decay and spring force."""
     stiffness, mass, ratio = 2e8, 3e-3, 0.05  # N/m^3, kg
     supports = {"foot": {"on": "z_min", "hold": ["x", "y"], "bedding": {"z": stiffness}}}
     masses = {"lid": {"mass": mass, "at": [0.0, 0.0, THICKNESS], "footprint": [20e-3, 4e-3]}}
@@ -121,8 +121,8 @@ def test_damped_body_on_springs_and_its_reaction(tmp_path):
     damped = rate * np.sqrt(1 - ratio**2)
     time = history["time"]
     exact = 0.1 / damped * np.exp(-ratio * rate * time) * np.sin(damped * time)
-    found = history["displacement@middle"][:, 2]
-    assert np.abs(found - exact).max() < 0.01 * np.abs(exact).max()
+    displacement = history["displacement@middle"][:, 2]
+    assert np.abs(displacement - exact).max() < 0.01 * np.abs(exact).max()
     pull = -stiffness * LENGTH * WIDTH * exact
     assert np.abs(history["reaction@foot"][:, 2] - pull).max() < 0.01 * np.abs(pull).max()
     assert result["health"]["energy_balance_error"]["value"] < 1e-9
@@ -131,7 +131,7 @@ def test_damped_body_on_springs_and_its_reaction(tmp_path):
 
 @pytest.mark.parametrize("estimate", ["element", "power_iteration"])
 def test_explicit_steps_on_stiff_springs_are_stable(tmp_path, estimate):
-    """Springs far stiffer than the elements set the step: the balance is exact only while nothing grows."""
+    """Springs far stiffer than the elements limit the step; the balance is exact only in a stable run."""
     supports = {"foot": {"on": "z_min", "hold": ["x", "y"], "bedding": {"z": 1e17}}}
     dynamics = {"duration": 2e-5, "initial_velocity": [0.0, 0.0, 0.1]}
     dynamics |= {"numerics": {"critical_step": estimate, "step_fraction": 0.99, "history_samples": 20}}
@@ -158,7 +158,7 @@ def test_explicit_and_implicit_agree_on_springs(tmp_path):
     assert peaks[0] == pytest.approx(peaks[1], rel=2e-3)
 
 
-def test_half_a_structure_bears_half_of_a_mass():
+def test_half_a_structure_carries_half_of_a_mass():
     for at, footprint, share in (
         ((0.0, 0.2, 0.0), None, 0.5),
         ((0.2, 0.0, 0.0), None, 1.0),
@@ -167,12 +167,12 @@ def test_half_a_structure_bears_half_of_a_mass():
     ):
         places = PointMass(mass=1.0, at=at, footprint=footprint).meshed_places(("x",), 1e-9)
         assert sum(part for _, part in places) == pytest.approx(share)
-        assert all(place[0] >= 0.0 for place, _ in places)
+        assert all(position[0] >= 0.0 for position, _ in places)
 
 
 @pytest.mark.parametrize("corners", [3, 4, 6])
 def test_bedding_of_facets_integrates_products(corners):
-    """One newton per cubic metre on a unit triangle or square: its area, and its second moment about an edge."""
+    """A bedding of 1 N/m^3 on a unit triangle or square gives its area and its second moment about an edge."""
     points = {
         3: [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
         4: [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],

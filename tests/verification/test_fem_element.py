@@ -1,4 +1,4 @@
-"""Patch tests and bending: what decides whether the hexahedron may be used for boards."""
+"""Patch tests and bending tests that qualify the hexahedron for boards."""
 
 import numpy as np
 import pytest
@@ -49,9 +49,9 @@ def test_patch_of_distorted_hexahedra_carries_constant_stress(material):
 
 
 def cantilever_tip(poisson: float, size: tuple[float, float, float], counts: tuple[int, int, int]) -> float:
-    """Return the tip deflection under a unit end load over that of a Timoshenko beam.
+    """Return the tip deflection under a unit end load over the deflection of a Timoshenko beam.
 
-    The root keeps its plane but may contract in it, as the beam's does.
+    The root stays plane but can contract in its plane, as in beam theory.
     """
     young, shear_factor = 1.0e9, 5.0 / 6.0
     points, cells = grid(*(np.linspace(0, length, count + 1) for length, count in zip(size, counts, strict=True)))

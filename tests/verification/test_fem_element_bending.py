@@ -1,4 +1,4 @@
-"""Beams, laminates and plates against exact values, for every kind of element: what locks and what does not."""
+"""Beams, laminates and plates of each element type against exact values: locking."""
 
 import numpy as np
 import pytest
@@ -23,9 +23,9 @@ def strip(length: float, width: float, height: float, counts: tuple[int, int, in
 
 
 def ratio(name: str, size: tuple[float, float, float], counts: tuple[int, int, int], poisson=0.0, move=None) -> float:
-    """Tip deflection over the exact one."""
-    found = tip(KINDS[name], strip(*size, counts), [isotropic(1e9, poisson)], move=move or (lambda points: points))
-    return found / beam(*size[:2], np.array(size[2:]), np.array([1e9]), poisson)
+    """Return the ratio of the tip deflection to the exact value."""
+    deflection = tip(KINDS[name], strip(*size, counts), [isotropic(1e9, poisson)], move=move or (lambda points: points))
+    return deflection / beam(*size[:2], np.array(size[2:]), np.array([1e9]), poisson)
 
 
 @NOT_LOCKING
@@ -41,14 +41,14 @@ def test_bending_does_not_lock_when_nearly_incompressible(name):
 
 
 def test_linear_tetrahedra_lock():
-    """Known, and the reason why nothing that bends should be made of them."""
+    """This known error excludes them from bodies in bending."""
     assert ratio("tetrahedron", (400.0, 1.0, 4.0), (16, 1, 4)) < 0.1
     assert ratio("tetrahedron", (10.0, 1.0, 1.0), (16, 2, 2), 0.499) < 0.2
 
 
 @pytest.mark.parametrize("name", HEXAHEDRA)
 def test_skewed_hexahedra_bend_and_converge(name):
-    """Scaled Jacobian 0.2: 8 % too stiff with elements as long as the beam is high, and of second order."""
+    """At scaled Jacobian 0.2, elements as long as the beam height are 8 % too stiff; second order."""
 
     def skewed(points):
         fade = np.clip(np.minimum(points[:, 0], 10 - points[:, 0]) / 2.5, 0, 1)
@@ -64,14 +64,14 @@ def test_skewed_hexahedra_bend_and_converge(name):
 
 @NOT_LOCKING
 def test_copper_foil_of_aspect_25_between_layers_of_board(name):
-    """0.02 mm of copper in 1 mm of FR4, elements 0.5 mm long."""
+    """A 0.02 mm copper foil lies in 1 mm of FR4, with elements of 0.5 mm."""
     heights = np.array([0.48, 0.02, 0.5]) * MILLIMETRE
     young = np.array([FR4.young_modulus_in_plane, 141.92e9, FR4.young_modulus_in_plane])
     length, width = 20 * MILLIMETRE, 1 * MILLIMETRE
     z = np.array([0.0, 0.24, 0.48, 0.5, 0.75, 1.0]) * MILLIMETRE
     lines = [*strip(length, width, 1.0, (40, 2, 1))[:2], z]
-    found = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 3]], c))
-    assert found == pytest.approx(beam(length, width, heights, young), rel=0.01)
+    deflection = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 3]], c))
+    assert deflection == pytest.approx(beam(length, width, heights, young), rel=0.01)
 
 
 @NOT_LOCKING
@@ -80,15 +80,15 @@ def test_stiffness_jump_of_100(name):
     length, width = 20 * MILLIMETRE, 1 * MILLIMETRE
     z = np.array([0.0, 0.125, 0.25, 0.5, 0.75, 0.875, 1.0]) * MILLIMETRE
     lines = [*strip(length, width, 1.0, (40, 2, 1))[:2], z]
-    found = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 4]], c))
-    assert found == pytest.approx(beam(length, width, heights, young), rel=0.01)
+    deflection = tip(KINDS[name], lines, [isotropic(value) for value in young], lambda c: np.searchsorted(z[[2, 4]], c))
+    assert deflection == pytest.approx(beam(length, width, heights, young), rel=0.01)
 
 
 SIDE, THICKNESS = 0.1, 1e-3
 
 
 def plate_ratios(name: str, elements: int, simply_supported: bool) -> np.ndarray:
-    """First three frequencies of a quarter plate with symmetric modes, over the exact values of a thin plate."""
+    """Return the first three frequencies of symmetric modes of a quarter plate over the exact thin-plate values."""
     young, poisson = 70e9, 0.3
     side = np.linspace(0, SIDE / 2, elements + 1)
     points, cells = box(KINDS[name], side, side, [0, THICKNESS])

@@ -1,4 +1,4 @@
-"""Tetrahedra against an independent code: the same linear form assembled by DOLFINx."""
+"""Tetrahedra against the same linear form assembled by DOLFINx."""
 
 import dolfinx.fem
 import dolfinx.fem.petsc

@@ -1,4 +1,4 @@
-"""Hourglass energy of one-point hexahedra: what the energy balance shows is what the hourglass stiffness holds."""
+"""Hourglass energy of one-point hexahedra: the energy balance equals the energy of the hourglass stiffness."""
 
 import numpy as np
 import pytest
@@ -30,15 +30,15 @@ def energy_of(elements: Elements, displacement: np.ndarray):
 
 
 @pytest.mark.parametrize("distortion", [0.0, 0.05], ids=["congruent", "assembled"])
-def test_hourglass_energy_is_that_of_the_hourglass_stiffness(distortion):
+def test_hourglass_energy_equals_the_hourglass_stiffness_energy(distortion):
     elements = cube(distortion, "one_point")
     displacement = RANDOM.uniform(-1e-3, 1e-3, elements.points.shape)
     gamma, resistance = hourglass_control(elements.points[elements.cells], elements.elasticity, elements.material)
     amplitude = np.einsum("eak,eai->eki", gamma, displacement[elements.cells]).reshape(-1, 12)
     exact = 0.5 * np.einsum("em,emn,en->", amplitude, resistance, amplitude)
-    found = energy_of(elements, displacement)
-    assert found.hourglass == pytest.approx(exact, rel=1e-10)
-    assert found.total == pytest.approx(
+    energy = energy_of(elements, displacement)
+    assert energy.hourglass == pytest.approx(exact, rel=1e-10)
+    assert energy.total == pytest.approx(
         energy_of(cube(distortion, "incompatible_modes"), displacement).strain, rel=1e-12
     )
 
@@ -46,8 +46,8 @@ def test_hourglass_energy_is_that_of_the_hourglass_stiffness(distortion):
 @pytest.mark.parametrize("distortion", [0.0, 0.05], ids=["congruent", "assembled"])
 def test_affine_fields_have_no_hourglass_energy(distortion):
     elements = cube(distortion, "one_point")
-    found = energy_of(elements, elements.points @ RANDOM.uniform(-1e-3, 1e-3, (3, 3)))
-    assert abs(found.hourglass) < 1e-12 * found.strain
+    energy = energy_of(elements, elements.points @ RANDOM.uniform(-1e-3, 1e-3, (3, 3)))
+    assert abs(energy.hourglass) < 1e-12 * energy.strain
 
 
 def test_full_integration_has_no_hourglass_energy():

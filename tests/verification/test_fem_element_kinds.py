@@ -1,4 +1,4 @@
-"""Every kind of element: patch tests, orders in h, Irons' bound, pressures of nearly incompressible bodies."""
+"""Each element type: patch tests, order in h, Irons' bound, pressures of nearly incompressible bodies."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def internal_force(elements: Elements, displacement: np.ndarray) -> np.ndarray:
 
 
 def check_patch(elements: Elements, inner: np.ndarray) -> None:
-    """An affine field leaves inner nodes without force and gives its stress everywhere."""
+    """Check that an affine field gives zero force at inner nodes and its exact stress everywhere."""
     gradient = RANDOM.uniform(-1, 1, (3, 3))
     displacement = elements.points @ gradient.T
     force = internal_force(elements, displacement)
@@ -94,7 +94,7 @@ def test_order_in_h_on_distorted_meshes(name, of_displacement, of_strain):
 
 @every_kind
 def test_no_assembled_model_has_a_smaller_critical_step_than_its_elements(kind):
-    """Irons and Treharne: the element bound holds, and is not far from the assembled step."""
+    """The element bound (Irons and Treharne) is safe and close to the step of the assembled model."""
     points, cells = box(kind, LINE, LINE, LINE, move=shaken)
     elements = elements_of(kind, points, cells, [FR4, SAC405], np.arange(len(cells)) % 2)
     root = scipy.sparse.diags(1.0 / np.sqrt(np.repeat(mass_of(elements), 3)))
@@ -105,7 +105,7 @@ def test_no_assembled_model_has_a_smaller_critical_step_than_its_elements(kind):
 
 
 def pressures(kind, count: int, poisson: float) -> np.ndarray:
-    """Element pressures, (count, count, count), of a confined cube under a smooth pressure on its top."""
+    """Return the element pressures of a confined cube under a smooth top pressure, shape (count, count, count)."""
     points, cells = box(kind, *[np.linspace(0, 1, count + 1)] * 3)
     elements = elements_of(kind, points, cells, [Isotropic(density=1.0, young_modulus=1.0, poisson_ratio=poisson)])
     held = np.abs(points) < 1e-9
@@ -122,7 +122,7 @@ def pressures(kind, count: int, poisson: float) -> np.ndarray:
 
 
 def alternation(values: np.ndarray) -> float:
-    """The largest second difference between neighbours, over the range: 1 for a checkerboard, O(h^2) without."""
+    """Return the largest second difference of neighbours over the range: 1 for a checkerboard, otherwise O(h^2)."""
     return max(np.abs(np.diff(values, 2, axis=axis)).max() for axis in range(3)) / (4 * np.ptp(values))
 
 

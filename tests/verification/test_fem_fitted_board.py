@@ -1,4 +1,4 @@
-"""What is fitted to a board: gauges in exact fields; a drop against the same board as a structure."""
+"""Gauges and neighbours of a board: exact fields, and a drop against the same board as a structure."""
 
 import json
 from dataclasses import replace
@@ -25,11 +25,11 @@ from reflowshock.fem.setup.structure_models import build_structure
 from tests.support.fem_models import BOARD_X, BOARD_Y, BOARD_Z, board_mesh, write_msh
 from tests.support.fem_structures import LENGTH, STEEL, THICKNESS, WIDTH, strip_mesh, structure_input
 
-CURVATURE = np.array([3.0, -1.0, 2.0])  # [1/m] of w in xx, yy, xy
+CURVATURE = np.array([3.0, -1.0, 2.0])  # w in xx, yy, xy [1/m]
 
 
 def bent(points: np.ndarray, middle: float) -> np.ndarray:
-    """Displacement of a plate that is bent to constant curvatures."""
+    """Return the displacement of a plate bent to constant curvatures."""
     x, y, z = points.T
     xx, yy, xy = CURVATURE
     slope = np.array([xx * x + xy * y, yy * y + xy * x])
@@ -37,18 +37,18 @@ def bent(points: np.ndarray, middle: float) -> np.ndarray:
 
 
 def strains_of(mesh: MeshData, displacement: np.ndarray, symmetry: tuple[str, ...] = (), **gauges) -> dict[str, float]:
-    given = TypeAdapter(Fittings).validate_python({"gauges": gauges})
-    table = fitted(mesh, given, symmetry, np.empty(0, np.int32), yields=False).points.gauges
+    fittings = TypeAdapter(Fittings).validate_python({"gauges": gauges})
+    table = fitted(mesh, fittings, symmetry, np.empty(0, np.int32), yields=False).points.gauges
     stretches = np.zeros((len(table.names), 3))
     np.add.at(stretches, table.gauge, table.weight * displacement[table.nodes])
-    found = [table.strains(stretches, turning).tolist() for turning in (False, True)]
-    return dict(zip(table.names, zip(*found, strict=True), strict=True))
+    strains = [table.strains(stretches, turning).tolist() for turning in (False, True)]
+    return dict(zip(table.names, zip(*strains, strict=True), strict=True))
 
 
 @pytest.mark.parametrize("slant", [0.0, 30.0, 90.0])
 @pytest.mark.parametrize("face", ["upper", "lower"])
 def test_gauge_on_a_bent_plate(face, slant):
-    """Either face has half the thickness times the curvature along the gauge; a long one reads its mean."""
+    """The strain is half the thickness times the curvature along the gauge; a long gauge reads the mean."""
     along = np.array([np.cos(np.radians(slant)), np.sin(np.radians(slant))])
     middle = 0.5 * THICKNESS
     xx, yy, xy = CURVATURE
@@ -56,12 +56,12 @@ def test_gauge_on_a_bent_plate(face, slant):
     exact = (-middle if face == "upper" else middle) * across
     mesh = strip_mesh((8, 3, 2))
     gauge = {"at": [1.3e-3, 0.4e-3], "face": face, "direction": along.tolist(), "length": 4e-3}
-    found = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
-    assert found == pytest.approx(exact, rel=1e-9)
+    strain = strains_of(mesh, bent(mesh.points, middle), g=gauge)["g"][0]
+    assert strain == pytest.approx(exact, rel=1e-9)
 
 
 def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
-    """A force at its tip: strain F (L - x) c / (E I) at the distance c from the neutral line; solved at rest."""
+    """A tip force gives the strain F (L - x) c / (E I) at the distance c from the neutral line at rest."""
     force, mesh = 2.0, strip_mesh((20, 2, 2))
     steel = STEEL | {"poisson_ratio": 0.0}
     places = {"root": (-6e-3, "upper"), "middle": (0.7e-3, "lower")}
@@ -77,9 +77,9 @@ def test_gauges_on_a_cantilever_read_the_moment_at_their_middles(tmp_path):
     table = model.tables.fitted.points.gauges
     stretches = np.zeros((2, 3))
     np.add.at(stretches, table.gauge, table.weight * displacement[model.body.local.locate(table.nodes)])
-    for found, (x, face) in zip(table.strains(stretches, False), places.values(), strict=True):
+    for strain, (x, face) in zip(table.strains(stretches, False), places.values(), strict=True):
         bending = force * (0.5 * LENGTH - x) * 0.5 * THICKNESS / (STEEL["young_modulus"] * WIDTH * THICKNESS**3 / 12)
-        assert found == pytest.approx(-bending if face == "upper" else bending, rel=2e-3)
+        assert strain == pytest.approx(-bending if face == "upper" else bending, rel=2e-3)
 
 
 def test_rotation_is_no_strain():
@@ -95,8 +95,8 @@ def test_ends_beyond_a_plane_of_symmetry_are_mirrored():
     mesh = board_mesh(size=1e-3)
     displacement = np.column_stack([2e-3 * mesh.points[:, 0], 5e-3 * mesh.points[:, 1], np.zeros(len(mesh.points))])
     gauges = {"x": {"at": [0.0, 0.0]}, "y": {"at": [3e-3, 0.0], "direction": [0.0, 1.0]}}
-    found = strains_of(mesh, displacement, ("x", "y"), **gauges)
-    assert [found["x"][0], found["y"][0]] == pytest.approx([2e-3, 5e-3])
+    strains = strains_of(mesh, displacement, ("x", "y"), **gauges)
+    assert [strains["x"][0], strains["y"][0]] == pytest.approx([2e-3, 5e-3])
 
 
 def test_gauge_beyond_the_edge_is_refused():
@@ -104,13 +104,13 @@ def test_gauge_beyond_the_edge_is_refused():
         strains_of(strip_mesh(), np.zeros_like(strip_mesh().points), g={"at": [9.9e-3, 0.0]})
 
 
-def test_what_is_fitted_to_the_board_keeps_the_numbers_of_the_whole_mesh():
+def test_gauges_and_masses_keep_the_node_numbers_of_the_whole_mesh():
     mesh = board_mesh(size=1e-3)
     upper = mesh.in_parts("board_patch".__eq__)
-    given = TypeAdapter(Fittings).validate_python(
+    fittings = TypeAdapter(Fittings).validate_python(
         {"watch": {"a": {"at": [2e-3, 2e-3, 0.0]}}, "gauges": {"g": {"at": [1e-3, 1e-3], "face": "upper"}}}
     )
-    table = fitted_to(mesh, upper, given, False)
+    table = fitted_to(mesh, upper, fittings, False)
     assert mesh.points[table.points.nodes[0]] == pytest.approx([2e-3, 2e-3, 0.0])
     assert upper[table.points.cells].all()
     assert mesh.points[table.points.gauges.nodes][:, 2].max() == 0.0
@@ -131,7 +131,7 @@ def outputs_of(folder: Path) -> tuple[dict, dict[str, np.ndarray]]:
 
 
 def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict, dict[str, np.ndarray]]:
-    """The board as that of a drop without a package."""
+    """Run the drop of a board without a package."""
     shock = {"peak_acceleration": PEAK, "pulse_duration": PULSE, "duration": END, "modes": 3, "gravity": "off"}
     shock |= {"numerics": {"kinematics": kinematics, "history_samples": 50, "field_samples": 2}}
     shock |= {"numerics": shock["numerics"] | {"step_fraction": 0.5}}
@@ -146,7 +146,7 @@ def dropped(folder: Path, kinematics: str, supports: dict, **more) -> tuple[dict
 def as_structure(
     folder: Path, kinematics: str, supports: dict, parts=("board", "board_patch"), **more
 ) -> tuple[dict, dict[str, np.ndarray]]:
-    """The same mesh as a structure of two layers, its planes of symmetry held by supports."""
+    """Run the same mesh as a structure of two layers, with supports on its planes of symmetry."""
     layer = {"material": "steel", "thickness": 0.5 * BOARD_Z}
     body = {"length": 2 * BOARD_X, "width": 2 * BOARD_Y, "cells": [1, 1], "symmetry": ["x", "y"]}
     body |= {"layers": dict.fromkeys(parts, layer)}
@@ -162,7 +162,7 @@ def as_structure(
 
 
 @pytest.mark.parametrize(("kinematics", "sprung"), [("small", False), ("small", True), ("corotational", True)])
-def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, sprung):
+def test_drop_of_a_board_equals_the_same_structure(tmp_path, kinematics, sprung):
     mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
     write_msh(mesh, tmp_path / "board.msh")
     mesh.facets["x_min"], mesh.facets["y_min"] = mesh.facets["symmetry_x"], mesh.facets["symmetry_y"]
@@ -171,44 +171,46 @@ def test_drop_of_a_board_is_that_of_the_same_structure(tmp_path, kinematics, spr
     (drop, first), (structure, second) = (work(tmp_path, kinematics, supports) for work in (dropped, as_structure))
     for name in ("displacement@edge", "gauge@middle", "gauge@slant", "reaction@screws"):
         assert np.abs(first[name] - second[name]).max() < 1e-6 * np.abs(second[name]).max(), name
-    found, wanted = drop["metrics"], structure["metrics"]
-    compared = [name for name in wanted if name.startswith(("peak_strain@", "peak_strain_rate@", "peak_acceleration@"))]
+    metrics, expected = drop["metrics"], structure["metrics"]
+    compared = [
+        name for name in expected if name.startswith(("peak_strain@", "peak_strain_rate@", "peak_acceleration@"))
+    ]
     compared += ["second_peak_acceleration@edge", "first_frequency", "third_frequency"]
     assert len(compared) == 9
     for name in compared:
-        assert found[name]["value"] == pytest.approx(wanted[name]["value"], rel=1e-6), name
+        assert metrics[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-6), name
     assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
-    assert 1500.0 * 0.5 < found["response_at_first_frequency"]["value"] < 1500.0 * 2.0
+    assert 1500.0 * 0.5 < metrics["response_at_first_frequency"]["value"] < 1500.0 * 2.0
     assert drop["health"]["energy_balance_error"]["ok"]
 
 
-GLUED = {  # on two posts, whose edges are lines of the board
+GLUED = {  # on two posts whose edges are mesh lines of the board
     "at": [7.5e-3, 4.5e-3], "rows": 1, "columns": 2, "pitch": 2e-3, "post": 1e-3, "standoff": 0.4e-3,
     "substrate": [5e-3, 3e-3, 0.5e-3], "die": [3e-3, 1e-3, 0.3e-3],
 }  # fmt: skip
 
 
-def test_neighbour_is_tied_as_if_it_were_one_body_with_the_board(tmp_path):
-    """Where its lines are lines of the board's mesh: modes, mass and motion are those of one mesh of both."""
+def test_tied_neighbour_equals_one_body_with_the_board(tmp_path):
+    """On matching mesh lines, modes, mass and motion equal a single mesh of board and neighbour."""
     neighbour = Neighbour(**GLUED)
     mesh = board_mesh(size=1e-3, layers=2, patch_layers=1)
     write_msh(mesh, tmp_path / "board.msh")
     both = with_neighbours(mesh, {"pmic": neighbour})
     volume = 2 * 1e-6 * 0.4e-3 + 15e-6 * 0.5e-3 + 3e-6 * 0.3e-3
-    own = both.in_parts(lambda name: name.endswith("_pmic"))
-    assert element_geometry(both.points, both.cells[own]).volume.sum() == pytest.approx(volume)
+    is_neighbour = both.in_parts(lambda name: name.endswith("_pmic"))
+    assert element_geometry(both.points, both.cells[is_neighbour]).volume.sum() == pytest.approx(volume)
     feet = both.facet_nodes("slave@neighbour_pmic")
     distance, below = cKDTree(mesh.points).query(both.points[feet])
     assert distance.max() < 1e-12
     glued, _ = merge_nodes(both, feet, below.astype(np.int32))
     sides = {"x_min": glued.facets["symmetry_x"], "y_min": glued.facets["symmetry_y"]}
-    kept = {name: some for name, some in glued.facets.items() if "@" not in name}
-    write_msh(replace(glued, facets=kept | sides), tmp_path / "box.msh")
+    named_facets = {name: some for name, some in glued.facets.items() if "@" not in name}
+    write_msh(replace(glued, facets=named_facets | sides), tmp_path / "box.msh")
     supports = {"screws": {"on": "mounting_holes", "hold": ["x", "y", "z"]}}
     roles = dict.fromkeys(("board", "solder", "substrate", "die"), STEEL)
-    given, parts = {"gauges": {"below": {"at": [6e-3, 4e-3]}}}, ("board", "board_patch", *glued.part_names[2:])
-    drop, first = dropped(tmp_path, "small", supports, packages={"pmic": GLUED}, materials=roles, **given)
-    structure, second = as_structure(tmp_path, "small", supports, parts, **given)
+    fittings, parts = {"gauges": {"below": {"at": [6e-3, 4e-3]}}}, ("board", "board_patch", *glued.part_names[2:])
+    drop, first = dropped(tmp_path, "small", supports, packages={"pmic": GLUED}, materials=roles, **fittings)
+    structure, second = as_structure(tmp_path, "small", supports, parts, **fittings)
     assert drop["model"]["model_mass"] == pytest.approx(structure["model"]["model_mass"])
     assert drop["metrics"]["first_frequency"]["value"] == pytest.approx(
         structure["metrics"]["first_frequency"]["value"], rel=1e-6

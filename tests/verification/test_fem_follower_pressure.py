@@ -1,4 +1,4 @@
-"""A pressure that follows its surface: normal to it, in balance on a closed one, its work exactly balanced."""
+"""Follower pressure: normal direction, equilibrium on closed surfaces and exact balance of its work."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 from tests.support.fem_bodies import STEEL
 
 PRESSURE = 1e6
-SIDES = {f"{'xyz'[axis]}_{end}": on(axis, place) for axis in range(3) for end, place in (("min", 0.0), ("max", 1e-3))}
+SIDES = {f"{'xyz'[axis]}_{end}": on(axis, level) for axis in range(3) for end, level in (("min", 0.0), ("max", 1e-3))}
 
 
 def cube() -> MeshData:
@@ -36,7 +36,7 @@ def force_of(load, motion: ExplicitMotion) -> np.ndarray:
     return motion.force - before
 
 
-def test_it_turns_with_the_body():
+def test_pressure_rotates_with_the_body():
     mesh, motion, (load,) = pressed(["x_max"])
     nodes, areas = outward_areas(mesh, "x_max")
     dead = force_of(NodalForces.build(motion.body, nodes, -areas, Constant(PRESSURE)), motion)
@@ -47,17 +47,17 @@ def test_it_turns_with_the_body():
     assert np.abs(force_of(load, motion) - dead @ turn.T).max() < 1e-12 * np.abs(dead).max()
 
 
-def test_closed_surface_of_any_shape_is_in_balance():
+def test_closed_surface_of_any_shape_is_in_equilibrium():
     _, motion, loads = pressed(SIDES)
     motion.displacement[:] = np.random.default_rng(4).uniform(-1e-4, 1e-4, motion.displacement.shape)
     force = sum(force_of(load, motion) for load in loads)
-    place = motion.body.local.points + motion.displacement
+    position = motion.body.local.points + motion.displacement
     scale = PRESSURE * 1e-6
     assert np.abs(force.sum(axis=0)).max() < 1e-12 * scale
-    assert np.abs(np.cross(place, force).sum(axis=0)).max() < 1e-12 * scale * 1e-3
+    assert np.abs(np.cross(position, force).sum(axis=0)).max() < 1e-12 * scale * 1e-3
 
 
-def test_its_work_is_that_of_the_motion():
+def test_work_of_the_pressure_equals_the_kinetic_energy():
     _, motion, _ = pressed(["x_max"])
     motion.velocity += np.cross([0.0, 0.0, 1e4], motion.body.local.points)
     start = motion.kinetic_energy() + motion.internal_energy().total

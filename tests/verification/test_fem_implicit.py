@@ -22,7 +22,7 @@ PEAK = 1e4
 
 @pytest.fixture(scope="module")
 def spring() -> tuple[Body, float]:
-    """A mass-spring pair, one free layer of nodes between two held ones, and its circular frequency [1/s]."""
+    """Return a mass-spring pair (one free layer of nodes between two fixed ones) and its angular frequency [1/s]."""
     points, cells = grid([0, 1e-3, 2e-3], [0, 1e-3], [0, 1e-3])
     ends = {"mounting_holes": lambda c: (c[:, 0] < 1e-9) | (c[:, 0] > 2e-3 - 1e-9)}
     body, critical = dns_body(mesh_of(points, cells, "board", ends), STEEL)
@@ -65,7 +65,7 @@ def test_order_in_time(spring, alpha):
 
 
 def amplification(alpha: float, phase: float) -> np.ndarray:
-    """Return the matrix that takes (u, h v, h^2 a) of one mode over a step h, phase = omega h (Hughes 1987, 9.3)."""
+    """Return the amplification matrix of (u, h v, h^2 a) for a step h, phase = omega h (Hughes 1987, 9.3)."""
     beta, gamma, square = 0.25 * (1 - alpha) ** 2, 0.5 - alpha, phase**2
     predicted = np.array([[1, 1, 0.5 - beta], [0, 1, 1 - gamma]])
     new = -square * ((1 + alpha) * predicted[0] - alpha * np.array([1, 0, 0])) / (1 + (1 + alpha) * beta * square)
@@ -97,7 +97,7 @@ def total_energy(motion) -> float:
 
 
 def test_equals_the_explicit_solver_in_the_limit_and_keeps_its_energy():
-    """A tied package under a short pulse: the difference shrinks with the square of the step."""
+    """For a tied package under a short pulse the difference decreases with the square of the step."""
     body, critical = dns_body(append(small_assembly(1, size=1e-3)), materials=ELASTIC)
     load, steps = half_sine_drop(PEAK, 3e-6), int(np.ceil(4e-6 / (0.9 * critical)))
     end = steps * 0.9 * critical

@@ -1,4 +1,4 @@
-"""A package on a board in implicit steps: the same histories as explicit ones."""
+"""A package on a board: histories of implicit steps against explicit steps."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def dns(meshes: list[Path], directory: Path, solver: str) -> Path:
 def test_implicit_dns_has_the_histories_of_the_explicit_one(tmp_path):
     meshes = write_small_assembly(tmp_path, 1, size=1e-3)
     explicit, implicit = (dns(meshes, tmp_path / solver, solver) for solver in ("explicit", "implicit"))
-    found = compare_histories(implicit, explicit)
-    assert found["board_displacement_error"] < 0.01
-    assert found["die_displacement_error"] < 0.01
-    assert found["worst_joint_stress_error"] < 0.02
+    comparison = compare_histories(implicit, explicit)
+    assert comparison["board_displacement_error"] < 0.01
+    assert comparison["die_displacement_error"] < 0.01
+    assert comparison["worst_joint_stress_error"] < 0.02

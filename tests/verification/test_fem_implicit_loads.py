@@ -1,4 +1,4 @@
-"""All loads and damping in implicit steps: energy balance exact to round-off, motion that of explicit steps."""
+"""All loads and damping in implicit steps: energy balance to round-off, and the motion of explicit steps."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def shape_of(motion: Motion) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_motion_is_that_of_small_explicit_steps(kind):
+def test_motion_equals_small_explicit_steps(kind):
     body, mesh, critical = model(kind)
 
     def loads() -> list[Load]:
@@ -80,7 +80,7 @@ def test_initial_velocity_starts_the_energy_balance():
     assert motion.external_work == 0.0
 
 
-def test_state_continues_to_the_same_bits():
+def test_restart_is_bitwise_identical_for_all_loads():
     body, mesh, critical = model("motion")
     first, second = (
         ImplicitMotion(MPI.COMM_SELF, body, loads_of("motion", body, mesh, 0.0), 2 * critical) for _ in range(2)
@@ -95,15 +95,15 @@ def test_state_continues_to_the_same_bits():
 
 @pytest.mark.parametrize("terms", [(0.1, 0.0), pytest.param((0.0, 0.1), marks=pytest.mark.long)])
 def test_free_vibration_decays_as_its_ratio_says(terms):
-    """One mode of a bar: x = exp(-xi w t) (cos w' t + xi / s sin w' t), s^2 = 1 - xi^2, w' = s w."""
+    """One mode of a bar follows x = exp(-xi w t) (cos w' t + xi / s sin w' t), s^2 = 1 - xi^2, w' = s w."""
     body, _, _ = model("damped")
     equations = Equations.of(MPI.COMM_SELF, body)
     modes = natural_modes(equations, 12)
     along = int(np.argmax(modes.effective_mass[:, 0]))
     omega, shape = 2 * np.pi * modes.frequency[along], modes.shape[along]
-    given = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
+    rayleigh = Damping(mass_ratio=terms[0], stiffness_ratio=terms[1], frequency=omega / (2 * np.pi))
     ratio, period = sum(terms), 2 * np.pi / omega
-    damping = RayleighDamping.build(body, *given.coefficients)
+    damping = RayleighDamping.build(body, *rayleigh.coefficients)
     motion = ImplicitMotion(MPI.COMM_SELF, body, [damping], period / 400)
     motion.displacement[:] = shape
     motion.restart()
@@ -112,5 +112,5 @@ def test_free_vibration_decays_as_its_ratio_says(terms):
         run(motion, motion.time + 0.7 * period)
         phase = root * omega * motion.time
         exact = np.exp(-ratio * omega * motion.time) * (np.cos(phase) + ratio / root * np.sin(phase))
-        found = np.einsum("ni,n,ni->", motion.displacement, body.mass, shape)
-        assert found == pytest.approx(exact, abs=1e-3)
+        amplitude = np.einsum("ni,n,ni->", motion.displacement, body.mass, shape)
+        assert amplitude == pytest.approx(exact, abs=1e-3)

@@ -1,6 +1,6 @@
-"""Measures of a joint in its columns stay where meshes change; tied to boxes that ignore its pads it is far off.
+"""Joint measures with imprinted pads are insensitive to the mesh; ties to boxes that ignore the pads are not accurate.
 
-benchmarks/imprinted_pads.py halves every element, with solder that yields, too.
+benchmarks/imprinted_pads.py also halves all elements, with plastic solder.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ MEASURES = ("axial_force", "shear_force", "bending_moment", "von_mises:25um")
 
 
 def measures(mesh, turned=None):
-    """Of the end at the board, elastic."""
+    """Return the elastic measures at the board end of the joint."""
     problem = Problem(patch(mesh)[0], False, turned=turned)
     return dict(ends(problem, problem.solve()))["board"]
 
@@ -29,7 +29,7 @@ def test_boxes_shifted_by_half_an_element_change_little(imprinted):
     assert shifted == pytest.approx(imprinted, rel=0.02)
 
 
-def test_a_motion_that_is_turned_against_the_mesh_changes_little():
+def test_rotated_motion_changes_little():
     along, turned = (measures(IMPRINTED, angle) for angle in (0.0, np.radians(45.0)))
     assert turned == pytest.approx(along, rel=0.005)
 
@@ -42,7 +42,7 @@ def test_elements_two_thirds_as_long_change_little(imprinted):
     )
 
 
-def test_a_free_form_joint_in_its_column_bears_what_a_swept_one_does(imprinted):
+def test_free_form_joint_in_its_column_has_the_measures_of_a_swept_joint(imprinted):
     free_form = replace(IMPRINTED, joint=CHEAPEST | {"layers": 7}, swept=False)
     assert measures(free_form) == pytest.approx(imprinted, rel=0.03)
     tied = measures(replace(free_form, box=TIED.box, imprint=None))

@@ -1,4 +1,4 @@
-"""The program's elements and ties against an independent oracle: one joint between patches of board and substrate."""
+"""Elements and ties against an independent oracle: one joint between patches of board and substrate."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ RESULTANTS = [f"{name}@{end}" for name in ("axial", "shear", "moment") for end i
 
 @pytest.fixture(scope="module")
 def oracle() -> dict[str, float]:
-    """Return the oracle's measures of the elastic patch at rest."""
+    """Return the measures of the elastic patch at rest by the oracle."""
     patch = JointPatch()
     return equilibrium(Patch(patch, mesh_patch(patch, QUADRATIC["coarse"], 2), yields=False))[-1]
 
@@ -35,7 +35,7 @@ def test_oracle_returns_to_the_yield_surface():
     axis = np.arange(3) * 0.5
     points = np.array([[x, y, z] for z in axis for y in axis for x in axis])
     region = YieldingRegion(points, np.arange(27)[None], material)
-    shear = 8e-3  # of the plane: only the shear stress is not zero, and tau = sigma_y / sqrt(3)
+    shear = 8e-3  # only the shear stress of the plane is not zero, and tau = sigma_y / sqrt(3)
     force = region.force((points[:, [1]] * [shear, 0.0, 0.0]).ravel()).reshape(-1, 3)
     modulus = material.shear_modulus
     plastic = (np.sqrt(3.0) * modulus * shear - 40e6) / (3.0 * modulus + 2e9)
@@ -44,7 +44,7 @@ def test_oracle_returns_to_the_yield_surface():
     assert region.values(np.zeros(81))["plastic_strain"].max() == 0.0
 
 
-def test_oracle_balances_its_joint(oracle):
+def test_oracle_joint_is_in_equilibrium(oracle):
     patch = JointPatch()
     assert oracle["axial@foot"] == pytest.approx(oracle["axial@head"], rel=1e-9)
     assert oracle["shear@foot"] == pytest.approx(oracle["shear@head"], rel=1e-9)
@@ -54,27 +54,27 @@ def test_oracle_balances_its_joint(oracle):
 
 def test_imprinted_pads_agree_with_the_oracle(oracle):
     patch = JointPatch()
-    found = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["middle"]), Course()).at_rest()
+    stiffness = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["middle"]), Course()).at_rest()
     for name in [*RESULTANTS, "von_mises@foot:25um", "von_mises@head:25um"]:
-        assert found[name] == pytest.approx(oracle[name], rel=0.05), name
+        assert stiffness[name] == pytest.approx(oracle[name], rel=0.05), name
 
 
 @pytest.mark.long
 def test_finest_meshes_agree_within_two_per_cent():
     patch = JointPatch()
     reference = equilibrium(Patch(patch, mesh_patch(patch, QUADRATIC["fine"], 2), yields=False))[-1]
-    found = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["fine"]), Course()).at_rest()
+    stiffness = ProgramPatch(patch, matching_mesh(patch, TRILINEAR["fine"]), Course()).at_rest()
     for name in ("axial@foot", "shear@foot", "peel@foot", "von_mises@foot:25um"):  # the foot is the critical end
-        assert found[name] == pytest.approx(reference[name], rel=0.02), name
+        assert stiffness[name] == pytest.approx(reference[name], rel=0.02), name
 
 
 def test_boxes_that_ignore_the_pad_are_too_stiff(oracle):
-    """The excess of a joint tied to facets of 0.5 mm, as another model has found it (40, 83-130, 86-181 %)."""
+    """The excess for ties to facets of 0.5 mm agrees with another model (40, 83-130, 86-181 %)."""
     patch = JointPatch()
-    found = ProgramPatch(patch, box_mesh(patch, TRILINEAR["middle"], 500 * UM, (8, 4)), Course()).at_rest()
+    stiffness = ProgramPatch(patch, box_mesh(patch, TRILINEAR["middle"], 500 * UM, (8, 4)), Course()).at_rest()
     bounds = {"axial@foot": (0.3, 0.5), "moment@foot": (0.8, 1.3), "von_mises@foot:25um": (0.86, 1.81)}
     for name, (least, most) in bounds.items():
-        assert least < found[name] / oracle[name] - 1.0 < most, name
+        assert least < stiffness[name] / oracle[name] - 1.0 < most, name
 
 
 def test_oracle_in_slow_motion_is_at_rest(oracle):

@@ -1,4 +1,4 @@
-"""Section forces and layer averages of a column of solder: exact resultants, rate of momentum, exact fields."""
+"""Section forces and layer averages of a solder column: exact resultants, rate of momentum, exact fields."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ ZERO = Isotropic(density=7400.0, young_modulus=40e9, poisson_ratio=0.0)
 
 
 def column(held: bool, copper: bool, edges: int = 3, levels=LEVELS, bulge: float = 0.0):
-    """Return a column of solder, between pads of copper where asked for, whose lowest face may be held."""
+    """Return a solder column, with optional copper pads and an optional clamp at its lowest face."""
     side = np.linspace(-SIDE / 2, SIDE / 2, edges + 1)
     z = np.concatenate([[-PAD], levels, [HEIGHT + PAD]]) if copper else levels
     points, cells = grid(side, side, z)
@@ -59,8 +59,8 @@ def row_of(watch, motion):
 
 @pytest.mark.parametrize("formulation", ["incompatible_modes", "one_point"])
 @pytest.mark.parametrize("component", range(6))
-def test_each_resultant_of_a_load_on_the_column_is_found_at_both_ends(formulation, component):
-    """Axial force, shears, torsion, bendings; a shear at the upper end bends the lower one by its height."""
+def test_resultants_of_each_load_are_exact_at_both_ends(formulation, component):
+    """The loads are axial force, shear, torsion and bending; upper shear bends the lower end by its height."""
     body, watch, step = watched(column(held=True, copper=False), ELASTIC, formulation=formulation)
     points, free = body.local.points, body.free.ravel()
     top = np.flatnonzero(points[:, 2] > HEIGHT - 1e-9)
@@ -95,7 +95,7 @@ def test_each_resultant_of_a_load_on_the_column_is_found_at_both_ends(formulatio
 )
 @pytest.mark.parametrize("solder", [ELASTIC, SAC405], ids=["elastic", "yields"])
 def test_sections_balance_the_rate_of_momentum(formulation, kinematics, bulge, solder):
-    """A column shakes, turns and yields: both faces give what velocities half a step before and after a sample say.
+    """Section forces of a shaking, rotating and yielding column equal the momentum rate from half-step velocities.
 
     Strain rates are 2e4 1/s, spins 1e4 rad/s. Five times that spin leaves 3e-6 of moment where fully integrated
     elements flow at finite strain: their modes are not quite in equilibrium.
@@ -114,15 +114,15 @@ def test_sections_balance_the_rate_of_momentum(formulation, kinematics, bulge, s
         if k % 40:
             continue
         row = row_of(watch, motion)
-        assert np.array_equal(row_of(watch, motion)["section_board"], row["section_board"])  # asking changes nothing
+        assert np.array_equal(row_of(watch, motion)["section_board"], row["section_board"])  # evaluation has no effect
         before = motion.velocity.copy()
         after = before + motion.step * motion.acceleration()
-        place = body.local.points + (motion.displacement if kinematics != "small" else 0.0)
+        position = body.local.points + (motion.displacement if kinematics != "small" else 0.0)
         rate = mass[:, None] * ((after - before) / motion.step - motion.gravity)
-        needed = np.concatenate([rate.sum(axis=0), np.cross(place - MIDDLE, rate).sum(axis=0)])
-        given = load_of(row, "package", *frame_of(mesh, body, place, "package"))
-        given -= load_of(row, "board", *frame_of(mesh, body, place, "board"))
-        residuals += [*np.abs(given - needed) / [1, 1, 1, HEIGHT, HEIGHT, HEIGHT], row["section_imbalance"][0]]
+        needed = np.concatenate([rate.sum(axis=0), np.cross(position - MIDDLE, rate).sum(axis=0)])
+        load = load_of(row, "package", *frame_of(mesh, body, position, "package"))
+        load -= load_of(row, "board", *frame_of(mesh, body, position, "board"))
+        residuals += [*np.abs(load - needed) / [1, 1, 1, HEIGHT, HEIGHT, HEIGHT], row["section_imbalance"][0]]
         forces += [*np.abs(row["section_board"][0, :3])]
     assert max(forces) > 0.1
     assert max(residuals) < 1e-6 * max(forces)
@@ -131,7 +131,7 @@ def test_sections_balance_the_rate_of_momentum(formulation, kinematics, bulge, s
 
 
 def solder_mass(body, density):
-    """Return the share of the solder in the mass of each node (n,) [kg]."""
+    """Return the solder mass of each node, shape (n,) [kg]."""
     height = body.local.points[body.elements.cells][:, :, 2].mean(axis=1)
     chosen, mass = (height > 0.0) & (height < HEIGHT), np.zeros(len(body.mass))
     np.add.at(mass, body.elements.cells[chosen], density * body.geometry.nodal_volume[chosen])
@@ -139,16 +139,16 @@ def solder_mass(body, density):
 
 
 def load_of(row, end, frame, centre):
-    """Return force and moment about the middle (6,) of the resultants at one end."""
+    """Return force and moment about the middle from the resultants at one end, shape (6,)."""
     axial, shear_x, shear_y, torsion, bending_x, bending_y = row[f"section_{end}"][0]
     force, moment = frame.T @ [shear_x, shear_y, axial], frame.T @ [bending_x, bending_y, torsion]
     return np.concatenate([force, moment + np.cross(centre - MIDDLE, force)])
 
 
-def frame_of(mesh, body, place, end):
-    """Return frame and centre of a pad's face with nodes at ``place``, from its triangles."""
+def frame_of(mesh, body, position, end):
+    """Return frame and centre of a pad face with nodes at ``position``, from its triangles."""
     local = body.local.locate(mesh.facets[f"pad_{end}@A1"].ravel()).reshape(-1, 4)
-    corners = place[local]
+    corners = position[local]
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     normals = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
@@ -161,7 +161,7 @@ def frame_of(mesh, body, place, end):
 @pytest.mark.parametrize("layer", [12.5e-6, 25e-6, 50e-6, 100e-6])
 @pytest.mark.parametrize("formulation", ["incompatible_modes", "one_point"])
 def test_layer_of_a_bent_column_has_the_exact_mean(layer, formulation):
-    """Pure bending: |stress| = E kappa |x|, whose mean over any layer is E kappa a / 4 for a section of side a."""
+    """In pure bending the mean of |stress| = E kappa |x| over a layer is E kappa a / 4 for a section of side a."""
     levels = np.array([0.0, 12.5e-6, 37.5e-6, 0.1e-3, 0.2e-3, 0.26e-3, HEIGHT])
     body, watch, step = watched(column(False, False, 4, levels), ZERO, formulation=formulation, layer=layer)
     motion, (x, _, z) = motion_of(body, step), body.local.points.T
@@ -175,7 +175,7 @@ def test_layer_of_a_bent_column_has_the_exact_mean(layer, formulation):
 
 
 def test_a_layer_that_crosses_elements_takes_the_fractions_of_their_volumes():
-    """Strain grows with height: elements of constant stress, the second one covered by 12.5 of 50 um."""
+    """Strain grows with height in elements of constant stress; the layer covers 12.5 of 50 um of the second one."""
     levels = np.array([0.0, 12.5e-6, 62.5e-6, 0.2e-3, HEIGHT])
     body, watch, step = watched(column(False, False, 2, levels), ZERO)
     motion, z = motion_of(body, step), body.local.points[:, 2]
@@ -187,28 +187,28 @@ def test_a_layer_that_crosses_elements_takes_the_fractions_of_their_volumes():
     assert row["von_mises_package"][0] == pytest.approx(means[-1])
 
 
-def test_points_of_an_element_that_yields_are_told_apart():
-    """The outer points of a bent column yield first: the layer's flow is the mean of its own points."""
+def test_layer_average_uses_points_within_the_layer():
+    """The outer points of a bent column yield first; the layer average uses only the points in the layer."""
     body, watch, step = watched(column(False, False, 2), SAC405, ForceOptions("small", 1.0))
     motion, (x, _, z) = motion_of(body, step), body.local.points.T
     for curvature in np.linspace(0.0, 12.0, 101)[1:]:
         motion.displacement[:] = curvature * np.stack([-(z**2) / 2, np.zeros_like(x), x * z], axis=1)
         motion.update_force()
     (term,) = (item for item in body.terms if isinstance(item, NonlinearElements))
-    found = term.points(*term.located(np.arange(len(body.elements.cells))))
-    assert found.plastic_strain.min() == 0.0 < found.plastic_strain.max()
+    located = term.points(*term.located(np.arange(len(body.elements.cells))))
+    assert located.plastic_strain.min() == 0.0 < located.plastic_strain.max()
     row = row_of(watch, motion)
     lowest = body.local.points[body.elements.cells][:, :, 2].max(axis=1) < HEIGHT / 4 + 1e-9
     below = [0, 1, 2, 3]  # points of the lower octants: the layer is thinner than half an element
-    assert row["plastic_strain_board"][0] == pytest.approx(found.plastic_strain[lowest][:, below].mean())
-    mises = von_mises(found.stress[lowest][:, below].reshape(-1, 6))
+    assert row["plastic_strain_board"][0] == pytest.approx(located.plastic_strain[lowest][:, below].mean())
+    mises = von_mises(located.stress[lowest][:, below].reshape(-1, 6))
     assert row["von_mises_board"][0] == pytest.approx(mises.mean())
 
 
 @pytest.mark.parametrize("formulation", ["incompatible_modes", "one_point"])
 @pytest.mark.parametrize("bulge", [0.0, 0.2])
-def test_points_of_hexahedra_that_turn_are_those_of_finite_strains(formulation, bulge):
-    """A column turned by 60 degrees and stretched by 1e-4: von Mises stress E times the stretch at either pad."""
+def test_rotated_hexahedra_have_finite_strain_stresses(formulation, bulge):
+    """A column rotated by 60 degrees and stretched by 1e-4 has the von Mises stress E times 1e-4 at both pads."""
     mesh = column(False, False, bulge=bulge)
     body, watch, step = watched(mesh, ZERO, ForceOptions("corotational"), formulation)
     motion, points, angle = motion_of(body, step), body.local.points, np.pi / 3

@@ -1,4 +1,4 @@
-"""Step levels in motion: exact solutions, momentum, and the same motion when two models share the levels."""
+"""Step levels in motion: exact solutions, momentum, and equal motion of a model split at a level."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ MESH = joint_on_board(solder=4)
 
 
 def released(model: Levelled, displacement: np.ndarray, step: float) -> ExplicitMotion:
-    """Return the motion of a body of a model, let go at rest at a displacement (n, 3)."""
+    """Return the motion of a body released at rest from a displacement, shape (n, 3)."""
     motion = motion_of(model.body, step)
     motion.displacement[:] = displacement
     motion.update_force()
@@ -33,7 +33,7 @@ def released(model: Levelled, displacement: np.ndarray, step: float) -> Explicit
 
 
 def at_step(model: Levelled, step: float) -> Levelled:
-    """Return a model with the same levels at another window."""
+    """Return a model with the same levels and another window."""
     levels = SubsteppedElements.build(MPI.COMM_SELF, model.body, Levels(model.level, model.ratios, step))
     return replace(model, body=replace(model.body, terms=[*model.body.terms[:-1], levels]), window=step)
 
@@ -83,8 +83,8 @@ def test_momentum_of_a_free_body_stays():
 
 
 @pytest.mark.parametrize("ratios", [(14,), (5, 3)], ids=str)
-def test_two_models_that_share_the_levels_move_as_one(ratios):
-    """The meso model has the elements of all levels below the window; its interface is the ring of the first level."""
+def test_models_split_at_a_level_move_as_one(ratios):
+    """The meso model has the elements of all levels below the window; the first-level ring is its interface."""
     whole = levelled(MESH, ELASTIC, ratios)
     level = np.empty_like(whole.level)
     level[whole.body.local.cell_numbers] = whole.level
@@ -100,9 +100,9 @@ def test_two_models_that_share_the_levels_move_as_one(ratios):
         alone.advance()
         alone.update_force()
         pair.run()
-    found = {}
+    displacements = {}
     for motion in (pair.macro.motion, pair.meso.motion):
-        found |= dict(zip(map(tuple, motion.body.local.points), motion.displacement, strict=True))
+        displacements |= dict(zip(map(tuple, motion.body.local.points), motion.displacement, strict=True))
     exact = alone.displacement
-    same = np.array([found[tuple(point)] for point in whole.body.local.points])
+    same = np.array([displacements[tuple(point)] for point in whole.body.local.points])
     assert np.abs(same - exact).max() <= 1e-10 * np.abs(exact).max()

@@ -1,4 +1,4 @@
-"""Loads and damping against exact solutions; their work in the energy balance is exact to round-off."""
+"""Loads and damping against exact solutions, with an energy balance to round-off."""
 
 import numpy as np
 import pytest
@@ -25,14 +25,14 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def bar(held: bool, elements: int = 10) -> MeshData:
-    """Return a bar along x, held at x = 0 or free, with facet sets at both ends."""
+    """Return a bar along x, fixed at x = 0 or free, with facet sets at both ends."""
     points, cells = grid(np.linspace(0, LENGTH, elements + 1), [0, WIDTH], [0, WIDTH])
     facets = {"symmetry_x": on(0, 0.0)} if held else {}
     return mesh_of(points, cells, "board", facets | {"low": on(0, 0.0), "high": on(0, LENGTH)})
 
 
 def total_energy(motion: ExplicitMotion) -> float:
-    """Return all energy that is there or was taken, minus the external work."""
+    """Return stored plus dissipated energy minus the external work."""
     held = motion.internal_energy()
     return motion.kinetic_energy() + held.total + motion.damping_energy - motion.external_work
 
@@ -114,7 +114,7 @@ def test_free_body_keeps_momentum_and_angular_momentum():
 
 
 def test_prescribed_motion_sends_the_exact_wave():
-    """A bar pushed at v: behind the front the stress is rho c v, and the reaction does the work of both energies."""
+    """Behind the front of a bar pushed at v the stress is rho c v; the reaction supplies kinetic and strain energy."""
     mesh, speed = bar(held=False, elements=60), 1.0
     body, critical = dns_body(mesh, STEEL)
     driven = low_nodes(body, mesh)
@@ -124,8 +124,8 @@ def test_prescribed_motion_sends_the_exact_wave():
         motion.update_force()
     assert motion.displacement[driven, 0] == pytest.approx(speed * motion.time, rel=1e-12)
     exact = STEEL.density * SPEED * speed**2 * WIDTH**2 * motion.time
-    own = 0.5 * body.mass[driven].sum() * speed**2  # of the driven nodes, which have their velocity from the start
-    assert motion.external_work + own == pytest.approx(exact, rel=0.005)
+    initial_energy = 0.5 * body.mass[driven].sum() * speed**2  # the driven nodes start with their velocity
+    assert motion.external_work + initial_energy == pytest.approx(exact, rel=0.005)
 
 
 def test_large_mass_is_direct_acceleration():
@@ -150,8 +150,8 @@ def test_large_mass_is_direct_acceleration():
 
 
 @pytest.mark.parametrize("kind", ["mass", "stiffness"])
-def test_damping_ratio_is_that_of_the_exact_decay(kind):
-    """First mode of a bar held at one end: amplitude exp(-xi w t), measured over ten periods."""
+def test_damping_ratio_equals_the_exact_decay(kind):
+    """The first mode of a bar fixed at one end decays as exp(-xi w t), measured over ten periods."""
     ratio, mesh = 0.02, bar(held=True)
     body, critical = dns_body(mesh, STEEL)
     frequency = SPEED / (4 * LENGTH)

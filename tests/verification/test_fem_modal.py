@@ -1,4 +1,4 @@
-"""Natural frequencies against exact values: bar, beam, plates, free body, and the JEDEC board's measured first mode."""
+"""Natural frequencies against exact values (bar, beam, plates, free body) and the measured mode of the JEDEC board."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from reflowshock.materials.library import FR4
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import bar
 
-SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # of bar waves; nu = 0
+SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # bar wave speed; nu = 0
 WIDTH = 0.1
 
 
@@ -34,7 +34,7 @@ def held_bar(elements: int, held_at_end: tuple[int, ...]) -> Body:
 
 
 def test_bar():
-    """Fixed at one end, moving along its axis only: (2 k - 1) c / 4 L."""
+    """A bar fixed at one end has the axial frequencies (2 k - 1) c / 4 L."""
     body = held_bar(40, (0,))
     body.free[:, 1:] = False
     exact = np.array([1, 3, 5]) * SPEED / (4 * WIDTH)
@@ -42,13 +42,13 @@ def test_bar():
 
 
 def test_cantilever_beam():
-    """Euler and Bernoulli; each mode twice, because the section is square."""
+    """Euler-Bernoulli modes appear twice because the section is square."""
     exact = np.array([1.875104, 4.694091]) ** 2 / (2 * np.pi * WIDTH**2) * SPEED * 1e-3 / np.sqrt(12)
     assert frequencies(held_bar(40, (0, 1, 2)), 4) == pytest.approx(np.repeat(exact, 2), rel=0.01)
 
 
 def quarter_plate(elements: int, thickness: float, held: tuple[tuple[int, ...], tuple[int, ...]]) -> Body:
-    """Return a quarter of a square plate: symmetric about x = 0 and y = 0, components held on the other two sides."""
+    """Return a quarter of a square plate, symmetric about x = 0 and y = 0, with components fixed on the other sides."""
     side = np.linspace(0, WIDTH / 2, elements + 1)
     points, cells = grid(side, side, [0, thickness])
     body, _ = dns_body(mesh_of(points, cells, "board", {}), STEEL)
@@ -105,7 +105,7 @@ def test_shapes_are_orthonormal_and_carry_the_stiffness(free_body):
 
 
 @pytest.mark.skipif(modal.SLEPc is None, reason="SciPy is all there is")
-def test_scipy_finds_the_same(free_body, monkeypatch):
+def test_frequencies_equal_scipy(free_body, monkeypatch):
     with_slepc = natural_modes(equations(free_body), 9)
     monkeypatch.setattr(modal, "SLEPc", None)
     with_scipy = natural_modes(equations(free_body), 9)
@@ -115,7 +115,7 @@ def test_scipy_finds_the_same(free_body, monkeypatch):
 
 
 def test_first_mode_of_the_jedec_board():
-    """JESD22-B111 board of FR4 held at its four holes; 280 Hz were measured (Fuchs & Major 2011)."""
+    """The JESD22-B111 board of FR4, fixed at its four holes, was measured at 280 Hz (Fuchs & Major 2011)."""
     points, cells = grid(np.linspace(0, 66e-3, 34), np.linspace(0, 38.5e-3, 20), [0, 1e-3])
     body, _ = dns_body(mesh_of(points, cells, "board", {}), FR4)
     x, y = body.local.points[:, 0], body.local.points[:, 1]

@@ -10,7 +10,7 @@ from reflowshock.fem.mesh.mesh import MeshData
 from tests.support.fem_bodies import STEEL
 from tests.support.fem_models import bar
 
-SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # of bar waves; nu = 0
+SPEED = np.sqrt(STEEL.young_modulus / STEEL.density)  # bar wave speed; nu = 0
 LENGTH = 0.1
 
 
@@ -54,7 +54,7 @@ def test_order_in_time():
 
 
 def test_velocity_step_travels_at_the_wave_speed_and_keeps_its_height():
-    """A bar that hits a wall at v: the stress behind the front is rho c v, and it leaves the wall after 2 L / c."""
+    """For a bar that hits a wall at v the stress behind the front is rho c v, and contact ends after 2 L / c."""
     elements, speed = 100, 1.0
     body, critical = dns_body(bar_with_wall(elements), STEEL)
     motion = motion_of(body, 0.9 * critical)
@@ -75,9 +75,9 @@ def bar_with_wall(elements: int) -> MeshData:
 
 
 def test_half_sine_shock_response():
-    """A spring-mass pair under a half sine: z omega^2 / A = 4 f tau cos(pi f tau) / (1 - 4 f^2 tau^2) afterwards.
+    """A spring-mass pair after a half sine has z omega^2 / A = 4 f tau cos(pi f tau) / (1 - 4 f^2 tau^2).
 
-    The pair is a plate of clamped elements, two of them: one free layer of nodes between two held ones.
+    The pair is a plate of two clamped elements: one free layer of nodes between two fixed layers.
     """
     points, cells = grid([0, 1e-3, 2e-3], [0, 1e-3], [0, 1e-3])
     ends = {"mounting_holes": lambda c: (c[:, 0] < 1e-9) | (c[:, 0] > 2e-3 - 1e-9)}

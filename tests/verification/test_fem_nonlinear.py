@@ -1,4 +1,4 @@
-"""Finite strain, finite rotation and plastic flow against exact solutions, order in the step asserted."""
+"""Finite strain, finite rotation and plastic flow against exact solutions, with the order in the step."""
 
 from collections.abc import Callable
 
@@ -29,9 +29,9 @@ def patch(name: str, material: Material, finite: bool, step: float = np.inf) -> 
 
 
 def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: int) -> np.ndarray:
-    """Deform all by F(s), s from 0 to 1; check that inner nodes stay free of force; return s (3, 3), all points alike.
+    """Deform the body by F(s), s from 0 to 1, check force-free inner nodes and return the uniform stress, shape (3, 3).
 
-    Returned is the stress of the points, in the frame that turns with the body. Round-off of U is multiplied by E.
+    The stress is in the frame that rotates with the body. Round-off of U is multiplied by E.
     """
     stiffness = term.elements.elasticity.max()
     points = term.elements.points
@@ -46,19 +46,19 @@ def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: 
 
 @every_kind
 def test_bar_that_yields_follows_its_exact_curve(name):
-    """Uniaxial stress A + B p: axial strain s/E + p, lateral -nu s/E - p/2; proportional, so exact in any step."""
+    """With uniaxial stress A + B p, axial strain s/E + p and lateral strain -nu s/E - p/2, any step is exact."""
     law, material = LINEAR_HARDENING.plasticity, LINEAR_HARDENING
     for plastic in (0.001, 0.02):
         stress = law.A + law.B * plastic
         elastic = stress / material.young_modulus
         strain = np.diag([elastic + plastic, *[-material.poisson_ratio * elastic - plastic / 2] * 2])
-        found = follow(patch(name, material, finite=False), lambda s, e=strain: np.eye(3) + s * e, 3)
-        assert np.abs(found - np.diag([stress, 0, 0])).max() < 1e-9 * stress
+        curve = follow(patch(name, material, finite=False), lambda s, e=strain: np.eye(3) + s * e, 3)
+        assert np.abs(curve - np.diag([stress, 0, 0])).max() < 1e-9 * stress
 
 
 @every_kind
 def test_large_plastic_tension(name):
-    """The same with logarithmic strains, to 50 % of plastic strain: U' U^-1 is the rate of ln U."""
+    """Logarithmic strains up to 50 % of plastic strain: U' U^-1 is the rate of ln U."""
     law, material = LINEAR_HARDENING.plasticity, LINEAR_HARDENING
     stress = law.A + 0.5 * law.B
     elastic = stress / material.young_modulus
@@ -83,8 +83,8 @@ def test_large_simple_shear(name, shear):
     rotation = np.array([[np.cos(b), np.sin(b), 0], [-np.sin(b), np.cos(b), 0], [0, 0, 1]])
     errors = []
     for steps in (50, 100):
-        found = follow(patch(name, ELASTIC, finite=True), lambda s: np.eye(3) + s * shear * np.eye(3, k=1) * ROW, steps)
-        errors.append(np.abs(rotation @ found @ rotation.T - exact).max() / across)
+        curve = follow(patch(name, ELASTIC, finite=True), lambda s: np.eye(3) + s * shear * np.eye(3, k=1) * ROW, steps)
+        errors.append(np.abs(rotation @ curve @ rotation.T - exact).max() / across)
     assert errors[1] < 2e-3
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
 
@@ -93,15 +93,15 @@ ROW = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 def test_large_confined_tension():
-    found = follow(patch("one_point", ELASTIC, finite=True), lambda s: np.diag([2.0**s, 1.0, 1.0]), 200)
-    assert found[0, 0] == pytest.approx((LAME + 2 * SHEAR) * np.log(2.0), rel=1e-4)
-    assert found[1, 1] == pytest.approx(LAME * np.log(2.0), rel=1e-4)
+    curve = follow(patch("one_point", ELASTIC, finite=True), lambda s: np.diag([2.0**s, 1.0, 1.0]), 200)
+    assert curve[0, 0] == pytest.approx((LAME + 2 * SHEAR) * np.log(2.0), rel=1e-4)
+    assert curve[1, 1] == pytest.approx(LAME * np.log(2.0), rel=1e-4)
 
 
 @every_kind
 @pytest.mark.parametrize("material", [FR4, SOLDER], ids=["orthotropic", "plastic"])
-def test_rotation_on_top_of_a_path_turns_the_force_and_nothing_else(name, material):
-    """Objectivity: u on a path with a rotation of any size in each step gives R times the force of u."""
+def test_force_is_objective(name, material):
+    """A path with an additional rotation R of any size in each step gives R times the force."""
     still, turned = (patch(name, material, finite=True, step=1e-6) for _ in range(2))
     points = still.elements.points
     moves = np.random.default_rng(3).uniform(-0.02, 0.02, (3, *points.shape))
@@ -115,7 +115,7 @@ def test_rotation_on_top_of_a_path_turns_the_force_and_nothing_else(name, materi
 
 
 @every_kind
-def test_hundred_turns_leave_no_strain(name):
+def test_hundred_rotations_leave_no_strain(name):
     term = patch(name, FR4, finite=True)
     points, worst = term.elements.points, 0.0
     for turn in np.linspace(0.0, 100.0, 401)[1:]:
@@ -127,20 +127,20 @@ def test_hundred_turns_leave_no_strain(name):
 
 @every_kind
 def test_work_of_the_force_is_the_energy(name):
-    """Elastic plus plastic plus hourglass energy is the work along a path that bends, turns and flows: order 2."""
+    """Elastic, plastic and hourglass energy equal the work along a path with bending, rotation and flow: order 2."""
     errors = []
     for steps in (40, 80):
         term = patch(name, LINEAR_HARDENING, finite=True)
         points = term.elements.points
         shape = np.random.default_rng(4).uniform(-0.03, 0.03, points.shape)
-        work, force, place = 0.0, np.zeros_like(points), points
+        work, force, position = 0.0, np.zeros_like(points), points
         for s in np.arange(1, steps + 1) / steps:
             matrix = Rotation.from_rotvec(s * np.array([1.0, 0.5, -0.7])).as_matrix()
             after = (points + s * shape) @ matrix.T
             now = force_of(term, after - points)
-            work += 0.5 * float(np.sum((force + now) * (after - place)))
-            force, place = now, after
-        energy = term.energy(place - points)
+            work += 0.5 * float(np.sum((force + now) * (after - position)))
+            force, position = now, after
+        energy = term.energy(position - points)
         errors.append(abs(work - energy.total) / energy.total)
     assert energy.plastic > 0.005 * energy.total
     assert errors[1] < 3e-3
@@ -150,6 +150,6 @@ def test_work_of_the_force_is_the_energy(name):
 @pytest.mark.parametrize("layers", [1, 2, 4])
 @pytest.mark.parametrize("name", ["one_point", "incompatible_modes"])
 def test_plastic_hinge(name, layers):
-    """One point needs hourglass forces that yield for this: elastic ones are 29 % too strong with four layers."""
+    """One-point elements need hourglass forces that yield: elastic ones are 29 % too strong with four layers."""
     allowed = 0.2 if (name, layers) == ("incompatible_modes", 1) else 0.05
     assert bent_moment(name, layers) == pytest.approx(1.0, abs=allowed)

@@ -1,4 +1,4 @@
-"""One way: a fine block driven by a board with a coarse one; nothing comes back, and each energy balance is closed."""
+"""One-way coupling: a fine block driven by a board with a coarse block, with closed energy balances."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ FINE, COARSE = Pair(ratio=2, height=4), Pair(ratio=1, height=2)  # the same bloc
 
 
 def driver_of(models: Models) -> tuple[Pieces, Tables]:
-    """Return a board of its own with the coarse block, which knows the interface of the fine block's model."""
+    """Return a board with the coarse block that drives the interface of the fine model."""
     whole, _, _ = surveyed(COARSE.mesh(), SOLDER)
     pieces, tables = pieces_of(model_inputs(whole, "dns")["dns"], SOLDER)
     fine, meso = models.parts["meso"]
@@ -32,18 +32,18 @@ def driver_of(models: Models) -> tuple[Pieces, Tables]:
     return pieces, replace(tables, interface=pieces.local.nodes[interface].astype(np.int32))
 
 
-def nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    return np.array([np.argmin(np.linalg.norm(points - point, axis=1)) for point in wanted])
+def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    return np.array([np.argmin(np.linalg.norm(points - point, axis=1)) for point in targets])
 
 
 def top(coupled: Coupled) -> np.ndarray:
-    """Return the displacement of the block's upper face (3,) [m]."""
+    """Return the displacement of the upper face of the block, shape (3,) [m]."""
     motion = coupled.meso.motion
     height = motion.body.local.points[:, 2]
     return motion.displacement[height > height.max() - 1e-9].mean(axis=0)
 
 
-def test_submodel_follows_and_the_driver_does_not_notice():
+def test_submodel_follows_without_feedback_to_the_driver():
     models = models_of(FINE.mesh(), SOLDER, Coupling(scheme="held_velocity"), FRACTION)
     driver = driver_of(models)
     window = FRACTION * driver[0].steps.min()  # the block is stiffer than the board
@@ -68,4 +68,4 @@ def test_submodel_follows_and_the_driver_does_not_notice():
     assert energies["external"] > 0.0
     assert energies["interface"] == 0.0
     error = np.linalg.norm(np.array(ours) - reference) / np.linalg.norm(reference)
-    assert 1e-4 < error < 0.06  # what a block of one column costs; two-way needs no coarse block
+    assert 1e-4 < error < 0.06  # the error of a block of one column; two-way coupling needs no coarse block

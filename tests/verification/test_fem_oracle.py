@@ -18,9 +18,9 @@ HOLE = (52.5e-3, 35.5e-3)
 
 
 def quarter_board() -> MeshData:
-    """Return a quarter of the board, held at the facets within 2.5 mm of the hole's axis, top and bottom.
+    """Return a quarter of the board, fixed at the top and bottom facets within 2.5 mm of the hole axis.
 
-    Two layers: the strain of one would be that of the middle, where bending has none.
+    It has two layers, because one layer only resolves the neutral plane, where the bending strain is zero.
     """
     points, cells = grid(np.linspace(0, X, 23), np.linspace(0, Y, 14), [0, Z / 2, Z])
     sides = {"x_min": on(0, 0.0), "x_max": on(0, X), "y_min": on(1, 0.0), "y_max": on(1, Y)}
@@ -59,9 +59,9 @@ def drop(directory: Path, solver: str) -> tuple[dict, Path]:
 def test_explicit_and_implicit_steps_agree(tmp_path):
     (explicit, first), (implicit, second) = (drop(tmp_path / name, name) for name in ("explicit", "implicit"))
     with np.load(first / "history.npz") as ours, np.load(second / "history.npz") as reference:
-        found = solver_differences(dict(ours), dict(reference))
-    assert found["displacement_difference@centre"] <= 0.01
-    assert found["strain_difference@centre"] <= 0.01
+        differences = solver_differences(dict(ours), dict(reference))
+    assert differences["displacement_difference@centre"] <= 0.01
+    assert differences["strain_difference@centre"] <= 0.01
     for result in (explicit, implicit):
         assert all(check["ok"] for check in result["health"].values())
     assert implicit["metrics"]["energy_balance_error"]["value"] < 1e-9

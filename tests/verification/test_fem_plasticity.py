@@ -28,7 +28,7 @@ def plain_yield_stress(material: Isotropic, strain: float, rate: float) -> float
 
 
 def exact_increment(trial: float, strain: float, material: Isotropic, step: float) -> float:
-    """Solve the return equation by Brent's method in ln x, between rounding and the rate-independent increment."""
+    """Solve the return equation by Brent's method in ln x, between round-off and the rate-independent increment."""
     stiffness = 3.0 * material.shear_modulus
     largest = (trial - plain_yield_stress(material, strain, 0.0)) / stiffness
 
@@ -51,11 +51,11 @@ def test_return_equation_is_solved(rate, exponent, temperature):
     for strain in (0.0, 1e-9, 1e-3, 0.5):
         step = 1e-8
         trial = plain_yield_stress(material, strain, rate) + 3.0 * material.shear_modulus * rate * step
-        found = plastic_increment(trial, strain, constants, step)
-        assert found == pytest.approx(exact_increment(trial, strain, material, step), rel=1e-8)
-        left = trial - 3.0 * material.shear_modulus * found
+        increment = plastic_increment(trial, strain, constants, step)
+        assert increment == pytest.approx(exact_increment(trial, strain, material, step), rel=1e-8)
+        left = trial - 3.0 * material.shear_modulus * increment
         assert left == pytest.approx(
-            plain_yield_stress(material, strain + found, found / step), rel=1e-12, abs=1e-14 * trial
+            plain_yield_stress(material, strain + increment, increment / step), rel=1e-12, abs=1e-14 * trial
         )
 
 
@@ -67,11 +67,11 @@ def test_any_admissible_constants_give_a_bracketed_solution():
         step = 10.0 ** RANDOM.uniform(-12, 0)
         static = yield_stress(strain, 0.0, constants)
         trial = static * (1.0 + 10.0 ** RANDOM.uniform(-6, 3))
-        found = plastic_increment(trial, strain, constants, step)
-        assert 0.0 <= found <= (trial - static) / constants[0] * (1.0 + 1e-14)
-        left = trial - constants[0] * found
+        increment = plastic_increment(trial, strain, constants, step)
+        assert 0.0 <= increment <= (trial - static) / constants[0] * (1.0 + 1e-14)
+        left = trial - constants[0] * increment
         assert left == pytest.approx(
-            yield_stress(strain + found, found / step, constants), rel=1e-12, abs=1e-14 * trial
+            yield_stress(strain + increment, increment / step, constants), rel=1e-12, abs=1e-14 * trial
         )
 
 

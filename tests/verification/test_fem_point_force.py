@@ -1,4 +1,4 @@
-"""Forces at points against exact solutions: momentum of a free body, deflection of a cantilever at rest."""
+"""Point forces against exact solutions: momentum of a free body, static deflection of a cantilever."""
 
 import json
 
@@ -21,7 +21,7 @@ AT = np.array([3.1e-3, -1.7e-3, 0.8e-3])
 
 @pytest.mark.parametrize("solver", ["explicit", "implicit"])
 def test_impulse_is_the_integral_of_the_force(tmp_path, solver):
-    """A triangle in time, linear within each step: momentum and moment of momentum are exact, and so is the work."""
+    """For a triangle in time, linear within each step, linear momentum, angular momentum and work are exact."""
     ends = STEP * np.array([0, 40, 100])
     table = tmp_path / "force.csv"
     rows = zip(ends.tolist(), (0.0, 11.0, 0.0), strict=True)
@@ -52,9 +52,9 @@ def test_impulse_is_the_integral_of_the_force(tmp_path, solver):
 @pytest.mark.parametrize("share", [1.0, 0.72])
 @pytest.mark.parametrize("y", [0.0, WIDTH / 4])
 def test_cantilever_at_rest_under_a_force(tmp_path, share, y):
-    """Mean deflection of the end, F a^2 (3 L - a) / (6 E I), and reactions; a is anywhere between nodes.
+    """The mean end deflection is F a^2 (3 L - a) / (6 E I), for any position a between nodes.
 
-    Without contraction the mean over the width of a plate obeys the beam's equation.
+    Without lateral contraction the mean over the width of a plate follows the beam equation.
     """
     young, inertia, force, arm = STEEL["young_modulus"], WIDTH * THICKNESS**3 / 12, 5.0, share * LENGTH
     omega = 1.8751**2 * np.sqrt(young * THICKNESS**2 / (12 * STEEL["density"] * LENGTH**4))

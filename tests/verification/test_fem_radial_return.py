@@ -1,4 +1,4 @@
-"""Radial return along strain paths: exact where backward Euler is, of first order elsewhere."""
+"""Radial return along strain paths: exact for proportional paths, otherwise first order."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def mises(deviator: np.ndarray) -> float:
 
 
 def returned(material: Isotropic, strains: np.ndarray, step: float) -> tuple[np.ndarray, float]:
-    """Return deviator (3, 3) [Pa] and plastic strain after deviatoric total strains (k, 3, 3), the first one zero."""
+    """Return deviator (3, 3) [Pa] and plastic strain after deviatoric total strains (k, 3, 3) that start at zero."""
     constants, shear = plastic_constants(material), material.shear_modulus
     deviator, plastic = np.zeros((3, 3)), 0.0
     for increment in np.diff(strains, axis=0):
@@ -36,7 +36,7 @@ def returned(material: Isotropic, strains: np.ndarray, step: float) -> tuple[np.
 def flow(material: Isotropic, rate: Callable[[float], np.ndarray], start: np.ndarray, end: float) -> np.ndarray:
     """Integrate the rate equations of Johnson-Cook viscoplasticity: deviator and plastic strain (10,) at the end.
 
-    The flow rule solved for the rate, reference_rate exp((q / (A + B p^n) - 1) / C), knows no return mapping.
+    The flow rule is solved for the rate, reference_rate exp((q / (A + B p^n) - 1) / C), without a return mapping.
     """
     law, shear = material.plasticity, material.shear_modulus
 
@@ -47,9 +47,9 @@ def flow(material: Isotropic, rate: Callable[[float], np.ndarray], start: np.nda
         direction = 1.5 * deviator / stress
         return np.append((2.0 * shear * (rate(time) - grown * direction)).ravel(), grown)
 
-    found = solve_ivp(slope, (0.0, end), start, method="Radau", rtol=1e-10, atol=np.append(np.full(9, 1e-3), 1e-14))
-    assert found.success
-    return found.y[:, -1]
+    solution = solve_ivp(slope, (0.0, end), start, method="Radau", rtol=1e-10, atol=np.append(np.full(9, 1e-3), 1e-14))
+    assert solution.success
+    return solution.y[:, -1]
 
 
 SHEAR = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) / np.sqrt(2.0)
@@ -74,7 +74,7 @@ def test_constant_plastic_rate_with_hardening_equals_the_integrated_rate_equatio
     factor = 1.0 + law.C * np.log(rate / law.reference_rate)
     first, last = 1e-3, 0.02
 
-    def strain(plastic):  # of the path on which the plastic strain grows at a constant rate
+    def strain(plastic):  # path on which the plastic strain grows at a constant rate
         stress = (law.A + law.B * plastic**law.n) * factor
         return np.sqrt(1.5) * (plastic + stress / (3.0 * shear))
 
@@ -100,7 +100,7 @@ def order(steps: list[int], errors: list[float]) -> float:
 
 
 def test_turning_path_of_perfect_plasticity_converges_to_krieg_and_krieg():
-    """Deviator and strain rate enclose psi: tan(psi / 2) decays as exp(-2 G |e| / R), R the yield surface's radius."""
+    """The angle psi between deviator and strain rate follows tan(psi / 2) ~ exp(-2 G |e| / R), R the yield radius."""
     material = solder(A=38e6)
     radius, shear = np.sqrt(2.0 / 3.0) * 38e6, material.shear_modulus
     yielding, turned = radius / (2.0 * shear), 1.2 * radius / (2.0 * shear)
@@ -127,7 +127,7 @@ def test_turning_path_with_rate_and_hardening_is_of_first_order():
         turn = np.pi * time / duration
         return size * np.pi / duration * (np.cos(turn) * TENSION + np.sin(turn) * SHEAR)
 
-    start = np.append((1e3 * TENSION).ravel(), 0.0)  # a direction to start from; the stress that it adds relaxes
+    start = np.append((1e3 * TENSION).ravel(), 0.0)  # initial direction; its stress relaxes
     end = flow(material, strain_rate, start, duration)
     steps, errors = [200, 400, 800], []
     for count in steps:

@@ -1,4 +1,4 @@
-"""What every coupling scheme must do: be the DNS at equal steps, account for all energy, continue."""
+"""Requirements on each coupling scheme: DNS at equal steps, energy balance, order and restart."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ def twins(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.array([np.argmin(np.linalg.norm(others - point, axis=1)) for point in points])
 
 
-def dns_beside(coupled: Coupled, pair: Pair):
-    """Return a DNS at the coupled models' small steps from their state, and the nodes of the macro model in it."""
+def parallel_dns(coupled: Coupled, pair: Pair):
+    """Return a DNS at the small step of the coupled models from their state, and the macro nodes in it."""
     body, _ = dns_body(pair.mesh(), materials=pair.materials())
     dns = motion_of(body, coupled.plan.step)
     for part in coupled.parts:
@@ -42,7 +42,7 @@ def test_one_substep_a_window_is_the_dns(scheme):
     pair = Pair(substeps=1, ratio=2)
     coupled = pushed(scheme, pair)
     assert coupled.plan.substeps == 1
-    dns, twin = dns_beside(coupled, pair)
+    dns, twin = parallel_dns(coupled, pair)
     for _ in range(300):
         coupled.run()
         dns.advance()
@@ -57,7 +57,7 @@ def test_displacements_are_of_second_order_in_the_window(scheme):
     for fraction in (0.8, 0.4):
         pair = Pair(4, 2.0, 2)
         coupled = pushed(scheme, pair, fraction)
-        dns, twin = dns_beside(coupled, pair)
+        dns, twin = parallel_dns(coupled, pair)
         error, size = 0.0, 0.0
         for _ in range(round(80 / fraction)):
             coupled.run()
@@ -72,7 +72,7 @@ def test_displacements_are_of_second_order_in_the_window(scheme):
 
 
 def change_of_the_sum(coupled: Coupled) -> float:
-    """How much what is held and what the interface has change together in 200 windows, over what they began with."""
+    """Return the relative change of model energy plus interface energy over 200 windows."""
     sums = []
     for _ in range(200):
         sums.append(coupled.held() + coupled.energies()["interface"])
@@ -81,20 +81,20 @@ def change_of_the_sum(coupled: Coupled) -> float:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_is_held_and_what_the_interface_has_add_up(scheme):
+def test_model_and_interface_energy_are_conserved(scheme):
     coupled = pushed(scheme, Pair(3 if scheme == WITH_LEVELS else 5, 3.0, 2, free=True))
     assert len(coupled.meso.motion.body.schedule) == 1
     assert change_of_the_sum(coupled) < 1e-11
 
 
-def test_what_lies_between_levels_along_a_path_is_in_no_account_and_small():
+def test_energy_between_path_levels_is_small():
     coupled = pushed(WITH_LEVELS, Pair(5, 3.0, 2, free=True))
     assert len(coupled.meso.motion.body.schedule) == 2
     assert change_of_the_sum(coupled) < 1e-3
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_run_continues_from_its_state_to_the_same_bits(scheme):
+def test_run_continues_from_its_state_bitwise(scheme):
     pair = Pair(3, 3.0, 2, layers=3)
     first, second = pushed(scheme, pair), pair.coupled(SCHEMES[scheme])
     for _ in range(20):
@@ -109,7 +109,7 @@ def test_a_run_continues_from_its_state_to_the_same_bits(scheme):
         assert ours.interface_work == others.interface_work
 
 
-def test_energy_that_the_interface_has_is_told_as_such():
+def test_interface_energy_is_reported_separately():
     coupled = pushed("held_velocity", Pair(4, 3.0, 2, layers=3))
     balance = EnergyBalance(limit=1e-4, trivial=0.0)
     balance.judge(coupled.sums(), 0.0)

@@ -1,4 +1,4 @@
-"""Stress, strain and plastic flow that watch points and fields show, against exact homogeneous states."""
+"""Stress, strain and plastic flow of watch points and fields against exact homogeneous states."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ both_formulations = pytest.mark.parametrize("formulation", ["one_point", "incomp
 
 
 def recovered(material, path, kinematics: str, formulation: str, steps: int = 100) -> tuple[StressRecovery, np.ndarray]:
-    """Deform a block by path(s), s from 0 to 1; return the recovery of two elements and the displacement."""
+    """Deform a block by path(s), s from 0 to 1, and return the recovery of two elements and the displacement."""
     points, cells = grid([0, 1, 2], [0, 1], [0, 1, 1.5])
     body, step = nonlinear_body(mesh_of(points, cells, "board", {}), material, ForceOptions(kinematics), formulation)
     motion = motion_of(body, step)
@@ -29,7 +29,7 @@ def recovered(material, path, kinematics: str, formulation: str, steps: int = 10
 
 
 @both_formulations
-def test_cauchy_stress_and_stretch_of_a_body_that_turns(formulation):
+def test_cauchy_stress_and_stretch_of_a_rotating_body(formulation):
     turn, logarithm = Rotation.from_rotvec([0.5, -1.2, 0.8]), np.array([0.3, -0.1, 0.05])
     recovery, displacement = recovered(
         ELASTIC, lambda s: (turn**s).as_matrix() @ np.diag(np.exp(s * logarithm)), "finite", formulation
@@ -77,7 +77,7 @@ def test_small_kinematics_of_an_elastic_body_follow_the_linear_law():
 
 
 @pytest.mark.parametrize(("kinematics", "left_out"), [("small", True), ("finite", False)])
-def test_strain_that_small_kinematics_leaves_out_of_a_rotation(kinematics, left_out):
+def test_neglected_strain_of_a_rotation_in_small_kinematics(kinematics, left_out):
     angle = 0.02
 
     def turn(s: float) -> np.ndarray:

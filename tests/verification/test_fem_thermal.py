@@ -1,4 +1,4 @@
-"""Thermoelastic package and board against exact solutions: free expansion, two layers (strip, plate), thin layers."""
+"""Thermoelastic package and board against exact solutions: free expansion, bilayers (strip, plate), thin layers."""
 
 from pathlib import Path
 
@@ -30,9 +30,9 @@ RISE = 175.0
 
 
 def bilayer_curvature(lower: Isotropic, upper: Isotropic, thickness: tuple[float, float], plate: bool) -> float:
-    """Return the curvature [1/m] of two layers that warm up by 175 K, ends up if positive (Timoshenko, JOSA 11, 1925).
+    """Return the curvature [1/m] of a bilayer heated by 175 K, positive with ends up (Timoshenko, JOSA 11, 1925).
 
-    In a plate both directions bend alike: E / (1 - nu) stands for E.
+    A plate bends equally in both directions: E / (1 - nu) replaces E.
     """
     below, above = (material.young_modulus / (1.0 - plate * material.poisson_ratio) for material in (lower, upper))
     m, n = thickness[0] / thickness[1], below / above
@@ -79,7 +79,7 @@ def strip(tmp_path: Path, cells: tuple[int, int, int, int], ratio: float = 0.0):
     return structure, bilayer_curvature(soft, stiff, layers.thickness, plate=False)
 
 
-def test_bimaterial_strip_bends_as_timoshenko_says(tmp_path):
+def test_bimaterial_strip_has_timoshenko_curvature(tmp_path):
     structure, curvature = strip(tmp_path, (40, 2, 4, 4), 0.3)
     state = heated(structure)
     nodes = lower_face(structure)

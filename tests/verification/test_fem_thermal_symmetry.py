@@ -1,4 +1,4 @@
-"""A quarter of a heated package stands for the whole: equal motions of its pads, also with plates of copper."""
+"""A quarter model of a heated package against the full model: pad motions, also with copper plates."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ MOVED = Thermal(package="moved", corner_displacement=-5e-5)
 
 
 def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple[Pads, HeatedState]:
-    """Return pads, and their motion under heat, weight and a pull of every joint towards the centre of the array."""
+    """Return pads and their motion under heat, weight and joint forces towards the centre of the array."""
     parts = package(copper=copper)
     plate = board(symmetry=symmetry, numerics={"element_size": 0.5 * MM, "coarse_size": 4.0 * MM, "growth": 2.0})
     write_heated_assembly(parts, plate, folder / "heated.msh")
@@ -39,7 +39,7 @@ def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple
     [({}, Thermal()), pytest.param(PLATE, MOVED, marks=pytest.mark.long)],
     ids=["floating", "moved, plates"],
 )
-def test_a_quarter_stands_for_the_whole(tmp_path, copper, thermal):
+def test_quarter_model_equals_full_model(tmp_path, copper, thermal):
     pads, quarter = solved(tmp_path, "quarter", copper, thermal)
     all_pads, whole = solved(tmp_path, "full", copper, thermal)
     number = [list(all_pads.names).index(name) for name in pads.names]

@@ -1,4 +1,4 @@
-"""Waves through a change of impedance, and second order in time under every kind of load."""
+"""Waves through a change of impedance, and second order in time under each type of load."""
 
 from itertools import pairwise
 
@@ -23,17 +23,17 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def smooth_pulse(peak: float, duration: float) -> Tabulated:
-    """Return peak times sin^2, tabulated."""
+    """Return a tabulated sin^2 pulse of the given peak."""
     times = np.linspace(0.0, duration, 201)
     return Tabulated(times, peak * np.sin(np.pi * times / duration) ** 2)
 
 
 @pytest.mark.parametrize("ratio", [3.0, 1.0 / 3.0])
 def test_wave_through_a_change_of_impedance(ratio):
-    """Stress is transmitted by 2 Z2 / (Z1 + Z2) and reflected by (Z2 - Z1) / (Z1 + Z2), Z = rho c."""
+    """The stress factors are 2 Z2 / (Z1 + Z2) transmitted and (Z2 - Z1) / (Z1 + Z2) reflected, Z = rho c."""
     count, size = 200, 1e-4
     other = Isotropic(density=STEEL.density * ratio**2, young_modulus=STEEL.young_modulus, poisson_ratio=0.0)
-    # The second bar's elements are as long as the wave is slower in it, so that both have the same critical step.
+    # Element lengths are proportional to the wave speeds, so both bars have the same critical step.
     x = np.concatenate([np.linspace(0, count, count + 1), count + np.linspace(0, count, count + 1)[1:] / ratio]) * size
     points, cells = grid(x, [0, size], [0, size])
     second = points[cells][:, :, 0].mean(axis=1) > count * size
@@ -84,7 +84,7 @@ def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
 
 
 def order(fields: list[np.ndarray]) -> float:
-    """Return the order that three results with steps halved twice show."""
+    """Return the order observed in three results with the step halved twice."""
     first, second = (np.linalg.norm(after - before) for before, after in pairwise(fields))
     return float(np.log2(first / second))
 
@@ -106,7 +106,7 @@ def test_second_order_in_time(kind):
 
 
 def test_second_order_of_a_body_that_starts_with_a_velocity_and_drag():
-    """A free body slows down as v exp(-alpha t), and has moved by v (1 - exp(-alpha t)) / alpha."""
+    """A free body has the velocity v exp(-alpha t) and the displacement v (1 - exp(-alpha t)) / alpha."""
     drag = 2e5
     body, critical = dns_body(box(held=False), STEEL)
     duration = 40 * critical
@@ -125,7 +125,7 @@ def test_second_order_of_a_body_that_starts_with_a_velocity_and_drag():
 
 
 def test_stiffness_damping_half_a_step_late_is_of_first_order():
-    """Its error is the ratio of critical damping times the step, small against the damping itself."""
+    """The error is the damping ratio times the step, small compared with the damping."""
     mesh = box(held=True)
     body, critical = dns_body(mesh, STEEL)
     duration, stiffness = 40 * critical, 0.2 * critical

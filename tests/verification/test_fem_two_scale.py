@@ -1,4 +1,4 @@
-"""Two-scale against DNS: equal where it must be, close where it may differ, better with smaller windows."""
+"""Two-scale coupling against DNS: equality at one substep, and convergence with the window."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def board_only() -> MeshData:
 
 
 def test_one_substep_a_window_is_the_dns():
-    """The exchange is without lag: macro and meso model with m = 1 are one model, to round-off."""
+    """The exchange has no lag: with m = 1 the coupled models equal one model to round-off."""
     window = Window(board_only(), ELASTIC, 0.9, by_patch, [PULSE])
     assert window.plan.substeps == 1
     body, _ = dns_body(board_only())
@@ -39,14 +39,14 @@ def test_one_substep_a_window_is_the_dns():
 
 
 def matching(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return for each point the number of the other at the same place."""
+    """Return for each point the index of the other point at the same position."""
     keys = [tuple(row) for row in np.round(others * 1e9).astype(int)]
     number = {key: k for k, key in enumerate(keys)}
     return np.array([number[tuple(row)] for row in np.round(points * 1e9).astype(int)])
 
 
 def die_history(fraction: float, duration: float) -> tuple[Window, float]:
-    """Run two-scale and DNS side by side; return the window and the relative L2 error of the die's centre."""
+    """Run two-scale and DNS; return the window and the relative L2 error of the die centre."""
     mesh = append(small_assembly(size=1e-3 / 2))
     window = Window(mesh, THICK_COPPER, fraction, loads=[PULSE])
     body, _ = dns_body(mesh, materials=THICK_COPPER)
@@ -75,7 +75,7 @@ def test_two_scale_follows_the_dns_and_improves_with_the_window():
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.5)
 
 
-def test_ledger_of_a_two_scale_run_balances():
+def test_energy_budget_of_a_two_scale_run_balances():
     window, _ = die_history(0.9, 4e-5)
     sums = energy_sums(window.macro, 1.0) + energy_sums(window.meso, -1.0)
     balance = EnergyBalance(limit=0.02, trivial=0.0)

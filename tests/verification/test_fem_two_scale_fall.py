@@ -1,4 +1,4 @@
-"""A board and its package in free fall: both models move alike, and nothing is strained."""
+"""A board and its package in free fall: equal motion of both models without strain."""
 
 from dataclasses import replace
 
@@ -20,10 +20,10 @@ PULSE = half_sine_drop(peak=1.5e4, duration=2e-5)
     ("scheme", "limit"),
     [("held_velocity", 1e-10), ("impulse", 1e-10), ("local_steps", 1e-10), ("gravouil_combescure", 1e-3)],
 )
-def test_a_body_acceleration_moves_both_models_alike(scheme, limit):
-    """With held velocity, a meso model that falls by itself in each substep runs ahead of its interface by 1 %.
+def test_body_acceleration_moves_both_models_equally(scheme, limit):
+    """With held velocity, a meso model accelerated in each substep leads its interface by 1 %.
 
-    The models of Gravouil-Combescure each integrate the load in their own steps: they differ by its second order.
+    With Gravouil-Combescure each model integrates the load with its own step; the difference is of second order.
     """
     mesh = append(small_assembly(size=1e-3))
     loose = replace(mesh, facets={name: facets for name, facets in mesh.facets.items() if name != "mounting_holes"})

@@ -1,4 +1,4 @@
-"""Laws in UFL: the program's own elements against them on the same mesh, energy, relaxation, and a user's example."""
+"""Material laws in UFL against built-in elements on the same mesh: forces, energy and relaxation."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def neo_hookean() -> Law:
 
 
 def first_step() -> Law:
-    """What the program's finite kinematics are in the first step from rest.
+    """Return the UFL law of the first finite-kinematics step from rest.
 
     s = C : 2 (U - 1) (U + 1)^-1 in the turned frame, P = R s U^-1; U, the root of F^T F, by Newton's method.
     """
@@ -86,7 +86,7 @@ def first_step() -> Law:
 
 
 @pytest.mark.parametrize("name", TETRAHEDRA)
-def test_small_strain_equals_own_elements(name):
+def test_small_strain_equals_built_in_elements(name):
     elements = distorted(name, FR4)
     displacement = np.random.default_rng(1).uniform(-1e-6, 1e-6, elements.points.shape)
     law = linear(elasticity_matrix(FR4))
@@ -100,7 +100,7 @@ def test_small_strain_equals_own_elements(name):
 
 @pytest.mark.parametrize("name", ["incompatible_modes", "one_point"])
 def test_hexahedra_agree_where_strain_is_uniform(name):
-    """They have modes that plain trilinear ones have not; these do nothing in a patch test."""
+    """Their incompatible modes do not contribute in a patch test."""
     elements = distorted(name, FR4)
     displacement = elements.points @ np.random.default_rng(1).uniform(-1e-3, 1e-3, (3, 3))
     ours = (stiffness_matrix(elements) @ displacement.ravel()).reshape(-1, 3)
@@ -109,8 +109,8 @@ def test_hexahedra_agree_where_strain_is_uniform(name):
 
 
 @pytest.mark.parametrize("name", TETRAHEDRA)
-def test_finite_strain_equals_own_elements(name):
-    """Strains of some ten percent, all turned by 2 rad about a skew axis."""
+def test_finite_strain_equals_built_in_elements(name):
+    """Strains are about 10 %, with a rotation of 2 rad about a skew axis."""
     elements = distorted(name, RUBBER)
     random = np.random.default_rng(2)
     moved = elements.points + random.uniform(-3e-5, 3e-5, elements.points.shape)
@@ -118,15 +118,15 @@ def test_finite_strain_equals_own_elements(name):
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     turn = np.eye(3) + np.sin(2.0) * cross + (1.0 - np.cos(2.0)) * cross @ cross
     displacement = moved @ turn.T - elements.points
-    own = nonlinear(elements, RUBBER, finite=True)
-    ours = force_of(own, displacement)
+    numpy_term = nonlinear(elements, RUBBER, finite=True)
+    ours = force_of(numpy_term, displacement)
     term = term_of(elements, first_step())
     assert force_of(term, displacement) == pytest.approx(ours, abs=1e-10 * np.abs(ours).max())
-    assert term.energy(displacement).strain == pytest.approx(own.energy(displacement).strain, rel=1e-10)
+    assert term.energy(displacement).strain == pytest.approx(numpy_term.energy(displacement).strain, rel=1e-10)
 
 
 def energy_errors(law: Law, fraction: float) -> tuple[float, float]:
-    """Return the largest imbalance of energy in free vibration over its amount, and the share dissipated."""
+    """Return the relative energy imbalance in free vibration and the fraction dissipated."""
     elements = distorted("tetrahedron", RUBBER)
     body, critical = body_of(elements, law)
     motion = motion_of(body, fraction * critical)
@@ -140,7 +140,7 @@ def energy_errors(law: Law, fraction: float) -> tuple[float, float]:
 
 
 def body_of(elements: Elements, law: Law, part: str = "board") -> tuple[Body, float]:
-    """Return a body of a law, and its smallest critical step [s]."""
+    """Return a body with a material law and its smallest critical step [s]."""
     pieces, tables = dns_pieces(mesh_of(elements.points, elements.cells, "board", {}), {"board": RUBBER})
     pieces = pieces.with_laws(tables.part_names, {part: law})
     step = float(pieces.steps.min())
@@ -148,33 +148,33 @@ def body_of(elements: Elements, law: Law, part: str = "board") -> tuple[Body, fl
 
 
 def test_free_vibration_keeps_its_energy():
-    """Central differences keep it up to second order of the step."""
+    """Central differences conserve it to second order in the step."""
     errors = [energy_errors(neo_hookean(), fraction)[0] for fraction in (0.4, 0.2)]
     assert errors[1] < 2e-3
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.4)
 
 
 @pytest.mark.long
-def test_free_vibration_loses_what_a_viscous_law_takes():
+def test_free_vibration_loses_the_viscous_dissipation():
     balance, taken = energy_errors(own_material.potting(1e-7), 0.2)
     assert balance < 1e-10
     assert 0.0 < taken < 1.0
 
 
 def test_sudden_shear_relaxes_exponentially():
-    """The branch of a sudden small strain decays as exp(-t / tau) from g times the slow stress."""
+    """After a sudden small strain the viscous stress decays as exp(-t / tau) from g times the slow stress."""
     step, rate = 0.05 * own_material.RELAXATION, 1e-6
     elements = distorted("tetrahedron", RUBBER)
     term = term_of(elements, own_material.potting(step))
     displacement = rate * elements.points[:, [1, 0, 2]] * [1.0, 1.0, 0.0]
-    found = [np.abs(force_of(term, displacement)).max() for _ in range(40)]
+    forces = [np.abs(force_of(term, displacement)).max() for _ in range(40)]
     slow = np.abs(force_of(term_of(elements, own_material.potting(step, stiffer=0.0)), displacement)).max()
-    time = (np.arange(40) + 0.5) * step  # the strain grew in the middle of the first step
+    time = (np.arange(40) + 0.5) * step  # the strain is applied in the middle of the first step
     exact = 1.0 + own_material.STIFFER * np.exp(-time / own_material.RELAXATION)
-    assert np.array(found) / slow == pytest.approx(exact, rel=1e-5)
+    assert np.array(forces) / slow == pytest.approx(exact, rel=1e-5)
 
 
-def test_history_continues_to_the_bit():
+def test_history_continues_bitwise():
     elements = distorted("incompatible_modes", RUBBER)
     law, cells = own_material.potting(1e-5), np.arange(100, 108)
     path = np.random.default_rng(4).uniform(-3e-5, 3e-5, (3, *elements.points.shape))

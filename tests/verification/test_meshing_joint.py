@@ -26,7 +26,7 @@ def test_measures_converge_to_the_sphere():
 
 
 def test_correction_of_the_sections_vanishes_at_second_order():
-    """Chords over n layers cut off 2 pi h^2 H / 12 of a sphere's volume, h = H / n."""
+    """Chords over n layers remove 2 pi h^2 H / 12 of the volume of a sphere, h = H / n."""
     surface = close_surface(*truncated_sphere(RADIUS, HALF_GAP, 192, 97)[0])
     section = butterfly(4, 2)
     corrections = [
@@ -48,8 +48,8 @@ def test_volume_and_end_areas_are_exact_at_any_resolution(layers):
     assert area == pytest.approx(np.pi * measure(surface)["contact_radius_board"] ** 2, rel=1e-6)
 
 
-def test_width_of_the_mesh_is_that_of_the_sphere():
-    """An even number of layers has a level at the equator, whose octagon has the area of its circle."""
+def test_width_of_the_mesh_equals_the_sphere():
+    """With an even number of layers the equator is a mesh level whose octagon has the area of the circle."""
     surface = close_surface(*truncated_sphere(RADIUS, HALF_GAP, 96, 49)[0])
     section = butterfly(2, 1)
     middle = solder_levels(surface, section, JointNumerics(layers=6), np.asarray).points[3]

@@ -1,4 +1,4 @@
-"""Columns of split tetrahedra bend, vibrate and take steps as hexahedra have to: compared with swept ones."""
+"""Columns of split tetrahedra against swept hexahedra: bending, vibration and critical step."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ COLUMN = barrel(0.45 * MM, 0.03 * MM)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Deflection of the head under a side load [m], first frequency [Hz], critical step, exact and estimated [s]."""
+    """Deflection under a side load [m], first frequency [Hz], exact and estimated critical step [s]."""
 
     deflection: float
     frequency: float
@@ -34,7 +34,7 @@ class Answer:
 
 
 def answer(solder: Solder) -> Answer:
-    """A column of solder that is clamped at its foot."""
+    """Evaluate a solder column clamped at its foot."""
     elements = elements_of(
         KINDS["incompatible_modes"], solder.points, solder.cells[:, TENSOR_ORDER].astype(np.int32), [SOLDER]
     )
@@ -60,24 +60,24 @@ def swept(core: int, rings: int, layers: int) -> Answer:
 
 @pytest.fixture(scope="module")
 def answers() -> dict[str, Answer]:
-    """By the wanted resolution of a joint, swept and split, and by fine swept hexahedra."""
+    """Return answers at the intended resolution, swept and split, and with fine swept hexahedra."""
     split = free_form_solder(COLUMN, fill_apart(COLUMN, 0.16 * MM, False), np.asarray)
     return {"split": answer(split), "swept": swept(2, 1, 6), "exact": swept(4, 2, 14)}
 
 
-def test_it_bends_and_vibrates_as_fine_swept_hexahedra_do(answers):
+def test_split_column_has_the_stiffness_and_frequency_of_fine_hexahedra(answers):
     split, exact = answers["split"], answers["exact"]
     assert split.deflection == pytest.approx(exact.deflection, rel=0.02)
     assert split.frequency == pytest.approx(exact.frequency, rel=0.01)
 
 
-def test_it_is_no_worse_than_swept_hexahedra_of_its_size(answers):
+def test_split_column_is_as_accurate_as_swept_hexahedra(answers):
     split, swept, exact = (answers[name] for name in ("split", "swept", "exact"))
     assert abs(split.deflection / exact.deflection - 1.0) < abs(swept.deflection / exact.deflection - 1.0)
     assert abs(split.frequency / exact.frequency - 1.0) < abs(swept.frequency / exact.frequency - 1.0)
 
 
-def test_its_critical_step_is_smaller_and_not_overestimated(answers):
+def test_critical_step_is_smaller_and_not_overestimated(answers):
     split, swept = answers["split"], answers["swept"]
     assert 0.05 * swept.step < split.step < swept.step
     assert 0.3 * split.step < split.estimate < split.step

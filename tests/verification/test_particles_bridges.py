@@ -1,4 +1,4 @@
-"""Liquids between two plates that touch become one body: against a cylinder, and on the pads of two joints."""
+"""Merging liquid bridges between two plates: exact cylinder, and two joints on their pads."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def check_energy_falls(energy):
 
 
 def test_two_liquid_bridges_on_uniform_plates_become_one_cylinder():
-    """At 90 deg the shape at rest is a cylinder of both volumes, with pressure gamma / R."""
+    """At 90 degrees the shape at rest is a cylinder of the total volume with the pressure gamma / R."""
     gap, distance, volume = 0.3 * MM, 0.8 * MM, np.pi * 0.36**2 * 0.3 * MM**3
     numerics = SolderNumerics(spacing=0.09 * MM)
     solder = Solder(volume=volume, pad_contact_angle=0.5 * np.pi, numerics=numerics)
@@ -60,12 +60,12 @@ def test_two_overfilled_joints_become_one_body_on_four_pads():
     assert abs(shape.metrics["volume_drift"][0]) < 1e-3
     assert shape.metrics["volume"][0] == pytest.approx(2.0 * solder.volume, rel=1e-3)
     assert len(shape.rings) == 2
-    for ring in shape.rings:  # the line goes around the far side of both pads, pinned or beyond
+    for ring in shape.rings:  # the contact line encloses both pads
         x, y = shape.points[ring, :2].T
         assert x.max() > 0.73 * MM and x.min() < -0.73 * MM
         assert np.abs(x).max() < 0.85 * MM and np.abs(y).max() > 0.4 * MM
     x, y, z = shape.surface_points.T
     assert (x.max(), y.max()) == pytest.approx((-x.min(), -y.min()), rel=0.01)
     assert z.min() == 0.0 and z.max() == pytest.approx(geometry.gap)
-    # A bridge is lower than two joints: its free surface and mask have less energy at the end than theirs together.
+    # The final surface and wetting energy of the bridge is lower than the sum of both joints.
     assert shape.history["energy"][-1] < 2.0 * alone.history["energy"][-1]

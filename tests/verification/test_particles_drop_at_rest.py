@@ -1,4 +1,4 @@
-"""Drops of their own against exact shapes: the free drop's pressure, walls with hysteresis."""
+"""Single drops against exact shapes: pressure of a free drop, walls with hysteresis."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def at_rest(fluid, **drop):
 
 
 def test_laplace_pressure_of_a_cube_that_becomes_a_sphere():
-    """Tilford et al.: 3.08 kPa. Mean <= 0.5 %, scatter <= 1 %, capillary number <= 1e-4; second order in space."""
+    """Tilford et al.: 3.08 kPa. Limits: mean 0.5 %, scatter 1 %, capillary number 1e-4; second order in space."""
     counts, errors = np.array([6, 8, 11]), []
     for count in counts:
         metrics = at_rest(WATER, volume=EDGE**3, particles_per_edge=count).metrics
@@ -34,7 +34,7 @@ def test_laplace_pressure_of_a_cube_that_becomes_a_sphere():
     ("receding", "advancing"), [pytest.param(30.0, 60.0, marks=pytest.mark.long), (60.0, 120.0), (110.0, 130.0)]
 )
 def test_a_wall_with_hysteresis(receding, advancing):
-    """A cube that spreads becomes the cap of the advancing angle; else its line stands between both angles."""
+    """A spreading cube becomes the cap of the advancing angle; otherwise its angle lies between both limits."""
     angles = {"receding_angle": np.radians(receding), "advancing_angle": np.radians(advancing)}
     solder = Fluid(numerics={"time_step_limit": 100.0}, gravity=0.0)
     metrics = at_rest(solder, volume=1e-9, particles_per_edge=7, **angles).metrics

@@ -1,4 +1,4 @@
-"""Drops that merge come to rest in the exact shape of their common volume."""
+"""Merging drops: the exact shape of the total volume at rest."""
 
 from dataclasses import replace
 from math import inf
@@ -43,13 +43,13 @@ def centre(body):
 
 
 def touching_balls(radii, solder):
-    spacing, flows, place = solder.numerics.spacing, [], 0.0
+    spacing, flows, left_end = solder.numerics.spacing, [], 0.0
     for radius in radii:
         volume = 4.0 / 3.0 * np.pi * radius**3
         level = ball(grid_around_ball((0, 0, 0), radius, spacing), (0, 0, 0), radius)
         flow = start_flow(cloud_from_level_set(level, volume, ()), solder, FREE, ())
-        flow.body.points[:, 0] += place + radius
-        place += 2.0 * radius + 0.5 * spacing
+        flow.body.points[:, 0] += left_end + radius
+        left_end += 2.0 * radius + 0.5 * spacing
         flows.append(flow)
     return flows
 

@@ -1,4 +1,4 @@
-"""Flows by delta-SPH against exact solutions and measurements: channel, vortices, a tank at rest, a dam break."""
+"""Flows by delta-SPH against exact solutions and measurements: channel, vortices, tank at rest, dam break."""
 
 from math import log2, sqrt
 
@@ -23,7 +23,7 @@ def value(result, name):
     return result.metrics[name][0]
 
 
-def test_a_channel_starts_as_the_exact_one():
+def test_channel_starts_as_the_exact_solution():
     errors = []
     for across in (10, 20):
         scene = Poiseuille(width=1e-3, speed=0.01, duration=0.2, numerics=SphNumerics(particles_across=across))
@@ -33,16 +33,16 @@ def test_a_channel_starts_as_the_exact_one():
 
 
 def carreau_profile(height, scene):
-    """Steady speeds [m/s]: stress is linear across the channel; a root for the rate at each height, then a sum."""
-    law, place = scene.rheology, np.linspace(0.0, 0.5 * scene.width, 1001)
-    stress = scene.density * scene.force * place
+    """Return steady speeds [m/s]: linear stress across the channel, shear rate by root finding, then integration."""
+    law, offset = scene.rheology, np.linspace(0.0, 0.5 * scene.width, 1001)
+    stress = scene.density * scene.force * offset
     rates = [brentq(lambda rate, s=s: law.viscosity(rate, scene.viscosity) * rate - s, 0.0, 1e4) for s in stress]
-    below = cumulative_trapezoid(rates, place, initial=0.0)
-    return np.interp(np.abs(height - 0.5 * scene.width), place, below[-1] - below)
+    below = cumulative_trapezoid(rates, offset, initial=0.0)
+    return np.interp(np.abs(height - 0.5 * scene.width), offset, below[-1] - below)
 
 
 def power_law_profile(height, scene):
-    """Steady speeds [m/s] of a power law without bounds (Bird, Armstrong, Hassager 1987)."""
+    """Return steady speeds [m/s] of an unbounded power law (Bird, Armstrong, Hassager 1987)."""
     offset = np.abs(2.0 * height / scene.width - 1.0)
     return scene.speed * (1.0 - offset ** (1.0 + 1.0 / scene.rheology.exponent))
 
@@ -57,7 +57,7 @@ def steady_speeds(height, scene):
 
 
 def error_of_steady_flow(rheology, profile, across, duration):
-    """RMS error of speeds, over the largest, after a duration [w^2 / nu] from the exact ones."""
+    """Return the RMS speed error over the largest speed after a duration [w^2 / nu] from the exact profile."""
     numerics = SphNumerics(particles_across=across)
     scene = Poiseuille(width=1e-3, speed=0.01, duration=duration, rheology=Rheology(**rheology), numerics=numerics)
     simulation = channel(scene)
@@ -76,7 +76,7 @@ def test_a_power_law_without_its_bounds_has_the_exact_profile(rheology):
     assert steady_speeds(height, scene) == pytest.approx(power_law_profile(height, scene), abs=1e-4 * scene.speed)
 
 
-def test_the_profile_of_a_carreau_liquid_is_that_of_a_root_at_each_height():
+def test_carreau_liquid_has_the_exact_profile():
     scene = Poiseuille(width=1e-3, speed=0.01, rheology=Rheology(**CARREAU))
     height = np.linspace(0.0, scene.width, 41)
     assert steady_speeds(height, scene) == pytest.approx(carreau_profile(height, scene), abs=1e-4 * scene.speed)
@@ -114,7 +114,7 @@ def test_vortices_die_out_at_the_exact_rate():
 
 
 def tank(diffusion, viscosity, across=16):
-    """What is wrong with the pressures of a tank at rest, over rho g H; the kinetic energy, over that of its weight."""
+    """Return pressure errors of a tank at rest over rho g H, and kinetic over potential energy."""
     numerics = SphNumerics(particles_across=across, density_diffusion=diffusion, artificial_viscosity=viscosity)
     scene = DamBreak(height=1.0, width=1.0, tank_length=1.0, sensor_height=0.2, duration=1.0, numerics=numerics)
     simulation = dam(scene)
@@ -135,19 +135,19 @@ def test_a_tank_rests_under_its_weight():
     assert motion.max() < 1e-3
 
 
-def test_diffusion_of_density_takes_the_noise_of_pressure():
+def test_density_diffusion_removes_pressure_noise():
     smooth, rough = (tank(diffusion, 0.0)[0].std() for diffusion in (0.1, 0.0))
     assert smooth < rough / 5.0
 
 
 def dam_break(across, duration):
     numerics = SphNumerics(particles_across=across)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
-    return solve_dam_break(DamBreak(**given, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
+    return solve_dam_break(DamBreak(**parameters, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
 
 
 def test_a_dam_break_strikes_the_wall_as_measured():
-    """Coarse: the front is thinner than the smoothing length, and seen late."""
+    """At coarse resolution the front is thinner than the smoothing length and is detected late."""
     result = dam_break(20, 5.1)
     assert value(result, "impact_onset") == pytest.approx(2.5, abs=0.15)
     assert value(result, "plateau_mean") == pytest.approx(0.5, abs=0.1)
@@ -163,11 +163,11 @@ def test_a_finer_dam_break_strikes_when_and_as_hard_as_measured():
     assert value(result, "particles_lost") == 0
 
 
-def test_the_front_of_a_column_is_where_an_independent_code_has_it():
-    """Free slip, a column twice as high as wide: interFoam's front; Martin & Moyce measured it 11 to 19 % behind."""
+def test_front_of_a_column_matches_an_independent_code():
+    """The reference is interFoam's front with free slip and H = 2 W; Martin & Moyce measured it 11 to 19 % behind."""
     numerics = SphNumerics(particles_across=40)
-    given = {"height": 2.0, "width": 1.0, "tank_length": 4.0, "sensor_height": 0.4, "duration": 0.47}
-    scene = DamBreak(**given, numerics=numerics)
+    parameters = {"height": 2.0, "width": 1.0, "tank_length": 4.0, "sensor_height": 0.4, "duration": 0.47}
+    scene = DamBreak(**parameters, numerics=numerics)
     history = solve_dam_break(scene).history
     time = history["time"] * sqrt(2.0 * scene.gravity / scene.width)
     front = np.interp(FRONT[0], time, history["front"] + 0.5 * scene.spacing) / scene.width
@@ -176,14 +176,14 @@ def test_the_front_of_a_column_is_where_an_independent_code_has_it():
 
 @pytest.mark.parametrize("term", ["viscosity", "artificial"])
 def test_a_term_that_is_off_is_not_computed(term):
-    """What stands in for it is no number: were it computed, no rate would be one."""
+    """The unused parameter is NaN: a rate that used it would be NaN."""
     numerics = SphNumerics(particles_across=10)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 1.0}
-    simulation = dam(DamBreak(**given, numerics=numerics))
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 1.0}
+    simulation = dam(DamBreak(**parameters, numerics=numerics))
     laws = [simulation.law._replace(**{term: value}) for value in (0.0, float("nan"))]
     rates = [Simulation(simulation.fields, simulation.fluids, law).rates for law in laws]
     assert np.isfinite(rates[0]).all()
-    assert np.array_equal(rates[0], rates[1])  # "> 0" does not hold of nan: no branch is taken
+    assert np.array_equal(rates[0], rates[1])  # "nan > 0" is false, so the branch is not taken
     acting = Simulation(simulation.fields, simulation.fluids, laws[0]._replace(**{term: 1e3}))
     acting.fields.u[: simulation.fluids] = np.sin(40.0 * simulation.fields.z[: simulation.fluids])
     with_term, without = (
@@ -192,19 +192,19 @@ def test_a_term_that_is_off_is_not_computed(term):
     assert not np.array_equal(with_term, without)
 
 
-def test_viscosity_that_is_left_out_changes_nothing():
+def test_neglected_viscosity_changes_nothing():
     numerics = SphNumerics(particles_across=10, artificial_viscosity=0.02)
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.4}
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.4}
     fronts = []
     for switch in ("off", "on"):
-        scene = DamBreak(**given, numerics=numerics, effects={"viscosity": switch})
+        scene = DamBreak(**parameters, numerics=numerics, effects={"viscosity": switch})
         fronts.append(solve_dam_break(scene).history["front"][-1])
-    told = decide_flow(scene.model_copy(update={"effects": scene.effects.model_copy(update={"viscosity": "auto"})}))
-    assert not told["flow_viscosity"]["on"]
-    assert fronts[1] == pytest.approx(fronts[0], rel=told["flow_viscosity"]["influence"])
+    decision = decide_flow(scene.model_copy(update={"effects": scene.effects.model_copy(update={"viscosity": "auto"})}))
+    assert not decision["flow_viscosity"]["on"]
+    assert fronts[1] == pytest.approx(fronts[0], rel=decision["flow_viscosity"]["influence"])
 
 
-def test_little_artificial_viscosity_does_little():
+def test_small_artificial_viscosity_changes_little():
     rates = []
     for alpha in (0.0, 1e-3):
         numerics = SphNumerics(particles_across=16, artificial_viscosity=alpha)

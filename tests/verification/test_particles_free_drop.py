@@ -12,14 +12,14 @@ RADIUS, DENSITY, GAMMA = 0.62e-3, 8930.0, 0.4985
 
 
 def drop(ohnesorge, shells):
-    """A ball of solder whose viscosity gives an Ohnesorge number mu / sqrt(rho gamma R)."""
+    """Return a ball of solder with a given Ohnesorge number mu / sqrt(rho gamma R)."""
     viscosity = ohnesorge * np.sqrt(DENSITY * GAMMA * RADIUS)
     numerics = SolderNumerics(spacing=RADIUS / shells)
     return Solder(volume=4 / 3 * np.pi * RADIUS**3, viscosity=viscosity, numerics=numerics)
 
 
 def test_viscous_oscillation_has_its_limits():
-    """Lamb's rate at small viscosity, approached with its square root (the vortical layer below the surface)."""
+    """The decay approaches Lamb's rate with the square root of viscosity (vortical layer below the surface)."""
     omega = rayleigh_frequency(2, 1.0, 1.0, 1.0)
     assert omega == pytest.approx(np.sqrt(8.0))
     misses = []
@@ -31,14 +31,14 @@ def test_viscous_oscillation_has_its_limits():
 
 
 def exact(ohnesorge):
-    """Decay rate [1/s] and period [s] of the second mode at small amplitude."""
+    """Return decay rate [1/s] and period [s] of the second mode at small amplitude."""
     diffusion_rate = ohnesorge * np.sqrt(GAMMA / (DENSITY * RADIUS**3))
     decay, frequency = viscous_oscillation(2, rayleigh_frequency(2, RADIUS, DENSITY, GAMMA), diffusion_rate)
     return decay, 2.0 * np.pi / frequency
 
 
 def check_conservation(result):
-    """Volume, momentum (in units of mass times the greatest speed) and energy, which only falls."""
+    """Check volume, momentum (over mass times maximum speed) and the monotonic decrease of energy."""
     history = result.history
     mass = DENSITY * history["volume"][0]
     assert result.metrics["volume_drift"][0] < 1e-6
@@ -47,9 +47,9 @@ def check_conservation(result):
 
 
 def second_mode_errors(shells, decay_rate):
-    """Errors of the period at small amplitude, Ohnesorge number 0.02, with so many shells: less and less, as they must.
+    """Return period errors at small amplitude and Ohnesorge number 0.02, and check that they decrease with the shells.
 
-    What the time step adds to the period, (omega dt)^2 / 3, is subtracted. The decay rate is judged with the last.
+    The effect of the time step on the period, (omega dt)^2 / 3, is subtracted. The last run checks the decay rate.
     """
     decay, period = exact(0.02)
     from_time_step = (2.0 * np.pi / 80) ** 2 / 3.0
@@ -64,19 +64,19 @@ def second_mode_errors(shells, decay_rate):
 
 
 def test_second_mode_converges_in_space():
-    """Second order. Reid's period within 0.5 %: in the next test, and with half a drop on a wall."""
+    """The order is two; the next test and the half drop on a wall check Reid's period within 0.5 %."""
     second_mode_errors(np.array([2, 3]), 0.05)
 
 
 @pytest.mark.long
 def test_second_mode_of_four_shells():
-    """Second order, Reid's period within 0.5 %, decay within 5 %."""
+    """The order is two, with Reid's period within 0.5 % and decay within 5 %."""
     assert second_mode_errors(np.array([2, 3, 4]), 0.05)[-1] < 5e-3
 
 
 @pytest.mark.long
 def test_second_mode_converges_in_time():
-    """Second order, from differences of the period between steps of ratio 2."""
+    """The order is two, from differences of the period for steps of ratio 2."""
     steps = (25, 50, 100)
     runs = [solve_free_drop(drop(0.02, 2), amplitude=0.02, periods=1.5, steps_per_period=count) for count in steps]
     coarse, middle, fine = (run.metrics["period"][0] for run in runs)
@@ -85,7 +85,7 @@ def test_second_mode_converges_in_time():
 
 @pytest.mark.long
 def test_laplace_pressure_converges():
-    """The polyhedron at rest has the pressure 2 A / (3 V): second order."""
+    """The polyhedron at rest has the pressure 2 A / (3 V), of second order."""
     shells = np.array([2, 3, 4, 5])
     runs = [solve_free_drop(drop(0.02, count), periods=0.1, steps_per_period=10) for count in shells]
     errors = [run.metrics["mean_pressure_error"][0] for run in runs]
@@ -94,9 +94,9 @@ def test_laplace_pressure_converges():
 
 @pytest.mark.long
 def test_second_mode_of_solder_at_a_tenth_of_the_radius():
-    """The acceptance case: period within 1 % and decay within 10 % of Reid's, 1.9 % below Lamb's decay.
+    """Period within 1 % and decay within 10 % of Reid's values; his decay is 1.9 % below Lamb's.
 
-    At this amplitude the true period is some 0.4 % longer (Tsamopoulos & Brown 1983).
+    At this amplitude the exact period is about 0.4 % longer (Tsamopoulos & Brown 1983).
     """
     result = solve_free_drop(drop(1.37e-3, 4), amplitude=0.1, periods=2.0)
     assert result.history["amplitude"].max() == pytest.approx(0.1, rel=0.1)
@@ -107,8 +107,8 @@ def test_second_mode_of_solder_at_a_tenth_of_the_radius():
 
 @pytest.mark.long
 @pytest.mark.parametrize(("shells", "excess"), [(3, 0.25), (4, 0.2), (5, 0.15), (7, 0.12)])
-def test_the_scheme_ispg_swings_with_its_period_and_decay(shells, excess):
-    """Of the excess, 0.21, 0.18, 0.10 and 0.08, half is the smoothing's, half that of the time integration."""
+def test_ispg_has_the_period_and_decay_of_a_free_drop(shells, excess):
+    """Smoothing and time integration each cause half of the excess decay (0.21, 0.18, 0.10 and 0.08)."""
     scene = Oscillation(volume=1e-9, particles_per_radius=shells, scheme="ispg")
     metrics = solve_oscillation(scene, scene.resolve(Liquid())).metrics
     assert abs(metrics["period_error"][0]) < 0.01
@@ -130,7 +130,7 @@ def test_laplace_drop():
 
 
 def test_a_drop_stretched_to_more_than_half_its_radius():
-    """Energy falls, momentum and volume are kept where tetrahedra wear out and are made anew; the period is longer."""
+    """Energy decreases and momentum and volume are conserved through remeshing of tetrahedra; the period is longer."""
     result = solve_free_drop(drop(1.37e-3, 3), amplitude=0.5, periods=1.0)
     history = result.history
     assert history["amplitude"].max() > 0.6

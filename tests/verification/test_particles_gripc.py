@@ -1,6 +1,6 @@
-"""The paper's ISPG scheme (Hu et al., 2.2-2.6) against exact fields, and what it makes of a drop.
+"""The published ISPG scheme (Hu et al., sections 2.2-2.6) against exact fields and for drops.
 
-It is there to be compared with: what it cannot do is asserted as well as what it can.
+The scheme serves as a reference: the tests assert its deficiencies as well as its abilities.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ PAPER = {"surface_tension": 4.985, "viscosity": 0.227, "process_time": 0.1}
 
 
 def shaken_cube(count):
-    """Unit cube on a wall with irregular particles inside, and the particles of its free surface."""
+    """Return a unit cube on a wall with irregular inner particles, and the particles of its free surface."""
     cloud = box_cloud(1.0, count)
     shake = np.random.default_rng(13).uniform(-0.1, 0.1, cloud.points.shape) * cloud.spacing
     inside = (np.arange(len(shake)) >= cloud.surface_count) & (cloud.wall < 0)
@@ -33,7 +33,7 @@ def shaken_cube(count):
 
 
 def poisson_error(basis, count):
-    """Relative L2 error of u = sin(2x) cos(y) cos(z), whose slope vanishes on the wall z = 0."""
+    """Return the relative L2 error of u = sin(2x) cos(y) cos(z), whose normal derivative vanishes on the wall z = 0."""
     cloud, points = shaken_cube(count)
     operators = collocate(points, cloud.plates, cloud.spacing, basis)
     x, y, z = points.T
@@ -57,14 +57,14 @@ def test_the_pressure_equation_converges_with_the_quadratic_basis():
 
 @pytest.mark.long
 def test_the_pressure_equation_does_not_converge_as_printed():
-    """Linear basis, eqs 21 and 22: the error stays at some percent (PHYSICS 1)."""
+    """With the linear basis, eqs 21 and 22, the error stays at some per cent (PHYSICS 1)."""
     order, errors = poisson_order("linear")
     assert abs(order) < 0.5
     assert min(errors) > 0.015
 
 
 def vortex_decay(steps):
-    """Amplitude of a Taylor-Green vortex between slip walls after a time 0.05 with kinematic viscosity one."""
+    """Return the amplitude of a Taylor-Green vortex between slip walls at time 0.05 with unit viscosity."""
     axis, spacing = np.linspace(0.0, 1.0, 13), 1.0 / 12
     points = np.stack(np.meshgrid(axis, axis[:4], axis, indexing="ij"), axis=-1).reshape(-1, 3)
     frames = [np.roll(np.eye(3), shift, axis=0) for shift in range(3)]
@@ -80,16 +80,16 @@ def vortex_decay(steps):
 
 
 def test_viscosity_lets_a_vortex_decay_at_its_rate():
-    """Exact: exp(-2 nu pi^2 t); implicit Euler is of first order, stable at 40 times the explicit limit."""
+    """The exact decay is exp(-2 nu pi^2 t); implicit Euler has order one and is stable at 40 explicit limits."""
     exact = np.exp(-2.0 * np.pi**2 * 0.05)
-    found = np.array([vortex_decay(steps) for steps in (1, 4, 16)])
-    assert found == pytest.approx([(1.0 + 2.0 * np.pi**2 * 0.05 / steps) ** -steps for steps in (1, 4, 16)], rel=0.02)
-    assert np.polyfit(np.log([1.0, 0.25, 0.0625]), np.log(np.abs(found - exact)), 1)[0] > 0.7
+    decays = np.array([vortex_decay(steps) for steps in (1, 4, 16)])
+    assert decays == pytest.approx([(1.0 + 2.0 * np.pi**2 * 0.05 / steps) ** -steps for steps in (1, 4, 16)], rel=0.02)
+    assert np.polyfit(np.log([1.0, 0.25, 0.0625]), np.log(np.abs(decays - exact)), 1)[0] > 0.7
 
 
 @pytest.fixture(scope="module")
 def rest():
-    """A drop of 60 degrees at rest by the energy scheme, 7 particles per edge, values of the paper."""
+    """Return a drop of 60 degrees at rest by the energy scheme, with 7 particles per edge and published values."""
     numerics = SolderNumerics(time_step_limit=100.0, tolerance=1e-7)
     solder = Solder(
         volume=1e-9, pad_contact_angle=np.pi / 3, effects=SolderEffects(gravity="off"), numerics=numerics, **PAPER
@@ -98,7 +98,7 @@ def rest():
 
 
 def continued(rest, basis):
-    """The drop at rest, continued with the paper's scheme, inertia and viscosity."""
+    """Continue the drop at rest with the published scheme, inertia and viscosity."""
     solder, flow = rest
     on = {"gravity": False, "inertia": True, "viscosity": True, "surface_tension": True, "wall_adhesion": True}
     physics = build_physics(solder, on, flow.physics.lines)
@@ -111,7 +111,7 @@ def continued(rest, basis):
 
 
 def test_the_surface_of_a_cap_has_its_capillary_pressure(rest):
-    """Contact line included: there the balance of forces holds the contact angle."""
+    """This includes the contact line, where the force balance determines the contact angle."""
     solder, flow = rest
     exact = sessile_meridian(1e-9, solder.pad_contact_angle, solder.surface_tension).pressure
     assert force_pressure(flow.body, flow.physics) == pytest.approx(exact, rel=0.01)
@@ -127,7 +127,7 @@ def test_a_drop_at_rest_stays_at_rest_with_the_quadratic_basis(rest):
 
 
 def test_a_drop_at_rest_breaks_up_with_the_linear_basis_as_printed(rest):
-    """It does not hold what the same scheme with a Laplacian that converges holds."""
+    """With a convergent Laplacian the same scheme keeps the drop at rest."""
     flow = continued(rest, "linear")
     first = flow.step().speed
     speed = first
@@ -138,7 +138,7 @@ def test_a_drop_at_rest_breaks_up_with_the_linear_basis_as_printed(rest):
 
 
 def test_a_cube_flows_with_the_energy_decreasing():
-    """Over the first 0.2 ms of 120 degrees; its height is off by percents where the energy scheme's is by 0.05 %."""
+    """The test covers 0.2 ms at 120 degrees; heights have errors of per cents, 0.05 % with the energy scheme."""
     solder = Solder(
         volume=1e-9,
         pad_contact_angle=2.0 * np.pi / 3.0,

@@ -1,4 +1,4 @@
-"""A drop at 90 deg that slides freely on its wall is half a free drop: it swings with Rayleigh's period."""
+"""A drop of 90 degrees on a free-slip wall oscillates as half a free drop, with Rayleigh's period."""
 
 import numpy as np
 import pytest
@@ -21,9 +21,9 @@ EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "vi
 
 @pytest.mark.long
 def test_second_mode_of_half_a_drop():
-    """Surface smoothed and tetrahedra made anew in each step: Reid's period within 0.5 %, his decay 5 %.
+    """With mesh smoothing and remeshing in each step, Reid's period is met within 0.5 % and his decay within 5 %.
 
-    What the time step adds to the period, (omega dt)^2 / 3, is subtracted.
+    The effect of the time step on the period, (omega dt)^2 / 3, is subtracted.
     """
     viscosity = OHNESORGE * np.sqrt(DENSITY * GAMMA * RADIUS)
     off = SolderEffects(inertia="off", viscosity="off", gravity="off")
@@ -44,8 +44,8 @@ def test_second_mode_of_half_a_drop():
         moments.append((SECOND_MOMENT * body.points * (mass @ body.points)).sum() / mass.sum() / RADIUS**2)
         times.append(flow.time)
         energies.append(physics.energy(body) + flow.solver.kinetic_energy(body))
-    found = fit_oscillation(np.array(times), np.array(moments), omega)
+    fit = fit_oscillation(np.array(times), np.array(moments), omega)
     from_time_step = (2.0 * np.pi / STEPS_PER_PERIOD) ** 2 / 3.0
-    assert frequency / found[1] - 1.0 - from_time_step == pytest.approx(0.0, abs=0.005)
-    assert found[0] == pytest.approx(decay, rel=0.05)
+    assert frequency / fit[1] - 1.0 - from_time_step == pytest.approx(0.0, abs=0.005)
+    assert fit[0] == pytest.approx(decay, rel=0.05)
     assert np.diff(energies).max() < 1e-5 * energies[0]

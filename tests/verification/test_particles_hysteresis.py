@@ -1,4 +1,4 @@
-"""Contact angle hysteresis: a drop that is filled and emptied on one wall, against spherical caps; with inertia."""
+"""Contact angle hysteresis of a drop that is filled and emptied, quasi-static and with inertia, against caps."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
 from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
-from reflowshock.particles.surface.contact_line import PINNED, HystereticLine, RubbingLine
+from reflowshock.particles.surface.contact_line import PINNED, FrictionLine, HystereticLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)
@@ -35,7 +35,7 @@ def flow():
 
 
 def to_volume(flow, solder, volume):
-    """Fill or empty slowly, wait for rest; return radius of the wetted area, height and contact angle of a cap."""
+    """Change the volume slowly to rest; return wetted radius, height and contact angle of a cap."""
     steps = round(80.0 * abs(volume - flow.volume) / VOLUME)
     for target in np.linspace(flow.volume, volume, steps + 1)[1:]:
         flow.volume = target
@@ -50,26 +50,26 @@ def to_volume(flow, solder, volume):
 def test_a_drop_that_is_filled_and_emptied(flow):
     liquid, solder = flow
     radius, _, angle = to_volume(liquid, solder, 1.4 * VOLUME)
-    assert angle == pytest.approx(np.degrees(ADVANCING), abs=1.5)  # it has advanced
+    assert angle == pytest.approx(np.degrees(ADVANCING), abs=1.5)  # advanced
     assert radius == pytest.approx(base_radius(1.4 * VOLUME, ADVANCING), rel=2e-2)
     stood, height, angle = to_volume(liquid, solder, 0.9 * VOLUME)
-    assert stood == pytest.approx(radius, rel=1e-2)  # it stands, where an advancing line would go back by 14 %
+    assert stood == pytest.approx(radius, rel=1e-2)  # pinned; a line without hysteresis would recede by 14 %
     assert np.degrees(RECEDING) < angle < np.degrees(ADVANCING)
     assert np.pi * height * (3.0 * stood**2 + height**2) / 6.0 == pytest.approx(0.9 * VOLUME, rel=1e-2)
     radius, _, angle = to_volume(liquid, solder, 0.3 * VOLUME)
-    assert angle == pytest.approx(np.degrees(RECEDING), abs=1.0)  # it has receded
+    assert angle == pytest.approx(np.degrees(RECEDING), abs=1.0)  # receded
     assert radius == pytest.approx(base_radius(0.3 * VOLUME, RECEDING), rel=1e-2)
 
 
 COUNT = 6
 
 
-def moving(viscosity, **kept):
-    """Solder of the paper's tension with inertia, by the scheme ispg."""
+def moving(viscosity, **changes):
+    """Return solder with the published surface tension and inertia, by the scheme ispg."""
     numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (COUNT - 1), time_step_limit=100.0)
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
     fluid = {"surface_tension": 4.985, "viscosity": viscosity, "process_time": 0.1}
-    return Solder(volume=VOLUME, effects=effects, numerics=numerics, **fluid, **kept)
+    return Solder(volume=VOLUME, effects=effects, numerics=numerics, **fluid, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +78,11 @@ def half_sphere():
     return flow_to_rest(drop, moving(0.227, pad_contact_angle=0.5 * np.pi))[0].body
 
 
-def let_go(half_sphere, receding, advancing, viscosity):
-    """The half sphere at rest on a wall with hysteresis: flow, contact angle and radius of a cap, part of it lost."""
+def release(half_sphere, receding, advancing, viscosity):
+    """Release the half sphere on a wall with hysteresis; return flow, contact angle and radius of the cap."""
     points, solder = half_sphere.points.copy(), moving(viscosity)
     cloud = replace(half_sphere.cloud, points=points, triangles=half_sphere.triangles)
-    line = RubbingLine(0, np.radians(receding), np.radians(advancing), points[cloud.rings[0]])
+    line = FrictionLine(0, np.radians(receding), np.radians(advancing), points[cloud.rings[0]])
     flow = start_flow(cloud, solder, EFFECTS | {"viscosity": True, "inertia": True}, (line,))
     flow.body.pressure = half_sphere.pressure.copy()
     before = ring_area(points, cloud.rings[0])
@@ -93,7 +93,7 @@ def let_go(half_sphere, receding, advancing, viscosity):
     rubbed = friction * abs(area - before) / flow.solver.first_energy
     assert flow.body.volume()[0] == pytest.approx(VOLUME, rel=1e-12)
     assert abs(losses["energy_imbalance"]) < 1e-3
-    assert losses["line_loss"] == pytest.approx(rubbed, rel=0.06, abs=1e-6)  # what friction of that way takes
+    assert losses["line_loss"] == pytest.approx(rubbed, rel=0.06, abs=1e-6)  # friction loss over that distance
     return line, 2.0 * np.degrees(np.arctan(np.ptp(flow.body.points[:, 2]) / radius)), radius
 
 
@@ -101,19 +101,19 @@ def let_go(half_sphere, receding, advancing, viscosity):
 @pytest.mark.parametrize(
     ("receding", "advancing", "angle"), [(60.0, 120.0, 90.0), (100.0, 130.0, 100.0), (50.0, 80.0, 80.0)]
 )
-def test_a_line_creeps_to_the_angle_that_it_has_passed(half_sphere, receding, advancing, angle):
-    """A half sphere stays, or recedes or spreads in a liquid so thick that it does not swing."""
-    _, found, radius = let_go(half_sphere, receding, advancing, 9.0)
-    assert found == pytest.approx(angle, abs=0.7)
+def test_contact_line_creeps_to_the_limiting_angle(half_sphere, receding, advancing, angle):
+    """A half sphere stays, recedes or spreads in a liquid whose viscosity suppresses oscillations."""
+    _, final_angle, radius = release(half_sphere, receding, advancing, 9.0)
+    assert final_angle == pytest.approx(angle, abs=0.7)
     assert radius == pytest.approx(base_radius(VOLUME, np.radians(angle)), rel=6e-3)
 
 
 @pytest.mark.long
-def test_a_line_that_swings_stands_between_its_angles(half_sphere):
-    """Inertia takes the half sphere beyond the cap of 100 degrees, from where no force that is left takes it back."""
-    line, found, _ = let_go(half_sphere, 100.0, 130.0, 0.227)
+def test_oscillating_contact_line_stops_between_its_angles(half_sphere):
+    """Inertia carries the half sphere beyond the cap of 100 degrees, where hysteresis keeps it."""
+    line, angle, _ = release(half_sphere, 100.0, 130.0, 0.227)
     assert (line.state == PINNED).all()
-    assert found == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 an edge, 105.2 at 7 with steps a quarter as long
+    assert angle == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 per edge, 105.2 at 7 with a quarter of the step
 
 
 def test_a_cube_comes_to_rest_between_both_angles():

@@ -1,4 +1,4 @@
-"""The scheme ispg: example 4.1 of Hu et al. with inertia, to rest, and the ledger of its energy."""
+"""The scheme ispg: examples of Hu et al. with inertia to rest, and the energy budget."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ LONG = [
 
 
 def cube(count, degrees, bond=0.0, symmetry="none", **wall):
-    """A drop and its solder; gravity by the Bond number."""
+    """Return a drop and its solder, with gravity by the Bond number."""
     angle = float(np.radians(degrees))
     numerics = SolderNumerics(scheme="ispg", spacing=1e-3 / (count - 1), time_step_limit=100.0)
     effects = SolderEffects(gravity="on" if bond else "off", inertia="on", viscosity="on")
@@ -47,7 +47,7 @@ def cube(count, degrees, bond=0.0, symmetry="none", **wall):
 
 
 def at_rest(*asked, **wall):
-    """Metrics of a drop at rest, and its history."""
+    """Return the metrics of a drop at rest and its history."""
     drop = drop_to_rest(*cube(*asked, **wall))
     metrics = {name: value for name, (value, _) in drop.shape.metrics.items()}
     assert metrics["at_rest"] == 1.0
@@ -65,8 +65,8 @@ def test_a_cube_without_a_wall_comes_to_rest_as_a_sphere():
 
 
 @pytest.mark.parametrize(("count", "degrees"), [(5, 60.0), *LONG])
-def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
-    """Values of the paper; its errors at 11 an edge: height 0.87, 2.84 %, width 3.26, 1.17 % at 60 and 120 degrees."""
+def test_cube_oscillates_and_comes_to_rest_as_a_cap(count, degrees):
+    """Published errors at 11 per edge: height 0.87 and 2.84 %, width 3.26 and 1.17 % at 60 and 120 degrees."""
     metrics, history = at_rest(count, degrees)
     assert 0.005 < metrics["time_at_rest"] < 0.1
     assert metrics["particles_lost"] == 0
@@ -74,13 +74,13 @@ def test_a_cube_swings_and_comes_to_rest_as_a_cap(count, degrees):
     assert abs(metrics["max_width_error"]) < 0.01
     assert abs(metrics["volume_drift"]) < 1e-12
     assert abs(metrics["energy_imbalance"]) < 0.002
-    assert min(metrics["viscous_loss"], metrics["smoothing_loss"]) > 0.005  # 0.009 at 5 an edge, 120 degrees
-    # Of the cube's 1 mm; the caps of 120 and 148 degrees are 0.98 and 1.16 mm high: their swing alone is left.
+    assert min(metrics["viscous_loss"], metrics["smoothing_loss"]) > 0.005  # 0.009 at 5 per edge, 120 degrees
+    # Fraction of 1 mm; the caps of 120 and 148 degrees are 0.98 and 1.16 mm high: only the oscillation remains.
     assert np.ptp(history["height"]) > (0.15e-3 if degrees > 100.0 else 0.5e-3)
 
 
 def test_masses_stay_positive_in_a_film_thinner_than_the_particles():
-    """A cube on a wall of 15 degrees spreads to twice the width at which it rests, a tenth of a spacing thick."""
+    """A cube on a wall of 15 degrees spreads to twice its final width, a tenth of a spacing thick."""
     scene, solder = cube(5, 15.0)
     flow, _ = flow_to_rest(scene, solder.model_copy(update={"process_time": 2.5e-3}))
     radius = np.hypot(*flow.body.points[:, :2].T)
@@ -89,10 +89,10 @@ def test_masses_stay_positive_in_a_film_thinner_than_the_particles():
     assert flow.solver.mass.diagonal().min() > 0.0
 
 
-def liquid(**kept):
-    """Solder with the paper's values and inertia, without gravity."""
+def liquid(**changes):
+    """Return solder with published values and inertia, without gravity."""
     effects = SolderEffects(gravity="off", inertia="on", viscosity="on")
-    return Solder(effects=effects, process_time=0.1, **PAPER, **kept)
+    return Solder(effects=effects, process_time=0.1, **PAPER, **changes)
 
 
 BALLS = [
@@ -102,8 +102,8 @@ BALLS = [
 
 
 @pytest.mark.parametrize(("volume", "count"), [(0.0141, 6), *BALLS])
-def test_a_ball_swings_and_comes_to_rest_on_its_pad(volume, count):
-    """Example 4.2: caps pinned at the pad's edge, the largest on the mask; the bar is 2 % in height and width."""
+def test_ball_oscillates_and_comes_to_rest_on_its_pad(volume, count):
+    """Example 4.2: caps pinned at the pad edge, the largest on the mask; limits of 2 % in height and width."""
     drop = Drop(volume=volume * 1e-9, contact_angle=np.radians(5.0), pad_radius=2e-4, particles_per_edge=count)
     numerics = SolderNumerics(scheme="ispg", spacing=drop.resolution, time_step_limit=100.0)
     shape = drop_to_rest(drop, liquid(volume=drop.volume, numerics=numerics, **drop.contact_angles)).shape
@@ -119,7 +119,7 @@ def test_a_ball_swings_and_comes_to_rest_on_its_pad(volume, count):
 
 
 def joint_at_rest(geometry, **wall):
-    """Metrics of a joint at rest between pads of 0.24 mm radius, which a cylinder of 0.4 mm fills."""
+    """Return the metrics of a joint at rest between pads of 0.24 mm radius, with the volume of a 0.4 mm cylinder."""
     numerics, radius = SolderNumerics(scheme="ispg", spacing=6e-5, time_step_limit=100.0), 0.24e-3
     shape = solve_joint(geometry, liquid(volume=np.pi * radius**2 * 0.4e-3, numerics=numerics, **wall))
     metrics = {name: value for name, (value, _) in shape.metrics.items()}
@@ -131,8 +131,8 @@ def joint_at_rest(geometry, **wall):
 
 
 @pytest.mark.parametrize("gap", [0.35e-3, pytest.param(0.45e-3, marks=pytest.mark.long)])
-def test_a_joint_swings_and_comes_to_rest(gap):
-    """A barrel, part of a sphere but for its force, and a neck, against Young-Laplace."""
+def test_joint_oscillates_and_comes_to_rest(gap):
+    """A barrel, close to a sphere, and a neck are compared with Young-Laplace shapes."""
     metrics, verdict = joint_at_rest(JointGeometry(gap, 0.24e-3, 0.24e-3))
     assert verdict == "ok"
     assert max(abs(metrics["width_error"]), abs(metrics["waist_error"])) < 0.002
@@ -141,15 +141,15 @@ def test_a_joint_swings_and_comes_to_rest(gap):
 
 @pytest.mark.long
 def test_a_squeezed_joint_comes_to_rest_on_the_mask():
-    """Edges that held vertices left it turning about its axis, 3.7e-3 spacings in 20 capillary limits, for ever.
+    """Pad edges that caught vertices made it rotate about its axis, 3.7e-3 spacings in 20 capillary limits.
 
-    Later it slid on: an edge caught one vertex for four steps, and nothing on smooth masks ends a uniform motion.
+    A later version kept sliding: an edge caught one vertex, and smooth masks do not resist uniform motion.
     """
     metrics, verdict = joint_at_rest(JointGeometry(0.22e-3, 0.24e-3, 0.24e-3))
     assert verdict == "overflow"
     assert abs(metrics["width_error"]) < 0.005
     assert abs(metrics["axial_force_error"]) < 0.03
-    assert metrics["slide_speed"] < 2e-3  # 0.8 mm/s; above 3 mm/s it would not be found at rest
+    assert metrics["slide_speed"] < 2e-3  # 0.8 mm/s; rest requires less than 3 mm/s
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_squeezed_joint_comes_to_rest_on_the_mask():
     ],
 )
 def test_a_joint_rests_where_the_default_does(geometry, wall):
-    """That moves to the least energy of the triangles; with friction on walls they need not have it."""
+    """The default scheme minimises the triangulation energy; with wall friction the minimum need not be reached."""
     metrics, _ = joint_at_rest(geometry, wall=wall)
     numerics, still = SolderNumerics(spacing=6e-5), SolderEffects(gravity="off", inertia="off", viscosity="off")
     shape = solve_joint(geometry, Solder(volume=metrics["volume"], numerics=numerics, effects=still, **PAPER))
@@ -172,7 +172,7 @@ def test_a_joint_rests_where_the_default_does(geometry, wall):
 
 @pytest.mark.long
 def test_errors_of_the_shape_are_of_second_order():
-    """From 7 to 11 an edge: the width, and the distance of the whole surface from the exact one; heights scatter."""
+    """From 7 to 11 per edge this holds for the width and the distance from the exact surface; heights scatter."""
     coarse, fine = (at_rest(count, 60.0)[0] for count in (7, 11))
     for error in ("max_width_error", "shape_error"):
         assert np.log(abs(coarse[error] / fine[error])) / np.log(10.0 / 6.0) > 1.5
@@ -181,9 +181,9 @@ def test_errors_of_the_shape_are_of_second_order():
 @pytest.mark.long
 @pytest.mark.parametrize(("count", "degrees", "bond"), [(5, 60.0, 5.0), (7, 60.0, 5.0), (7, 120.0, 1.0)])
 def test_a_heavy_drop_rests_in_its_exact_shape(count, degrees, bond):
-    """Bashforth and Adams; the potential energy of the weight is in the ledger.
+    """The shape is Bashforth-Adams; the energy budget includes the potential energy of gravity.
 
-    5 an edge at Bond number 5 flattens to a film of one spacing on its way.
+    With 5 per edge at Bond number 5 the drop is temporarily a film of one spacing.
     """
     metrics, _ = at_rest(count, degrees, bond)
     assert abs(metrics["height_error"]) < 0.01
@@ -201,7 +201,7 @@ FINER = [(count, angle, wall) for count in (7, 11) for angle in (60.0, 120.0) fo
     [FRICTION[1], *(pytest.param(*row, marks=pytest.mark.long) for row in FINER if row != FRICTION[1])],
 )
 def test_walls_with_friction_do_not_change_the_rest(count, degrees, wall):
-    """Such drops crawled along their wall for ever, driven by the evening out of triangles."""
+    """Such drops crept along their wall, driven by mesh smoothing."""
     metrics, _ = at_rest(count, degrees, **wall)
     assert abs(metrics["height_error"]) < 0.005
     assert abs(metrics["max_width_error"]) < 0.005
@@ -228,9 +228,9 @@ def test_a_part_of_a_drop_rests_as_the_whole(count, symmetry):
 
 @pytest.mark.long
 def test_a_drop_that_strikes_a_wall_spreads_and_comes_to_rest():
-    """Weber number 50, Reynolds number 230, no slip, 90 degrees; the width of Pasandideh-Fard et al. (1996).
+    """At Weber number 50 and Reynolds number 230, without slip, the width follows Pasandideh-Fard et al. (1996).
 
-    With 9 an edge it is 2 % below that.
+    With 9 per edge it is 2 % lower.
     """
     weber, (scene, solder) = 50.0, cube(7, 90.0, wall="no-slip")
     speed = float(np.sqrt(weber * solder.surface_tension / (solder.density * scene.diameter)))
@@ -247,10 +247,10 @@ def test_a_drop_that_strikes_a_wall_spreads_and_comes_to_rest():
     assert abs(metrics["energy_imbalance"]) < 0.001
 
 
-def test_a_free_drop_swings_with_its_period():
-    """Radius, density and surface tension one, 309 particles, Reid's period and decay, the step taken by default.
+def test_free_drop_oscillates_with_the_exact_period():
+    """A unit drop of 309 particles at the default step is compared with Reid's period and decay.
 
-    The decay is too fast: the ledger has what smoothing, evening out and time integration take besides viscosity.
+    The decay is too fast: the energy budget contains losses by smoothing and time integration as well as viscosity.
     """
     viscosity, volume = 2e-3, 4.0 / 3.0 * np.pi
     tension, friction = SurfaceTension(1.0), Viscosity(viscosity)
@@ -270,8 +270,8 @@ def test_a_free_drop_swings_with_its_period():
         times.append(flow.time)
         amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(flow.body)[2])) / volume)
     exact_decay, exact = viscous_oscillation(2, omega, viscosity)
-    decay, found = fit_oscillation(np.array(times), np.array(amplitudes), exact)
-    assert abs(exact / found - 1.0) < 0.015
+    decay, frequency = fit_oscillation(np.array(times), np.array(amplitudes), exact)
+    assert abs(exact / frequency - 1.0) < 0.015
     assert 1.0 < decay / exact_decay < 1.5
     state, first = flow.solver.state, flow.solver.first_energy
     start = 0.5 * (0.05 * omega) ** 2 * 6.0 / 5.0 * volume
@@ -282,8 +282,8 @@ def test_a_free_drop_swings_with_its_period():
 
 
 @pytest.mark.parametrize("shells", [5, pytest.param(8, marks=pytest.mark.long)])
-def test_a_swing_of_real_solder_decays_as_it_should_at_the_default_step(shells):
-    """561 and 2057 particles, 0.1 R; with tension in a prediction and BDF2 16 steps of a period let 2057 swing on."""
+def test_oscillation_of_real_solder_decays_at_the_default_step(shells):
+    """Cases: 561 and 2057 particles, 0.1 R; with predicted tension and BDF2, 16 steps per period left 2057 undamped."""
     volume = 1e-9
     numerics = SolderNumerics(scheme="ispg", spacing=np.cbrt(0.75 * volume / np.pi) / shells)
     drop = solve_free_drop(Solder(volume=volume, numerics=numerics), 0.1, steps_per_period=STEPS_PER_PERIOD)
@@ -293,10 +293,10 @@ def test_a_swing_of_real_solder_decays_as_it_should_at_the_default_step(shells):
 
 
 @pytest.mark.long
-def test_a_cap_of_90_degrees_swings_as_half_a_free_drop():
-    """Of twice its volume: a wall without friction is a plane of symmetry. Ohnesorge number of real solder.
+def test_cap_of_90_degrees_oscillates_as_half_a_free_drop():
+    """A free-slip wall is a plane of symmetry; the Ohnesorge number is the value of real solder.
 
-    The decay is 1.36 times the exact one with 343 particles.
+    The decay with 343 particles is 1.36 times the exact decay.
     """
     drop, solder = cube(7, 90.0)
     body, physics = (settled := flow_to_rest(drop, solder)[0]).body, settled.physics
@@ -313,6 +313,6 @@ def test_a_cap_of_90_degrees_swings_as_half_a_free_drop():
         flow.step(size)
         amplitudes.append(float(SECOND_MOMENT @ np.diag(body_moments(body)[2])) / volume / radius**2)
     exact_decay, exact = viscous_oscillation(2, omega, viscosity / (solder.density * radius**2))
-    decay, found = fit_oscillation(size * np.arange(1, len(amplitudes) + 1), np.array(amplitudes), exact)
-    assert abs(exact / found - 1.0) < 0.01
+    decay, frequency = fit_oscillation(size * np.arange(1, len(amplitudes) + 1), np.array(amplitudes), exact)
+    assert abs(exact / frequency - 1.0) < 0.01
     assert 1.0 < decay / exact_decay < 1.5

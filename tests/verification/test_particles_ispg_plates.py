@@ -1,4 +1,4 @@
-"""Joints of the scheme ispg between plates that move: pulled, pushed aside, tilted, torn off; packages that float."""
+"""Joints of the scheme ispg between moving plates: pull, shift, tilt, rupture and floating packages."""
 
 from dataclasses import replace
 
@@ -24,9 +24,9 @@ START = JointGeometry(0.35e-3, RADIUS, RADIUS)
 
 
 def solder(scheme="ispg", wall="free-slip", spacing=SPACING):
-    """The paper's values without gravity; with ispg inertia acts.
+    """Return solder with published values without gravity; ispg includes inertia.
 
-    Without slip vertices slide along the surface slowly: with the default tolerance the width is 2e-4 off at rest.
+    Without slip, vertices slide slowly along the surface: at the default tolerance the width has an error of 2e-4.
     """
     moves = "on" if scheme == "ispg" else "off"
     return Solder(
@@ -52,18 +52,18 @@ def place(standoff, offset=0.0, degrees=0.0):
     return JointGeometry(standoff, RADIUS, RADIUS, (offset, 0.0), (0.0, np.radians(degrees)))
 
 
-def test_slow_plates_do_the_work_of_the_surface():
-    """0.35 to 0.365 mm at a hundredth of the speed of waves: work is energy, and the force on the plate its slope."""
+def test_work_of_slow_plates_equals_the_surface_energy():
+    """From 0.35 to 0.365 mm at 1 % of the wave speed the work equals the energy change, and the force its slope."""
     flow, rule = start_joint(START, solder())
     run_to_rest(flow, rule)
     end, plates = place(0.365e-3), flow.body.plates
-    before, given = flow.physics.energy(flow.body), flow.solver.state.losses.plates
+    before, plate_work = flow.physics.energy(flow.body), flow.solver.state.losses.plates
     flow.physics = replace(flow.physics, motions=(Travel(1, joint_plates(end)[1], 0.02, RADIUS),))
     while is_driven(flow.body, flow.physics, flow.time_step.size):
         flow.step()
         heights = flow.body.points[:, 2] * 1e3
         assert heights.min() > -1e-9 and heights.max() < flow.body.plates[1].origin[2] * 1e3 + 1e-9
-    work = given - flow.solver.state.losses.plates
+    work = plate_work - flow.solver.state.losses.plates
     assert flow.body.plates[1].origin - plates[1].origin == pytest.approx([0.0, 0.0, 0.015e-3], abs=1e-12)
     assert work == pytest.approx(flow.physics.energy(flow.body) - before, rel=0.02)
     exact = [named(solve_joint(place(gap), solder("energy")))["axial_force"] for gap in (0.35e-3, 0.3575e-3, 0.365e-3)]
@@ -84,9 +84,9 @@ def test_slow_plates_do_the_work_of_the_surface():
     ],
 )
 def test_a_moved_joint_rests_where_the_default_does(end, wall):
-    """Pulled, pressed, pushed aside, tilted, at 100 mm/s; the default is moved there from rest to rest.
+    """The joint is pulled, pressed, shifted and tilted at 100 mm/s; the default scheme moves quasi-statically.
 
-    Its triangles are those that came from there: with new ones the force of a barrel differs by 1 % of pi a gamma.
+    The triangulation is continued: with a new one the force of a barrel differs by 1 % of pi a gamma.
     """
     *_, shape = follow_path(START, solder(wall=wall), [end], speed=0.1)
     *_, slow = follow_path(START, solder("energy"), [end])
@@ -107,19 +107,19 @@ def joint(spacing=SPACING, **table):
 @pytest.mark.long
 @pytest.mark.parametrize("speed", [0.1, 1.0])
 def test_a_joint_is_pulled_until_it_breaks(speed):
-    """Both parts rest as caps on their pads, the upper one where the package goes; fast it breaks later."""
+    """Both parts come to rest as caps on their pads; a faster pull delays the rupture."""
     scene = joint(6e-5, path=PackagePath(standoff=1.2e-3, speed=speed))
-    found = joint_to_rest(scene, solder(spacing=6e-5))
-    metrics = named(found.shape)
-    assert found.shape.verdict == "open"
+    state = joint_to_rest(scene, solder(spacing=6e-5))
+    metrics = named(state.shape)
+    assert state.shape.verdict == "open"
     assert metrics["at_rest"] == 1.0
     assert metrics["particles_lost"] == 0
     assert metrics["standoff_at_break"] == pytest.approx(0.35e-3 + speed * metrics["time_at_break"], rel=1e-6)
     assert 0.8e-3 < metrics["standoff_at_break"] < 1.1e-3
-    assert found.shape.points[:, 2].max() == pytest.approx(1.2e-3)
-    history = found.shape.history
-    known = np.isfinite(history["pull_exact"]) & (history["standoff"] > 0.4e-3)
-    difference = (history["pull"] - history["pull_exact"])[known] / PULL
+    assert state.shape.points[:, 2].max() == pytest.approx(1.2e-3)
+    history = state.shape.history
+    has_exact = np.isfinite(history["pull_exact"]) & (history["standoff"] > 0.4e-3)
+    difference = (history["pull"] - history["pull_exact"])[has_exact] / PULL
     assert np.sqrt(np.mean(difference**2)) < (0.05 if speed == 0.1 else 0.5)
     parts = [metrics[f"volume_{name}"] for name in ("board", "package")]
     assert sum(parts) == pytest.approx(VOLUME, rel=1e-6)
@@ -138,7 +138,7 @@ def test_a_joint_is_pulled_until_it_breaks(speed):
     ],
 )
 def test_a_package_floats_where_the_default_does(free, start):
-    """Under a load of 1 mN: its twist is an unknown, it has no mass of its own."""
+    """The load is 1 mN; the massless package has its six rigid-body modes as unknowns."""
     package = FloatingPackage(load=1e-3, free=free)
     shapes = [joint_to_rest(joint(package=package, **start), solder(scheme)).shape for scheme in ("ispg", "energy")]
     metrics, still = (named(shape) for shape in shapes)

@@ -1,4 +1,4 @@
-"""The scheme ispg where liquids meet and part: the neck of two drops, one sphere, a cap, a joint that breaks."""
+"""Topology changes of the scheme ispg: neck of two drops, merged sphere and cap, rupture of a joint."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ BALL = 4.0 / 3.0 * np.pi * RADIUS**3
 
 
 def fluid(parameters):
-    """Liquid with inertia in the scheme ispg."""
+    """Return a liquid with inertia for the scheme ispg."""
     return Fluid(parameters=parameters, effects=FlowEffects(inertia="on"), numerics=FlowNumerics(scheme="ispg"))
 
 
@@ -28,22 +28,22 @@ def named(shape):
 
 
 def neck_radius(body):
-    """The smallest of the cross-sections between the drops, as a disc."""
+    """Return the radius of a disc with the smallest cross-section between the drops."""
     points = np.ascontiguousarray(body.points[:, [1, 2, 0]])
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
     return np.sqrt(section_areas(points, body.triangles, heights).min() / np.pi)
 
 
 def test_the_neck_of_two_drops_grows_with_the_root_of_time():
-    """Real solder, balls of 6 spacings' radius: r = C (gamma R / rho)^(1/4) (t + t0)^(1/2), t0 of the first neck.
+    """Solder balls with R of 6 spacings follow r = C (gamma R / rho)^(1/4) (t + t0)^(1/2), t0 from the first neck.
 
-    Measured: C of 1.0 to 1.3 (Wu et al. 2004, Aarts et al. 2005); 1.04 here, 1.11 with 8 spacings.
+    Measurements: C of 1.0 to 1.3 (Wu et al. 2004, Aarts et al. 2005); result: 1.04, 1.11 with 8 spacings.
     """
     scene = Drops(volume_left=BALL, volume_right=BALL, distance=2.000002 * RADIUS, spacing=RADIUS / 6.0)
     solder = fluid("physical").resolve(scene, "off")
     acting = switched(decide_drop(solder, True))
     old = [start_flow(cloud, solder, acting, ()) for cloud in start_clouds(scene)]
-    flow = start_flow(rebuild(*(one.body for one in old)).cloud, solder, acting, ())
+    flow = start_flow(rebuild(*(drop.body for drop in old)).cloud, solder, acting, ())
     hand_over(old, [flow])
     unit, rows = np.sqrt(solder.density * RADIUS**3 / solder.surface_tension), []
     while not rows or rows[-1][1] < 0.8:
@@ -54,8 +54,8 @@ def test_the_neck_of_two_drops_grows_with_the_root_of_time():
     assert np.sqrt(slope) == pytest.approx(1.1, abs=0.1)
     assert np.sqrt(slope * time + offset) == pytest.approx(neck, rel=5e-3)
     state = flow.solver.state
-    kept = flow.physics.energy(flow.body) + state.kinetic + state.losses.total
-    assert kept == pytest.approx(flow.solver.first_energy, rel=2e-3)
+    balance = flow.physics.energy(flow.body) + state.kinetic + state.losses.total
+    assert balance == pytest.approx(flow.solver.first_energy, rel=2e-3)
     assert flow.body.volume()[0] == pytest.approx(2.0 * BALL, rel=1e-3)  # polyhedra of the balls' volume
     assert np.abs(state.momenta[:3]).max() < 1e-6 * np.sqrt(2.0 * state.kinetic * solder.density * 2.0 * BALL)
 
@@ -63,7 +63,7 @@ def test_the_neck_of_two_drops_grows_with_the_root_of_time():
 @pytest.mark.long
 @pytest.mark.parametrize("wall", [{}, {"contact_angle": np.radians(60.0)}])
 def test_drops_that_merge_come_to_rest_as_one(wall):
-    """0.5 and 0.25 mm^3, values of the paper; on a wall from cubes. Bars: 1 %, 0.1 %, 2 %."""
+    """Volumes are 0.5 and 0.25 mm^3 with published values, on a wall from cubes. Limits: 1 %, 0.1 %, 2 %."""
     distance = 1.3e-3 if wall else 0.9e-3
     scene = Drops(volume_left=0.5e-9, volume_right=0.25e-9, distance=distance, spacing=1.5e-4, **wall)
     shape = pair_to_rest(scene, fluid("paper").resolve(scene, "off")).shape
@@ -80,7 +80,7 @@ def test_drops_that_merge_come_to_rest_as_one(wall):
 
 @pytest.mark.long
 def test_a_joint_that_is_too_high_breaks_and_rests_as_two_drops():
-    """No neck of this volume spans the gap: it breaks by itself between plates that hold still."""
+    """The gap is too high for a stable neck, which breaks between fixed plates."""
     radius, volume = 0.24e-3, 0.07238229e-9
     solder = fluid("paper").resolve(Drop(volume=volume, spacing=5e-5), "off")
     solder = solder.model_copy(update={"pad_contact_angle": np.radians(5.0), "mask_contact_angle": np.radians(148.0)})
@@ -100,7 +100,7 @@ def test_a_joint_that_is_too_high_breaks_and_rests_as_two_drops():
 
 @pytest.mark.long
 def test_a_cube_that_becomes_a_film_comes_to_rest():
-    """5 an edge at 30 degrees, which had ended in a stencil with too few neighbours."""
+    """The case of 5 per edge at 30 degrees formerly failed with too few neighbours in a stencil."""
     drop = Drop(volume=1e-9, contact_angle=np.radians(30.0), particles_per_edge=5)
     metrics = named(drop_to_rest(drop, fluid("paper").resolve(drop, "off")).shape)
     assert metrics["at_rest"] == 1.0

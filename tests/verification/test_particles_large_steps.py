@@ -1,4 +1,4 @@
-"""Joints of a heated reflow take steps of 100 capillary limits: where solder overflows these change nothing at rest."""
+"""Steps of 100 capillary limits in a thermal reflow do not change the overflowing joint at rest."""
 
 import numpy as np
 import pytest
@@ -18,23 +18,23 @@ PLACES = [
 
 
 def carried(limit, folder):
-    """The joint in its last place, what it does to its pads there, and the steps that it took."""
+    """Return the joint in its last position, its wrenches on the pads, the number of steps and the solder."""
     solder = Solder(volume=7.24e-11, numerics=SolderNumerics(spacing=8e-5, time_step_limit=limit))
     files = [Checkpoint(folder / f"{limit:g}-{number}", (number, solder)) for number in range(len(PLACES))]
-    found = [
-        carry_joint(place, solder, before, now)
-        for place, before, now in zip(PLACES, [None, *files], files, strict=False)
+    joints = [
+        carry_joint(joint_place, solder, before, now)
+        for joint_place, before, now in zip(PLACES, [None, *files], files, strict=False)
     ]
     shape = carried_shape(PLACES[-1], solder, files[0], files[-1])
-    return shape, found[-1].wrenches, sum(one.steps for one in found), solder
+    return shape, joints[-1].wrenches, sum(joint.steps for joint in joints), solder
 
 
 def test_an_overflowing_joint_comes_to_rest_in_the_same_shape_in_fewer_steps(tmp_path):
     (small, light, many, solder), (large, heavy, few, _) = (carried(limit, tmp_path) for limit in (20.0, LARGE_STEPS))
     assert (small.verdict, large.verdict) == ("overflow", "overflow")
     assert few < many
-    expected, found = (measure(close_rings(one.surface_points, one.triangles, one.rings)) for one in (small, large))
-    assert found == pytest.approx(expected, rel=1e-4)
+    expected, metrics = (measure(close_rings(s.surface_points, s.triangles, s.rings)) for s in (small, large))
+    assert metrics == pytest.approx(expected, rel=1e-4)
     pull = np.pi * PAD * solder.surface_tension
-    assert np.abs(heavy - light)[:, :3].max() < 2e-4 * pull  # a fifth of the coupling's tolerance
+    assert np.abs(heavy - light)[:, :3].max() < 2e-4 * pull  # a fifth of the coupling tolerance
     assert np.abs(heavy - light)[:, 3:].max() < 2e-4 * pull * PAD

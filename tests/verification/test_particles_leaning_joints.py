@@ -1,4 +1,4 @@
-"""Joints with an offset and a tilted pad against Surface Evolver; how far the coaxial joint is a reference for them."""
+"""Joints with offset and tilted pads against Surface Evolver, and against the coaxial reference."""
 
 import json
 from pathlib import Path
@@ -19,13 +19,13 @@ SOLDER = Solder(volume=VOLUME, effects={"gravity": "off"}, numerics=SolderNumeri
 
 
 def leaning(gap, offset, degrees):
-    """Lengths in mm; the package rises towards its offset."""
+    """Return a joint with an offset [mm]; the package rises towards its offset."""
     return JointGeometry(gap * MM, RADIUS, RADIUS, (offset * MM, 0.0), (0.0, -np.radians(degrees)))
 
 
 @pytest.mark.parametrize("evolver", REFERENCE["joints"], ids=["corner of H 4.3", "0.3 radii, 5 deg", "the same, lower"])
 def test_area_pressure_and_width(evolver):
-    """Width <= 0.1 % where 1 % is wanted; the lowest joint bulges so far that its line leaves the edge on one side."""
+    """Widths agree within 0.1 % (required: 1 %); the line of the lowest joint partly leaves the pad edge."""
     shape = solve_joint(leaning(evolver["gap"], evolver["offset"], evolver["tilt"]), SOLDER)
     assert shape.metrics["max_width"][0] == pytest.approx(evolver["max_width"] * MM, rel=1e-3)
     assert shape.history["energy"][-1] / GAMMA == pytest.approx(evolver["area"] * MM**2, rel=2e-3)
@@ -35,7 +35,7 @@ def test_area_pressure_and_width(evolver):
 
 @pytest.mark.parametrize("evolver", REFERENCE["joints"])
 def test_the_change_by_leaning_is_bounded(evolver):
-    """Surface Evolver's widths against Young-Laplace of the same gap: within the bound, in all joints."""
+    """Widths by Surface Evolver are within the bound of the Young-Laplace width for the same gap."""
     coaxial = joint_meridian(VOLUME, RADIUS, RADIUS, evolver["gap"] * MM, GAMMA)
     bound = width_change_bound(leaning(evolver["gap"], evolver["offset"], evolver["tilt"]))
     assert abs(evolver["max_width"] * MM / coaxial.max_width - 1.0) <= bound

@@ -1,4 +1,4 @@
-"""Joints between plates in any place: forces against Young-Laplace, against the energy, against a cut sphere."""
+"""Joints between plates in general positions: forces against Young-Laplace, energy and a truncated sphere."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def weightless(volume, spacing):
 
 
 def at_rest(geometry, volume=BALL, spacing=7e-5):
-    """Body, energy, and force and moment on the package."""
+    """Return body, energy, and force and moment on the package at rest."""
     flow, rule = start_joint(geometry, weightless(volume, spacing))
     run = run_to_rest(flow, rule)
     others = [force for force in flow.physics.forces if not isinstance(force, Wetting)]
@@ -36,7 +36,7 @@ def at_rest(geometry, volume=BALL, spacing=7e-5):
     "gap", [0.30e-3, *(pytest.param(gap, marks=pytest.mark.long) for gap in (0.35e-3, 0.40e-3)), 0.50e-3]
 )
 def test_axial_force_between_bulge_and_hourglass(gap):
-    """V = pi 0.24^2 0.4 mm^3: width and waist <= 0.5 %, axial force <= 2 % of pi a gamma."""
+    """Limits for V = pi 0.24^2 0.4 mm^3: width and waist 0.5 %, axial force 2 % of pi a gamma."""
     volume = np.pi * 0.24**2 * 0.4e-9
     shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), weightless(volume, 4e-5))
     exact = joint_meridian(volume, RADIUS, RADIUS, gap, GAMMA)
@@ -55,7 +55,7 @@ def place(which, value):
 
 @pytest.mark.parametrize(("which", "component"), [("gap", 2), ("offset", 1), ("tilt", 4)])
 def test_force_on_the_plate_is_the_slope_of_the_energy(which, component):
-    """By central differences of the energies at rest; gap and offset in radii, so that all are energies."""
+    """The slope uses central differences of energies at rest; gap and offset are in radii, so all are energies."""
     step = 0.05 if which == "offset" else 0.01
     (_, above, _), (_, below, _) = (at_rest(place(which, value)) for value in (step, -step))
     wrench = at_rest(place(which, 0.0))[2] * np.repeat((RADIUS, 1.0), 3)
@@ -66,9 +66,9 @@ def test_force_on_the_plate_is_the_slope_of_the_energy(which, component):
 
 @pytest.mark.parametrize("degrees", [3.0, pytest.param(20.0, marks=pytest.mark.long)])
 def test_a_pad_may_sit_anywhere_on_the_sphere(degrees):
-    """Two discs cut from a sphere, the upper one tilted about the sphere's centre: the sphere is at rest.
+    """Two discs cut a sphere, the upper one tilted about its centre: the sphere is in equilibrium.
 
-    Radius, pressure 2 gamma / R and a plate without force and moment are exact; second order in the spacing.
+    Radius, pressure 2 gamma / R and zero force and moment are exact; second order in the spacing.
     """
     tilt, half = np.radians(degrees), 0.5 * GAP
     volume = np.pi * GAP * (6 * RADIUS**2 + GAP**2) / 6
@@ -95,7 +95,7 @@ def test_energy_of_a_small_tilt_is_half_stiffness_times_its_square():
 
 @pytest.mark.parametrize("load", [0.0, pytest.param(-1e-4, marks=pytest.mark.long), 2e-4])
 def test_collapse_height_under_a_load(load):
-    """A plate that floats comes to rest where the Young-Laplace force carries the load."""
+    """A floating plate comes to rest where the Young-Laplace force balances the load."""
     plate = Floating(1, LIFT, np.array([0.0, 0.0, load]))
     shape = settle_joint(JointGeometry(GAP, RADIUS, RADIUS), weightless(BALL, 5e-5), (plate,))
 
@@ -108,7 +108,7 @@ def test_collapse_height_under_a_load(load):
 
 
 def test_an_offset_plate_centres_itself():
-    """Offset by 0.3 radius, free to lift and to shift: less than 1 % of the radius is left."""
+    """From 0.3 radius of offset, free to lift and shift, less than 1 % of the radius remains."""
     plate = Floating(1, np.vstack((LIFT, SHIFT)), np.array([0.0, 0.0, 1e-4]))
     geometry = JointGeometry(GAP, RADIUS, RADIUS, offset=(0.3 * RADIUS, 0.0))
     shape = settle_joint(geometry, weightless(BALL, 7e-5), (plate,))

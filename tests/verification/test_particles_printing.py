@@ -1,4 +1,4 @@
-"""Printed ink on cured ink: a drop on a flat cured slab becomes the spherical cap that it becomes on a plate."""
+"""Printed ink on cured ink: a drop on a flat cured slab becomes the same spherical cap as on a plate."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ LAYERS = 5
 
 
 def on_slab(degrees):
-    """A drop of 23 um, 8 particles across, that lands at 3 m/s on a slab of cured particles; its top [m]."""
+    """Return a 23 um drop, 8 particles across, after landing at 3 m/s on a cured slab, and the slab top [m]."""
     scene = Printing(
         drop_volume=6.37e-15, surface_tension=0.072, viscosity=0.0149, speed=3.0, delay=1.0, pitch=23e-6, columns=1,
         rows=1, layers=3, contact_angle=np.radians(degrees), numerics=PrintingNumerics(particles_per_diameter=8),
@@ -34,17 +34,17 @@ def on_slab(degrees):
 
 
 def open_box(half, top):
-    """Surface of a box without its bottom, outward oriented."""
+    """Return the surface of a box without its bottom, oriented outwards."""
     box = pyvista.Box((-half, half, -half, half, 0.0, top)).triangulate().clean()
     points, triangles = np.array(box.points, dtype=float), box.faces.reshape(-1, 4)[:, 1:].astype(np.int32)
     return points, triangles[points[triangles, 2].max(axis=1) > 0.5 * top]
 
 
 def errors_on_slab(degrees, units):
-    """Height, and mean radius of the profile over that of the base, against the cap after sqrt(rho D^3 / gamma) units.
+    """Return errors of height and profile radius over base radius against the cap; time in sqrt(rho D^3 / gamma).
 
-    At 8 particles a diameter the base itself, continued from 1.5 spacings on, is 9 % too narrow on the plate, too,
-    where the profile is the exact one within 2 %.
+    At 8 particles per diameter the base, extrapolated from 1.5 spacings, is 9 % too narrow on the plate as well,
+    where the profile is accurate within 2 %.
     """
     scene, deposit, top = on_slab(degrees)
     unit = np.sqrt(scene.density * scene.length**3 / scene.surface_tension)
@@ -62,7 +62,7 @@ def errors_on_slab(degrees, units):
 
 def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
     height, profile = errors_on_slab(90.0, 1.5)
-    assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; without shares of walls 0.18 and 0.2
+    assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; 0.18 and 0.2 without wall fractions
 
 
 def test_liquid_that_spreads_on_cured_ink_stays_within_its_surface():
@@ -70,7 +70,7 @@ def test_liquid_that_spreads_on_cured_ink_stays_within_its_surface():
     while deposit.time < 0.5 * np.sqrt(scene.density * scene.length**3 / scene.surface_tension):
         deposit.step(1.0)
     deposit.update()
-    inside = depths(deposit.points[deposit.liquid], (deposit.surface.points, deposit.surface.triangles))
+    inside = depths(deposit.points[deposit.liquid], deposit.surface.points, deposit.surface.triangles)
     assert inside.min() > -0.2 * deposit.law.spacing  # before the surface had an image in cured ink: -0.7
 
 

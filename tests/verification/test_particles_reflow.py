@@ -15,15 +15,15 @@ BALL, RADIUS, GAMMA = 0.0724e-9, 0.24e-3, 0.4985
 WEIGHT = 8930.0 * 9.81
 
 
-def error(found, expected):
-    return found / expected - 1.0
+def error(actual, expected):
+    return actual / expected - 1.0
 
 
 @pytest.mark.parametrize(
     "gap", [0.28e-3, *(pytest.param(gap, marks=pytest.mark.long) for gap in (0.31e-3, 0.34e-3)), 0.42e-3]
 )
 def test_default_joints(gap):
-    """Bulges and hourglasses at the default resolution: width within 0.5 %, volume within 0.1 %."""
+    """At the default resolution bulges and hourglasses have widths within 0.5 % and volumes within 0.1 %."""
     shape = solve_joint(JointGeometry(gap, RADIUS, RADIUS), Solder(volume=BALL))
     value = {name: number for name, (number, _) in shape.metrics.items()}
     exact = joint_meridian(BALL, RADIUS, RADIUS, gap, GAMMA, WEIGHT)
@@ -42,7 +42,7 @@ def test_default_joints(gap):
 
 
 def test_width_converges_with_the_spacing():
-    """The surface is piecewise flat: second order; asserted over a factor of 2.5 in spacing."""
+    """The piecewise flat surface is of second order, asserted over a factor of 2.5 in spacing."""
     exact = joint_meridian(BALL, RADIUS, RADIUS, 0.31e-3, GAMMA, WEIGHT)
     spacings, errors = np.array([1e-4, 7e-5, 5e-5, 4e-5]), []
     for spacing in spacings:
@@ -55,7 +55,7 @@ def test_width_converges_with_the_spacing():
 
 @pytest.mark.parametrize("degrees", [*(pytest.param(angle, marks=pytest.mark.long) for angle in (60, 90)), 120])
 def test_a_cube_becomes_a_spherical_cap(degrees):
-    """Hu et al. 4.1 (their errors: 0.9-3.3 %) with 343 particles; free contact line, quasi-static."""
+    """Hu et al. 4.1 (published errors: 0.9-3.3 %) with 343 particles, free contact line, quasi-static."""
     numerics = SolderNumerics(time_step_limit=100)
     angle = np.radians(degrees)
     solder = Solder(volume=1e-9, pad_contact_angle=angle, effects=SolderEffects(gravity="off"), numerics=numerics)
@@ -86,9 +86,9 @@ def test_a_heavy_drop_sags():
     ],
 )
 def test_five_volumes_on_a_pad(volume, height, width, degrees):
-    """Hu et al. 4.2, pad radius 0.2 mm: caps pinned at the pad's edge, the largest on the mask (closed form).
+    """Hu et al. 4.2, pad radius 0.2 mm: caps pinned at the pad edge, the largest on the mask (closed form).
 
-    The cube starts with its corners on the mask; the contact line is caught by the edge, or passes it.
+    The cube starts with its corners on the mask; the pad edge pins the contact line or is passed.
     """
     numerics = SolderNumerics(time_step_limit=100)
     solder = Solder(volume=volume * 1e-9, effects=SolderEffects(gravity="off"), numerics=numerics)
@@ -101,7 +101,7 @@ def test_five_volumes_on_a_pad(volume, height, width, degrees):
 
 
 def test_solder_on_the_mask_meets_it_at_its_angle():
-    """Gap squeezed to 0.22 mm: pinned it would need 182 degrees; it flows over the edges to 148 degrees."""
+    """At a gap of 0.22 mm pinning would require 182 degrees; the solder flows over the edges to 148 degrees."""
     shape = solve_joint(JointGeometry(0.22e-3, RADIUS, RADIUS), Solder(volume=BALL))
     assert shape.verdict == "overflow"
     assert shape.metrics["contact_angle_board"][0] == pytest.approx(148.0, abs=1.0)

@@ -1,4 +1,4 @@
-"""Relaxation towards rest: iterations independent of size, particles inside follow."""
+"""Relaxation towards rest: iterations independent of size, motion of inner particles."""
 
 import numpy as np
 import pytest

@@ -23,7 +23,7 @@ SMALLEST, *BETWEEN, LARGEST = REFERENCE["drops"]
     ids=lambda row: f"{row['volume']}",
 )
 def test_five_volumes_on_a_pad(evolver):
-    """Hu et al. 4.2: pad 5 deg, mask 148 deg, pinned at the pad's edge; 343 particles."""
+    """Hu et al. 4.2: pad 5 degrees, mask 148 degrees, pinned at the pad edge; 343 particles."""
     drop = Drop(
         volume=evolver["volume"] * MM**3, contact_angle=np.radians(5), pad_radius=0.2 * MM, particles_per_edge=7
     )
@@ -35,7 +35,7 @@ def test_five_volumes_on_a_pad(evolver):
 
 
 def test_an_offset_joint():
-    """A joint that is no body of revolution: area of the free surface and pressure."""
+    """Free surface area and pressure of a joint without axial symmetry."""
     evolver = REFERENCE["offset_joint"]
     joint = Joint(
         volume=evolver["volume"] * MM**3, pad_bottom=0.24 * MM, pad_top=0.24 * MM, standoff=0.35 * MM, offset=0.07 * MM

@@ -1,4 +1,4 @@
-"""Half and a quarter of a drop come to rest in the shape of the whole."""
+"""Half and quarter models of a drop against the full drop at rest."""
 
 from functools import cache
 
@@ -37,6 +37,6 @@ def test_a_part_of_a_drop_is_the_whole(scene, symmetry):
     for name in ("volume", "max_width", "contact_radius", "mean_pressure"):
         assert part[name] == pytest.approx(whole[name], rel=1e-3), name
     assert part["contact_angle"] == pytest.approx(whole["contact_angle"], abs=0.2)
-    # On the axis of a quarter is a vertex with 8 triangles around it, which stands 0.6 % above a smooth apex.
+    # The axis vertex of a quarter has 8 triangles and is 0.6 % above a smooth apex.
     assert part["height"] == pytest.approx(whole["height"], rel={"half": 5e-4, "quarter": 8e-3}[symmetry])
     assert abs(part["volume_drift"]) < 1e-6

@@ -1,6 +1,6 @@
-"""Walls without slip and with Navier slip: torsion of a cylinder of liquid between two plates, an exact flow.
+"""Walls without slip and with Navier slip: exact torsion flow of a liquid cylinder between two plates.
 
-With v = r f(z) e_phi the free side carries no stress, and the equations of motion reduce to those of a channel:
+With v = r f(z) e_phi the free side is stress-free and the equations of motion reduce to a channel flow:
 rho f_t = mu f_zz, with slip length b: b f_z = +-(f - f_plate) at the plates.
 """
 
@@ -25,7 +25,7 @@ SLIP_LENGTH, LONG = 0.3, 1e6
 
 @dataclass(frozen=True)
 class Spin:
-    """A plate that turns about its normal."""
+    """Plate that rotates about its normal."""
 
     wall: int
     directions = np.zeros((0, 6))
@@ -37,14 +37,14 @@ class Spin:
 
 @dataclass(frozen=True)
 class EdgesHold:
-    """Contact lines that move with their plates."""
+    """Pad edges that pin the contact lines."""
 
     def pinned(self, body):
         return np.concatenate(body.cloud.rings)
 
 
 def cylinder(spacing):
-    """A prism of as many sides as the rings have particles."""
+    """Return a prism whose number of sides equals the particles per ring."""
     sides = joint_cloud(JointGeometry(GAP, RADIUS, RADIUS), np.pi * RADIUS**2 * GAP, spacing)
     return Body.at_rest(sides)
 
@@ -67,13 +67,13 @@ def physics(condition, *, inertia, spins):
 
 
 def order(counts, errors):
-    """Order in the spacing of errors at numbers of particles."""
+    """Return the order of errors in the spacing, from particle counts."""
     return -3.0 * np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
 
 @pytest.mark.parametrize(("condition", "length"), [("no-slip", 0.0), ("slip", SLIP_LENGTH)])
 def test_steady_torsion(condition, length):
-    """f = spin (z + b) / (H + 2 b), and the moment on the plate mu pi R^4 / 2 spin / (H + 2 b)."""
+    """Exact: f = spin (z + b) / (H + 2 b), moment on the plate mu pi R^4 / 2 spin / (H + 2 b)."""
     counts, excess = [], []
     for spacing in (0.2, 0.14, 0.1):
         body = cylinder(spacing)
@@ -104,7 +104,7 @@ def test_walls_share_their_area():
 
 
 def tetrahedra(body, acting, time_step, steps):
-    """Kinetic energies after steps on tetrahedra."""
+    """Return kinetic energies after steps on tetrahedra."""
     flow = InertialFlow(body, acting, InertialStep(DENSITY))
     for _ in range(steps):
         flow.step(time_step)
@@ -112,7 +112,7 @@ def tetrahedra(body, acting, time_step, steps):
 
 
 def ispg(body, acting, time_step, steps):
-    """Kinetic energies after steps of the scheme ispg."""
+    """Return kinetic energies after steps of the scheme ispg."""
     solver, volume = IspgStep(), body.volume()[0]
     for _ in range(steps):
         motion = solver.prepare(body, acting, NeighbourList(1.0, 0.0)).solve(time_step, volume)
@@ -122,7 +122,7 @@ def ispg(body, acting, time_step, steps):
 
 
 def decay_rate(scheme, condition, wave, spacing):
-    """Rate at which f = cos(k (z - H/2)) decays [1/s], from the energies in half the time in which it is halved."""
+    """Return the decay rate of f = cos(k (z - H/2)) [1/s] from energies over half of its half-life."""
     body, steps = cylinder(spacing), 5
     spin = SPIN * np.cos(wave * (body.points[:, 2] - 0.5 * GAP))
     body.velocity = np.column_stack((-body.points[:, 1] * spin, body.points[:, 0] * spin, np.zeros(len(spin))))
@@ -136,7 +136,7 @@ def decay_rate(scheme, condition, wave, spacing):
     [(tetrahedra, "no-slip", 1.8), (tetrahedra, "slip", 1.8), (ispg, "no-slip", 1.8), (ispg, "slip", 0.8)],
 )
 def test_torsion_decays(scheme, condition, least_order):
-    """The slowest mode f = cos(k (z - H/2)) decays at k^2 mu / rho, with k b tan(k H / 2) = 1."""
+    """The slowest mode f = cos(k (z - H/2)) decays with k^2 mu / rho, where k b tan(k H / 2) = 1."""
     wave = np.pi / GAP
     if condition == "slip":
         wave = brentq(lambda k: k * SLIP_LENGTH * np.tan(0.5 * k * GAP) - 1.0, 1e-3, 0.999 * np.pi / GAP)

@@ -74,7 +74,7 @@ def test_an_end_past_the_angle_of_the_mask_leaves_the_edge():
     assert joint.r[0] > 1.1 * RADIUS
 
 
-def test_a_joint_that_cannot_be_is_an_error():
+def test_impossible_joint_is_an_error():
     with pytest.raises(NoMeridian, match="no equilibrium joint"):
         joint_meridian(0.01e-9, RADIUS, RADIUS, 0.5e-3, GAMMA)
 
@@ -120,8 +120,8 @@ def test_a_section_without_weight_is_a_segment_of_a_circle(degrees):
 
 
 @pytest.mark.parametrize(("degrees", "bond"), [(60, 1.0), (60, 5.0), (120, 1.0), (148, 5.0)])
-def test_a_section_with_weight_is_in_balance(degrees, bond):
-    """Of one half across the middle, of the whole on the wall: forces along both axes vanish."""
+def test_section_with_weight_is_in_equilibrium(degrees, bond):
+    """Forces along both axes vanish, for one half cut at the middle and for the whole section on the wall."""
     angle = np.radians(degrees)
     drop = sessile_section(1.0, angle, 1.0, bond)
     across = drop.pressure * drop.height - 0.5 * bond * drop.height**2

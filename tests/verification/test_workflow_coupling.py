@@ -1,4 +1,4 @@
-"""Solder and structure in balance: collapse height, self-alignment, balance of moments, a package that bows."""
+"""Equilibrium of solder and structure: collapse height, self-alignment, moments and warped packages."""
 
 from types import SimpleNamespace
 
@@ -47,67 +47,67 @@ def exact_height(load):
 
 
 @pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.long), 4])
-def test_a_rigid_package_on_joints_comes_to_the_height_of_one(tmp_path, count):
-    """Four joints that are alike are one reflow, and bear four times the weight at the same height."""
+def test_rigid_package_on_joints_has_the_height_of_one_joint(tmp_path, count):
+    """Four identical joints share one reflow and carry four times the weight at the same height."""
     load = 5e-5
     structure = Bow(SQUARE[:count], rigid_modes(SQUARE[:count], ("z",), count * load))
     fine = SOLDER.model_copy(update={"numerics": SolderNumerics(spacing=5e-5, time_step_limit=100)})
-    found = coupled(tmp_path, structure, solder=fine)
-    assert len(found.joints.left) == 1
-    assert found.places["J0"].gap == pytest.approx(exact_height(load), rel=5e-3)
-    assert found.seen[-1].residual <= 1e-3
-    assert found.state.wrenches[:, 1, 2].sum() == pytest.approx(count * load, abs=1e-3 * count * PULL)
+    reflow = coupled(tmp_path, structure, solder=fine)
+    assert len(reflow.joints.left) == 1
+    assert reflow.places["J0"].gap == pytest.approx(exact_height(load), rel=5e-3)
+    assert reflow.seen[-1].residual <= 1e-3
+    assert reflow.state.wrenches[:, 1, 2].sum() == pytest.approx(count * load, abs=1e-3 * count * PULL)
     assert floating_height(JointGeometry(GAP, RADIUS, RADIUS), SOLDER, load) == pytest.approx(
         exact_height(load), rel=1e-4
     )
 
 
-def test_joints_that_flow_with_inertia_bear_a_package_at_the_height_of_the_default(tmp_path):
-    """By the scheme ispg each exchange ends at rest: the same height, and forces that bear the weight."""
+def test_joints_with_inertia_carry_a_package_at_the_default_height(tmp_path):
+    """With the scheme ispg each exchange ends at rest with the same height and forces that balance the weight."""
     load, gaps = 5e-5, {}
     flowing = {"numerics": SolderNumerics(spacing=1e-4, scheme="ispg"), "effects": {"gravity": "off", "inertia": "on"}}
     relaxing = {"numerics": SolderNumerics(spacing=1e-4, time_step_limit=100), "effects": {"gravity": "off"}}
     for name, settings in {"ispg": flowing, "energy": relaxing}.items():
         structure = Bow(SQUARE, rigid_modes(SQUARE, ("z",), 4 * load))
-        found = coupled(tmp_path / name, structure, solder=Solder(volume=BALL, **settings))
-        assert found.seen[-1].residual <= 1e-3
-        assert found.state.wrenches[:, 1, 2].sum() == pytest.approx(4 * load, abs=4e-3 * PULL)
-        shape = found.joints.shapes()["J0"]
+        reflow = coupled(tmp_path / name, structure, solder=Solder(volume=BALL, **settings))
+        assert reflow.seen[-1].residual <= 1e-3
+        assert reflow.state.wrenches[:, 1, 2].sum() == pytest.approx(4 * load, abs=4e-3 * PULL)
+        shape = reflow.joints.shapes()["J0"]
         assert shape.metrics["at_rest"][0] == 1.0 and abs(shape.metrics["volume_drift"][0]) < 1e-9
-        gaps[name] = found.places["J0"].gap
+        gaps[name] = reflow.places["J0"].gap
     assert abs(shape.metrics.get("energy_imbalance", (0.0, ""))[0]) < 1e-6
     assert gaps["ispg"] == pytest.approx(gaps["energy"], rel=5e-4)
 
 
 def test_a_package_that_starts_tilted_and_shifted_levels_and_centres_itself(tmp_path):
-    """Six rigid motions: 0.2 radii aside, a degree tilted, a degree turned; a micrometre of it is left."""
+    """Rigid-body modes start at 0.2 radii of shift and one degree of tilt and twist; one micrometre remains."""
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, 8e-5))
-    found = coupled(tmp_path, structure, rigid=np.array([5e-5, -3e-5, 0.0, 0.01, -0.015, 0.02]))
-    shift, turn = found.state.rigid[:2], found.state.rigid[3:]
+    reflow = coupled(tmp_path, structure, rigid=np.array([5e-5, -3e-5, 0.0, 0.01, -0.015, 0.02]))
+    shift, turn = reflow.state.rigid[:2], reflow.state.rigid[3:]
     assert abs(shift).max() < 1e-6 and 1e-3 * abs(turn).max() < 1e-6
-    assert np.ptp([place.gap for place in found.places.values()]) < 3e-6
-    assert found.state.rigid[2] + GAP == pytest.approx(exact_height(2e-5), rel=5e-3)
+    assert np.ptp([joint.gap for joint in reflow.places.values()]) < 3e-6
+    assert reflow.state.rigid[2] + GAP == pytest.approx(exact_height(2e-5), rel=5e-3)
 
 
 def test_weight_off_the_centre_tilts_the_package_towards_it(tmp_path):
-    """Moments balance about both axes; the tilt is that of the joints' axial stiffness to some per cent."""
+    """Moments balance about both axes; the axial joint stiffness predicts the tilt to some per cent."""
     weight, at = 4e-4, (0.3e-3, 0.1e-3)
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, weight, at))
-    found = coupled(tmp_path, structure)
-    forces = found.state.wrenches[:, 1]
-    centres = SQUARE + found.state.state.pad_motion[:, 1, :3]
+    reflow = coupled(tmp_path, structure)
+    forces = reflow.state.wrenches[:, 1]
+    centres = SQUARE + reflow.state.state.pad_motion[:, 1, :3]
     moment = np.cross(centres, forces[:, :3]).sum(axis=0) + forces[:, 3:].sum(axis=0)
     assert forces[:, 2].sum() == pytest.approx(weight, abs=4e-3 * PULL)
     assert moment[:2] == pytest.approx((at[1] * weight, -at[0] * weight), abs=6e-3 * PULL * 1e-3)
-    stiffness = -stiffness_estimate(next(iter(found.places.values())), SOLDER)[2, 2]
+    stiffness = -stiffness_estimate(next(iter(reflow.places.values())), SOLDER)[2, 2]
     lean = weight * np.array([-at[1], at[0]]) / (4.0 * stiffness * 1e-6)
-    assert found.state.rigid[3:5] == pytest.approx(lean, rel=0.2)
-    gaps = np.array([place.gap for place in found.places.values()])
+    assert reflow.state.rigid[3:5] == pytest.approx(lean, rel=0.2)
+    gaps = np.array([joint.gap for joint in reflow.places.values()])
     assert gaps.argmin() == 3 and gaps.argmax() == 0  # J3 is at +x, +y
 
 
 def test_a_package_that_bows_has_one_joint_at_four_corners(tmp_path):
-    """One way, standoffs are those of the structure; both ways they differ by force times compliance."""
+    """One-way standoffs equal the structure; two-way standoffs differ by force times compliance."""
     steps, bow = (300.0, 350.0, 400.0), 20e-6 / 2e-6 / 100.0
     runs = {}
     for bends in (True, False):
@@ -128,7 +128,7 @@ def test_a_package_that_bows_has_one_joint_at_four_corners(tmp_path):
 
 
 def test_a_killed_run_continues_to_the_same_bits(tmp_path):
-    """What the joints keep in files is all there is: an exchange that is asked for again gives the same wrenches."""
+    """Joint files contain the full state: a repeated exchange gives the same wrenches."""
     structure = Bow(SQUARE[:2], rigid_modes(SQUARE[:2], (), 0.0), bow=1e-1, compliance=5e-3)
     whole = coupled(tmp_path / "whole", structure, (300.0, 350.0))
     drawn = {name: JointGeometry(GAP, RADIUS, RADIUS) for name in ("J0", "J1")}
@@ -143,14 +143,14 @@ def test_a_killed_run_continues_to_the_same_bits(tmp_path):
     assert [exchange.residual for exchange in state.exchanges] == [exchange.residual for exchange in whole.seen]
 
 
-def test_no_balance_names_load_step_and_residuals(tmp_path, monkeypatch):
+def test_missing_equilibrium_reports_load_step_and_residuals(tmp_path, monkeypatch):
     monkeypatch.setattr("reflowshock.workflow.reflow.coupling.MOST_EXCHANGES", 1)
     structure = Bow(SQUARE[:1], rigid_modes(SQUARE[:1], (), 0.0), compliance=5e-3)
     with pytest.raises(NotInBalance, match=r"load step 1 at 300\.0 K: after 1 exchanges forces still change by"):
         coupled(tmp_path, structure)
 
 
-def test_load_steps_are_those_with_liquid_solder():
+def test_load_steps_cover_the_liquid_phase():
     paper = Thermal(peak=200 + KELVIN, melting=25 + KELVIN, solidification=200 + KELVIN, steps=7)
     assert [step.temperature - KELVIN for step in load_steps(paper)] == pytest.approx(range(25, 201, 25))
     lead_free = Thermal(steps=10, package="moved", corner_displacement=-1e-4)

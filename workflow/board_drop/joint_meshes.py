@@ -76,12 +76,18 @@ IMAGE = "_image"  # ends the name of a joint behind a plane of symmetry
 
 def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool) -> dict[str, dict]:
     """Place the package at its position after solidification and mesh the joints; return as ``mesh_array``."""
-    from reflowshock.meshing.board.displaced_assembly import prescribed, read_computed, write_displaced_assembly
+    from reflowshock.meshing.board.displaced_assembly import (
+        prescribed_displacement,
+        read_displacement,
+        write_displaced_assembly,
+    )
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import read_surface
 
     structure = run_folder / "reflow/structure.npz"
-    displacement = read_computed(structure) if structure.exists() else prescribed(case.package, case.warpage)
+    displacement = (
+        read_displacement(structure) if structure.exists() else prescribed_displacement(case.package, case.warpage)
+    )
     side = write_displaced_assembly(run_folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
     sites = {site.name: site for site in read_pads(run_folder / "reflow/pads.json")}
     surfaces = {path.stem: read_surface(path) for path in sorted((run_folder / "surface").glob("*.vtu"))}
@@ -95,13 +101,13 @@ def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coars
 
 def mesh_identical_joints(run: Run[BoardDropCase], folder: Path, *, coarse: bool) -> dict[str, dict]:
     """Mesh unloaded truncated spheres of the solder volume under a flat package; return as ``mesh_array``."""
-    from reflowshock.meshing.board.displaced_assembly import raised, write_displaced_assembly
+    from reflowshock.meshing.board.displaced_assembly import uniform_lift, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.sphere_surface import sphere_surface
 
     case = run.case
     sphere = identical_sphere(case)
-    displacement = raised(sphere.height - case.package.standoff)
+    displacement = uniform_lift(sphere.height - case.package.standoff)
     flat, path = run.folder / "geometry/assembly.msh", folder / f"{PREFIX}assembly.msh"
     side = write_displaced_assembly(flat, displacement, path)
     drawn = read_pads(run.folder / "geometry/pads.json")
@@ -140,7 +146,7 @@ def mesh_array(
     meshes = {"": fine}
     if coarse:
         meshes["coarse_"] = [
-            mesh_coarse_or_fine(surface, mesh, (package, site), side)
+            mesh_coarse_or_fine(surface, mesh, site, package, side)
             for (surface, site), mesh in zip(bodies, fine, strict=True)
         ]
     return meshes

@@ -1,4 +1,4 @@
-"""What all kinds of case have in common."""
+"""Base class of all kinds of case."""
 
 from pathlib import Path
 from typing import ClassVar, Self
@@ -7,12 +7,12 @@ from reflowshock.parameters import Parameters
 from reflowshock.workflow.case.names import Name
 from reflowshock.workflow.case.stage import Pipeline
 
-CASES = Path(__file__).resolve().parents[2] / "cases"  # those that the program ships
-FULL = "full"  # the scale of a case as its file says it
+CASES = Path(__file__).resolve().parents[2] / "cases"  # shipped cases
+FULL = "full"  # scale of a case without changes of its file
 
 
 class Title(Parameters):
-    """Name and title of a case; the name is also that of its run folder."""
+    """Name and title of a case; the run folder has the same name."""
 
     name: Name
     title: str = ""
@@ -22,11 +22,11 @@ class Case(Parameters):
     """Everything that a run depends on, in SI floats.
 
     Attributes:
-        kind: the table that makes a file a case of this kind.
-        stages: of all cases of this kind.
-        ranks_key: key of `ranks`.
-        case: its name.
-        scale: "full", or the name of the table of ``[scales]`` whose values replace those of the file.
+        kind: name of the table that identifies a case file of this kind.
+        stages: pipeline of all cases of this kind.
+        ranks_key: dotted key of ``ranks``.
+        case: name and title.
+        scale: "full", or the name of a table in ``[scales]`` whose values replace values of the file.
     """
 
     kind: ClassVar[str]
@@ -38,44 +38,44 @@ class Case(Parameters):
 
     @property
     def run_name(self) -> str:
-        """Name of its run folder, where none is given."""
+        """Default name of the run folder."""
         return self.case.name if self.scale == FULL else f"{self.case.name}-{self.scale}"
 
     @property
     def pipeline(self) -> Pipeline:
-        """The stages of this case."""
+        """Pipeline of this case."""
         return self.stages
 
     @property
     def ranks(self) -> int:
-        """MPI ranks of the package fem."""
+        """Number of MPI ranks of the package fem."""
         return 1
 
     @property
     def ranks_by_key(self) -> dict[str, int]:
-        """MPI ranks that it asks for, one stage after the other, by the key that does."""
+        """Numbers of MPI ranks of the stages, by dotted key."""
         return {self.ranks_key: self.ranks} if self.ranks_key else {}
 
     @classmethod
     def completed(cls, table: dict) -> dict:
-        """Return the table of a case file with the defaults that depend on which tables it has."""
+        """Return the table of a case file with defaults that depend on the tables present."""
         return table
 
     def resolved(self) -> Self:
-        """The case with what its file leaves open and its scene decides."""
+        """Return the case with all ``auto`` values resolved."""
         return self
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take names of files in a table of SI values as relative to the folder of the case file."""
+        """Resolve file names in a table of SI values relative to the folder of the case file."""
         return table
 
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
-        """Those of its files that are tables of a pulse, by key, which quantity each has, and in which column."""
+        """Pulse tables of the case by key: path, quantity, and column title (None for single columns)."""
         return {}
 
     @property
     def files(self) -> dict[str, Path]:
-        """Files that its parameters name, by key: what they hold counts as a parameter, too."""
+        """Input files of the case by key; their contents count as parameters."""
         return {}

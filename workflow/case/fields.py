@@ -23,12 +23,12 @@ BOUNDS: tuple[tuple[type, str, str], ...] = (
 
 
 def quantity_of(field: FieldInfo) -> Quantity | None:
-    """Return what a field, or each item of its list, measures; None for numbers, names, tables."""
+    """Return the quantity of a field, or of the items of its list; None for numbers, names, tables."""
     return next((item for item in _metadata(field) if isinstance(item, Quantity)), None)
 
 
 def holds_named_tables(field: FieldInfo) -> bool:
-    """Whether the field's table holds tables by names that the user chooses, such as the layers of a structure."""
+    """Return whether a field is a table of tables with user-defined names, such as the layers of a structure."""
     return typing.get_origin(field.annotation) is dict
 
 
@@ -41,7 +41,7 @@ def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
-    """Return the model that a given table follows: where there are several, the one of its ``kind``."""
+    """Return the model of a table; if a field has several models, the one with the ``kind`` of the table."""
     models = models_of(field)
     if len(models) < 2:
         return models[0] if models else None
@@ -50,19 +50,19 @@ def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
 
 
 def tag_of(model: type[BaseModel]) -> str:
-    """Return the ``kind`` that tells a model from the others that a table may follow."""
+    """Return the ``kind`` that identifies a model among the models of a table."""
     return str(typing.get_args(model.model_fields["kind"].annotation)[0])
 
 
 def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
-    """Return the kinds of value that a field takes, such as a name or a number; the field itself where it is one."""
+    """Return one field per kind of value, such as a name or a number; the field itself if there is only one."""
     members = typing.get_args(field.annotation) if _is_union(field.annotation) and not models_of(field) else ()
     values = [member for member in members if member is not types.NoneType]
     return tuple(map(FieldInfo.from_annotation, values)) if len(values) > 1 else (field,)
 
 
 def allowed(field: FieldInfo) -> str:
-    """Describe what a field takes: names, or a range in the user's unit."""
+    """Describe the allowed values of a field: names, or a range in the user's unit."""
     kinds = alternatives(field)
     if len(kinds) > 1:
         return ", or ".join(", ".join(literal_names(kind)) or allowed(kind) or "a list of names" for kind in kinds)
@@ -84,7 +84,7 @@ def allowed(field: FieldInfo) -> str:
 
 
 def literal_names(field: FieldInfo) -> tuple[str, ...]:
-    """Return the names that a field, or each item of its list, may take; empty where it is not so limited."""
+    """Return the allowed names of a field, or of the items of its list; empty for other fields."""
     annotation = field.annotation
     if typing.get_origin(annotation) is tuple or _is_union(annotation):
         annotation = typing.get_args(annotation)[0]
@@ -92,7 +92,7 @@ def literal_names(field: FieldInfo) -> tuple[str, ...]:
 
 
 def wanted_items(field: FieldInfo) -> str:
-    """Say how many items the list of a field must have."""
+    """Return a message about the required number of items in the list of a field."""
     items = typing.get_args(field.annotation)
     return "must be a list with at least one item" if Ellipsis in items else f"must be a list of {len(items)} items"
 
@@ -101,13 +101,13 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
     """Convert a table of a case file to SI floats, field by field.
 
     Args:
-        model: model that the table follows; keys that it does not know are left for it to refuse.
+        model: model of the table; unknown keys stay, so that its validation rejects them.
         table: the table as TOML gives it.
         prefix: dotted key of the table with its dot, or empty.
         problems: list to which unit errors are added; their values become nan.
 
     Returns:
-        The table in SI values. Tables with a default are completed by it, if they are of its kind.
+        The table in SI values. Tables of the same kind as their default are completed by it.
     """
     return {
         name: _to_si_value(model.model_fields[name], value, prefix + name, problems)
@@ -132,7 +132,7 @@ def _to_si_value(field: FieldInfo, value: object, key: str, problems: list[Probl
 
 
 def _converted(quantity: Quantity, field: FieldInfo, key: str, value: object, problems: list[Problem]) -> float:
-    """Convert the value of a key; nan, and a problem, where it is no such quantity."""
+    """Convert the value of a key to SI; return nan and add a problem if it is not a valid quantity."""
     try:
         return quantity.to_si(value)
     except UnitError as error:
@@ -141,15 +141,19 @@ def _converted(quantity: Quantity, field: FieldInfo, key: str, value: object, pr
 
 
 def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]) -> object:
-    """Convert one table of a field; its model's ``kind`` and defaults are those of the field's default."""
+    """Convert one table of a field; ``kind`` and missing values are taken from the default of the field."""
     if isinstance(value, dict):
         model = model_of(field, value)
         if model is None:
             return value
-        given = field.default.model_dump() if isinstance(field.default, model) else {}
-        # Its kind apart, what is the model's own default is left to it: so it is known what a case has set.
-        own = model.model_fields
-        defaults = {name: one for name, one in given.items() if name == "kind" or one != own[name].default}
+        default_values = field.default.model_dump() if isinstance(field.default, model) else {}
+        # Model defaults except ``kind`` are left out, so that ``model_fields_set`` holds the keys of the case.
+        model_fields = model.model_fields
+        defaults = {
+            name: default
+            for name, default in default_values.items()
+            if name == "kind" or default != model_fields[name].default
+        }
         return defaults | to_si_table(model, value, key + ".", problems)
     return value
 
@@ -181,7 +185,7 @@ def display(value: object, field: FieldInfo) -> str:
 
 
 def shown(value: object, field: FieldInfo | None) -> object:
-    """Write an SI value as its field is shown to users; other values, and none, stay as they are."""
+    """Return an SI value as text in the user's unit if its field is a quantity, otherwise the value itself."""
     return display(value, field) if value is not None and field is not None and quantity_of(field) else value
 
 
@@ -190,7 +194,7 @@ def _choice(field: FieldInfo) -> str:
 
 
 def _metadata(field: FieldInfo) -> Iterator[object]:
-    """Yield quantities and bounds of a field, or of the items of its list, which may be absent."""
+    """Yield quantities and bounds of a field, or of the items of its list."""
     yield from field.metadata
     inner = typing.get_args(field.annotation)[:1]
     while inner:

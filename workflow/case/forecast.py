@@ -1,4 +1,4 @@
-"""What forecasts of all kinds of case share: sizes, and the limit of time steps."""
+"""Forecasts of all kinds of case: size of a run, and the limit on time steps."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ from reflowshock.problem import Problem
 from reflowshock.workflow.case.text import short
 
 BYTES_OF_ELEMENT, BYTES_OF_PARTICLE = 5.0e3, 5.0e4
-# Of the shipped cases, on a core of an AMD EPYC: a stage that only meshes, and a report.
+# Measured on the shipped cases, one core of an AMD EPYC: a meshing stage, and a report.
 SECONDS_OF_STAGE, SECONDS_OF_REPORT = 3.0, 2.0
-STEPS_MOST = 1e10  # those of the smallest meshes take hours
+STEPS_MOST = 1e10  # takes hours even on the smallest meshes
 
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """Seconds of the stages on one core or on the ranks of the case, joints at a time, memory of the model [B]."""
+    """Size of a run: seconds per stage on the case's ranks, number of simultaneous joints, model memory [B]."""
 
     seconds: Mapping[str, float]
     joints: int
@@ -22,13 +22,13 @@ class Size:
 
 
 def too_many_steps(key: str, duration: float, step: float, solver: str) -> Iterator[Problem]:
-    """Yield a problem where a motion takes more steps than any run.
+    """Yield a problem if a motion takes more than ``STEPS_MOST`` time steps.
 
     Args:
-        key: Of the duration.
-        duration: Of the motion [s].
+        key: Dotted key of the duration.
+        duration: Duration of the motion [s].
         step: Predicted time step [s].
-        solver: Its name.
+        solver: Name of the solver.
     """
     if not step > 0.0:
         message = f"has no {solver} time step: sizes, densities, moduli or damping are out of range"

@@ -1,4 +1,4 @@
-"""Names that users choose: of cases, scales, studies, layers, loads. They become names of files, and parts of keys."""
+"""Names of cases, scales, studies, layers and loads, which become file names and parts of keys."""
 
 import re
 from typing import Annotated
@@ -14,10 +14,10 @@ Name = Annotated[str, Field(pattern=NAME)]
 
 
 def is_name(text: object) -> bool:
-    """Whether a text may be a name."""
+    """Return whether a value is a valid name."""
     return isinstance(text, str) and _NAME.fullmatch(text) is not None
 
 
 def wrong_name(key: str, text: object) -> Problem:
-    """Return the problem of a text that cannot be a name."""
+    """Return the problem for an invalid name."""
     return Problem(key, "is not a valid name", text, NAMES)

@@ -1,4 +1,4 @@
-"""Which magnitudes a physical quantity can have: a slip of a unit or of a digit is found before anything runs."""
+"""Plausible magnitudes of physical quantities, which reveal wrong units or digits before anything runs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ FORCE = "--force"
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The least and the greatest magnitude of a quantity, as text with a unit; zero is always plausible."""
+    """Smallest and largest plausible magnitude, as text with a unit; zero is always plausible."""
 
     low: str
     high: str
 
 
-# By dimension: of everything that a package, its solder, its board or its drop can be.
+# Ranges by dimension, for packages, solder, boards and drops.
 BY_DIMENSION = {
     "length": Range("1 nm", "10 m"),
     "volume": Range("1e-9 mm^3", "1 m^3"),
@@ -45,7 +45,7 @@ BY_DIMENSION = {
     "irradiance": Range("1e-3 W/m^2", "1e12 W/m^2"),
     "angle": Range("1e-9 rad", "1 turn"),
 }
-# By the last name of a key, where that says more than the dimension.
+# Narrower ranges by the last name of a key.
 BY_NAME = {
     "young_modulus*": Range("1 kPa", "10 TPa"),
     "shear_modulus*": Range("1 Pa", "10 TPa"),
@@ -57,32 +57,32 @@ BY_NAME = {
     "explicit_step": Range("1e-15 s", "1 s"),
     "implicit_step": Range("1e-15 s", "1e3 s"),
 }
-# Numbers without a unit; of those that are named the whole range.
+# Ranges of numbers without a unit; the named ones may have negative values.
 NUMBERS = (1e-12, 1e6)
 NAMED_NUMBERS = {
-    "poisson_ratio": (-0.99, 0.4999),  # of isotropic solids: nearer to 0.5 no explicit step is left
-    "constant": (1e-300, 1e300),  # of a law of life, whose unit depends on its exponent
+    "poisson_ratio": (-0.99, 0.4999),  # for isotropic solids; the explicit time step vanishes at 0.5
+    "constant": (1e-300, 1e300),  # for a fatigue law, whose unit depends on its exponent
 }
 
 
 def implausible(case: Case) -> Iterator[Problem]:
-    """Find values that nothing in a case of electronics can have."""
+    """Yield a problem for each parameter with an implausible value."""
     for key, value, field in fields.leaves(case):
         for number in _numbers(value):
             yield from _implausible(key, number, field)
 
 
 def implausible_tables(case: Case) -> Iterator[Problem]:
-    """Find tables of pulses that last too long, or whose values nothing can have."""
+    """Yield a problem for each pulse table with an implausible duration or value."""
     for key, unit, number in largest_values(case.pulse_tables):
-        found = BY_DIMENSION[dimension(unit)]
-        if number > to_si(found.high, unit):
+        plausible = BY_DIMENSION[dimension(unit)]
+        if number > to_si(plausible.high, unit):
             message = f"has {from_si(number, unit, 6)}, which is not plausible"
-            yield Problem(key, message, None, f"up to {found.high}, or {FORCE}")
+            yield Problem(key, message, None, f"up to {plausible.high}, or {FORCE}")
 
 
 def _numbers(value: object) -> Iterator[float]:
-    """Yield the numbers of a value, or of a list of lists, that are not zero."""
+    """Yield the nonzero numbers of a value or of nested lists."""
     if isinstance(value, tuple):
         for item in value:
             yield from _numbers(item)
@@ -100,15 +100,16 @@ def _implausible(key: str, number: float, field: FieldInfo) -> Iterator[Problem]
     if quantity is None:
         (low, high), limits = NUMBERS, f"{NUMBERS[0]:g} to {NUMBERS[1]:g}"
     else:
-        found = _range(name, quantity)
-        low, high, limits = quantity.to_si(found.low), quantity.to_si(found.high), f"{found.low} to {found.high}"
+        plausible = _range(name, quantity)
+        low, high = quantity.to_si(plausible.low), quantity.to_si(plausible.high)
+        limits = f"{plausible.low} to {plausible.high}"
     if not low <= abs(number) <= high:
-        shown = fields.display(float(number), field) if quantity else number
-        yield Problem(key, "is not plausible", shown, f"{limits} in magnitude, or {FORCE}")
+        displayed = fields.display(float(number), field) if quantity else number
+        yield Problem(key, "is not plausible", displayed, f"{limits} in magnitude, or {FORCE}")
 
 
 @cache
 def _range(name: str, quantity: Quantity) -> Range:
     """Return the plausible magnitudes of a quantity, by the last name of its key and its dimension."""
-    own = next((found for pattern, found in BY_NAME.items() if fnmatchcase(name, pattern)), None)
-    return own or BY_DIMENSION[quantity.dimension]
+    by_name = next((range_of_name for pattern, range_of_name in BY_NAME.items() if fnmatchcase(name, pattern)), None)
+    return by_name or BY_DIMENSION[quantity.dimension]

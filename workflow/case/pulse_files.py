@@ -1,4 +1,4 @@
-"""Tables of pulses that a case names: whether they can be read, and how large what they hold is."""
+"""Checks of the pulse tables of a case: readability and largest values."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -9,10 +9,10 @@ Tables = Mapping[str, tuple[Path, str, str | None]]
 
 
 def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
-    """Find tables that cannot be read.
+    """Yield a problem for each table that cannot be read.
 
     Args:
-        tables: key -> file, what it holds, and the title of the column where it has several.
+        tables: file, quantity and column title (None for single columns), by key.
     """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import read_pulse

@@ -1,4 +1,4 @@
-"""What a stage works with, and what it finds: metrics and health checks in the form of ``summary.json``."""
+"""Input and results of a stage: metrics and health checks in the form of ``summary.json``."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ AnyCase = TypeVar("AnyCase", bound=Case)
 
 @dataclass(frozen=True, slots=True)
 class Run(Generic[AnyCase]):
-    """What a stage works with.
+    """Input of a stage.
 
     Attributes:
         folder: the run folder, with the products of earlier stages.
@@ -27,19 +27,19 @@ class Run(Generic[AnyCase]):
     oversubscribe: bool = False
 
     def checkpoints(self, stage: str) -> Path:
-        """Folder in which a stage keeps what it needs to continue after a kill; removed when it is complete."""
+        """Return the folder for the checkpoints of a stage, which is removed when the stage is complete."""
         return self.folder / f".{stage}.checkpoints"
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What a stage found, in the form of ``summary.json``.
+    """Results of a stage, in the form of ``summary.json``.
 
     Attributes:
         metrics: name -> {"value", "unit"}.
         health: check -> {"value", "limit", "ok"}.
         effects: effect -> {"on", "why"}.
-        continued: what continued from checkpoints, in words.
+        continued: names of parts that continued from checkpoints, or empty.
     """
 
     metrics: dict = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Findings:
 
 
 class StageError(RuntimeError):
-    """A stage cannot use what it was given, or has not made what it is to make."""
+    """Unusable input of a stage, or missing output."""
 
 
 StageFunction = Callable[[Run[Any], Path], Findings]
@@ -61,22 +61,22 @@ def metric(value: float | str, unit: str = "") -> dict:
 
 
 def at_most(value: float, limit: float) -> dict:
-    """Return a health check that holds where the value is within its limit; nan never is."""
+    """Return a health check that passes if the value does not exceed its limit; nan fails."""
     return {"value": value, "limit": limit, "ok": bool(value <= limit)}
 
 
 def at_least(value: float, limit: float) -> dict:
-    """Return a health check that holds where the value reaches its limit; nan never does."""
+    """Return a health check that passes if the value is not below its limit; nan fails."""
     return {"value": value, "limit": limit, "ok": bool(value >= limit)}
 
 
 def worst(values: Iterable[float]) -> float:
-    """Return the largest magnitude; nan if any value is, zero if there is none."""
+    """Return the largest magnitude: nan if any value is nan, zero without values."""
     magnitudes = [abs(value) for value in values]
     return float("nan") if any(value != value for value in magnitudes) else max(magnitudes, default=0.0)
 
 
 def in_words_continued(results: Mapping[str, dict]) -> str:
-    """Say which runs continued from a checkpoint; empty where none did."""
+    """Return a text about the runs that continued from a checkpoint, or an empty string."""
     windows = {name: result.get("continued_from", 0) for name, result in results.items()}
     return ", ".join(f"{name} from window {window}" for name, window in windows.items() if window)

@@ -1,4 +1,4 @@
-"""Scales: a case file at other sizes, each a table ``[scales.NAME]`` of dotted keys whose values replace the file's.
+"""Scales of a case: tables ``[scales.NAME]`` of dotted keys whose values replace those in the file.
 
 scale = "full"                                   # or --set scale="quick"
 [scales.quick]
@@ -18,21 +18,21 @@ KEYS = 'a table of dotted keys, e.g. "board.numerics.coarse_size" = "2 mm"'
 
 
 def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, object]]:
-    """Take the scales out of a case file.
+    """Remove the scales from the table of a case file and return them.
 
     Args:
-        table: what the file says; loses ``scales``.
-        problems: list to which wrong tables are added.
+        table: contents of the file; ``scales`` is removed.
+        problems: list to which errors are added.
 
     Returns:
-        Name of a scale -> dotted key -> value.
+        Values by dotted key, by name of the scale.
     """
-    given = table.pop("scales", {})
-    if not isinstance(given, dict):
-        problems.append(Problem("scales", "must be a table", given, "tables [scales.NAME]"))
+    tables = table.pop("scales", {})
+    if not isinstance(tables, dict):
+        problems.append(Problem("scales", "must be a table", tables, "tables [scales.NAME]"))
         return {}
     scales = {}
-    for name, values in given.items():
+    for name, values in tables.items():
         if name == FULL:
             problems.append(Problem(f"scales.{name}", "is reserved for the file itself", None, "another name"))
         elif not is_name(name):
@@ -40,28 +40,28 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
         elif not isinstance(values, dict):
             problems.append(Problem(f"scales.{name}", "must be a table", values, KEYS))
         else:
-            given = dict(dotted(values))
-            scales[name] = {key: value for key, value in given.items() if is_key(key)}
+            settings = dict(dotted(values))
+            scales[name] = {key: value for key, value in settings.items() if is_key(key)}
             problems += [
                 Problem(f"scales.{name}.{key}", "is not a dotted key", value, KEYS)
-                for key, value in given.items()
+                for key, value in settings.items()
                 if key not in scales[name]
             ]
     return scales
 
 
 def is_key(text: str) -> bool:
-    """Whether a text may be a dotted key."""
+    """Return whether a text is a valid dotted key."""
     names = text.split(".")
     return all(names) and len(names) <= DEEPEST
 
 
 def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Problem]) -> dict[str, object]:
-    """Return the values of a scale by dotted key: of ``full`` none, of an unknown one none, which is a problem."""
+    """Return the values of a scale by dotted key: empty for ``full``; add a problem for an unknown scale."""
     if isinstance(name, str) and (name == FULL or name in scales):
         return scales.get(name, {})
-    known = [FULL, *scales]
-    problems.append(Problem("scale", "unknown scale", name, "one of " + ", ".join(known), nearest(str(name), known)))
+    names = [FULL, *scales]
+    problems.append(Problem("scale", "unknown scale", name, "one of " + ", ".join(names), nearest(str(name), names)))
     return {}
 
 
@@ -82,7 +82,7 @@ def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
 
 
 def override_value(text: str) -> object:
-    """Return the value that a setting's text stands for: TOML, quotes may be left out."""
+    """Parse the value of a setting as TOML, where quotes may be omitted."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Stages of a case: what each reads and writes. Snakemake's rules and the reasons that `plan` gives come from here."""
+"""Stages and pipelines of cases: parameters, inputs and products, from which jobs and stale products are derived."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,13 +15,13 @@ class Stage:
 
     Attributes:
         name: name of the stage and of its folder.
-        parameters: dotted keys of the parameters, or tables of them, that it depends on.
-        follows: stages whose products it depends on: when they ran, it has to run.
-        pads: whether it reads the pad table as drawn. Its ``parameters`` then contain all that this table depends on,
-            so that it need not run again when the geometry changes elsewhere.
+        parameters: dotted keys of parameters or tables that the stage depends on.
+        follows: stages whose products it reads.
+        pads: whether it reads only the pad table of the geometry. Its ``parameters`` then include the inputs of this
+            table, so that other changes of the geometry do not make it stale.
         products: files that it writes, relative to the run folder.
-        on_top: those of its files that a run folder also shows at its top.
-        without: those of its parameters, or tables of them, that it does not depend on.
+        on_top: files that also appear at the top of the run folder.
+        without: dotted keys within ``parameters`` that it does not depend on.
     """
 
     name: str
@@ -33,12 +33,12 @@ class Stage:
     without: tuple[str, ...] = ()
 
     def depends_on(self, key: str) -> bool:
-        """Whether it depends on a parameter."""
+        """Return whether the stage depends on a parameter."""
         return _stands_in(key, self.parameters) and not _stands_in(key, self.without)
 
     @property
     def record(self) -> str:
-        """File, relative to the run folder, in which the stage says what it used, found and measured."""
+        """Path of the stage's record, relative to the run folder."""
         return f"{self.name}/stage.json"
 
 
@@ -48,7 +48,7 @@ def _stands_in(key: str, tables: tuple[str, ...]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """The stages of a kind of case, in order."""
+    """Stages of a kind of case, in order."""
 
     stages: tuple[Stage, ...]
 
@@ -65,16 +65,16 @@ class Pipeline:
         return self.stages[: self.names.index(name) + 1]
 
     def read_by(self, name: str) -> tuple[str, ...]:
-        """Return the names of the stages whose products one reads: that it follows, and that those follow, in order."""
+        """Return the names of all direct and indirect upstream stages of a stage, in order."""
         if self[name].pads:
             return ("geometry",)
-        found = set(self[name].follows)
+        upstream = set(self[name].follows)
         for stage in reversed(self.upstream(name)[:-1]):
-            found |= set(stage.follows) if stage.name in found else set()
-        return tuple(one for one in self.names if one in found)
+            upstream |= set(stage.follows) if stage.name in upstream else set()
+        return tuple(stage_name for stage_name in self.names if stage_name in upstream)
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
-    """Return the last stage of a pipeline, which tells what the others found; ``parameters`` are what it judges by."""
+    """Return the report stage of a pipeline; ``parameters`` are dotted keys that its verdicts depend on."""
     pages = tuple(f"report/{name}" for name in PAGE)
     return Stage("report", ("case", "scale", *parameters), follows, pages, on_top=PAGE)

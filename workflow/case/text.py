@@ -7,7 +7,7 @@ CHECK_UNITS = {
     r"standoff_spread_.*": "m",
 }  # fmt: skip
 MICRO_UNIT = re.compile(r"\bu(?=[msgNJVA]\b)")
-# Below so much another unit reads better.
+# Smaller units below a limit: limit, factor, unit.
 LESS = {
     "s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "Pa": ((1e4, 1e-3, "kPa"),), "N": ((1.0, 1e3, "mN"),),
     "m": ((1e-4, 1e6, "µm"),), "m^3": ((1e-12, 1e15, "pL"),),
@@ -19,27 +19,27 @@ SHOWN = {
 
 
 def quantity(metric: dict) -> str:
-    """Text of a metric record: fractions as per cent, stresses in MPa or kPa, lengths in mm or µm, small forces mN."""
+    """Format a metric in a readable unit: stresses in MPa or kPa, lengths in mm or µm, small forces in mN."""
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
-    factor, shown = readable(unit, abs(value))
-    return f"{number(factor * value)} {shown}".strip()
+    factor, unit_text = readable(unit, abs(value))
+    return f"{number(factor * value)} {unit_text}".strip()
 
 
 def readable(unit: str, size: float) -> tuple[float, str]:
-    """Return by what values of a size in an SI unit are multiplied, and in which unit they then read well."""
-    smaller = ((factor, shown) for least, factor, shown in LESS.get(unit, ()) if 0.0 < size < least)
+    """Return factor and name of a readable unit for values of a magnitude in an SI unit."""
+    smaller = ((factor, display_unit) for least, factor, display_unit in LESS.get(unit, ()) if 0.0 < size < least)
     return next(smaller, SHOWN.get(unit, (1.0, unit)))
 
 
 def spelled(unit: str) -> str:
-    """Return a unit as a case names it, as it is printed: um as µm."""
+    """Return the printed form of a unit of a case file, such as µm for um."""
     return MICRO_UNIT.sub("µ", unit)
 
 
 def number(value) -> str:
-    """Four significant digits, without a needless exponent."""
+    """Format a number with four significant digits."""
     if isinstance(value, bool | str) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -48,47 +48,47 @@ def number(value) -> str:
 
 
 def nano(seconds: float | None) -> str:
-    """Seconds as nanoseconds."""
+    """Format seconds as nanoseconds."""
     return "–" if seconds is None else f"{1e9 * seconds:.3g} ns"
 
 
 def micro(value: float) -> str:
-    """Metres as micrometres, four digits."""
+    """Format metres as micrometres with four digits."""
     return _four_digits(1e6 * value)
 
 
 def mega(value: float) -> str:
-    """Pascals as megapascals, four digits."""
+    """Format pascals as megapascals with four digits."""
     return _four_digits(1e-6 * value)
 
 
 def _four_digits(value: float) -> str:
-    """Write a figure of a column: with the zeros at its end."""
+    """Format a number of a column, with trailing zeros."""
     return f"{value:.0f}" if abs(value) >= 999.95 else f"{value:#.4g}"
 
 
 def percent(value: float) -> str:
-    """A fraction as per cent, three digits."""
+    """Format a fraction in per cent with three digits."""
     if abs(value) < 1.0e-6:
         return "< 0.0001 %"
     return f"{100.0 * value:.3g} %" if abs(value) < 10.0 else f"{100.0 * value:.0f} %"
 
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:
-    """Return value and limit of a check."""
+    """Return value and limit of a health check as text."""
     unit = next((unit for pattern, unit in CHECK_UNITS.items() if re.fullmatch(pattern, name)), "")
     value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))
     return value, limit
 
 
 def duration(seconds: float) -> str:
-    """Write a wall time with two digits, in the unit that makes its figure readable."""
+    """Format a wall time with two digits in a readable unit."""
     units = ((1.0, "s"), (60.0, "min"), (3600.0, "h"))
     size, unit = next(((s, u) for s, u in units if seconds < 100.0 * s), (86400.0, "days"))
     return f"{seconds / size:.2g} {unit}" if seconds < 100.0 * size else f"{seconds / size:.0f} {unit}"
 
 
 def short(seconds: float) -> str:
-    """Write a time step in the unit that makes its figure readable."""
+    """Format a time step in a readable unit."""
     factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "µs")) if f * seconds < 1e3), (1e3, "ms"))
     return f"{factor * seconds:.3g} {unit}"

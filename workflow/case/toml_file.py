@@ -1,4 +1,4 @@
-"""Reading TOML files: cases and studies. Whatever a path leads to, it is read quickly or refused in one line."""
+"""TOML files of cases and studies: reading, and one-line errors for anything unreadable."""
 
 import os
 import stat
@@ -10,14 +10,14 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_places import Place, place_of_error, toml_fault
 
 MOST_BYTES = 4_000_000
-DEEPEST = 16  # tables in tables; no case has more than five
+DEEPEST = 16  # nesting depth; no case needs more than five
 
 
 def read_text(path: Path) -> str:
-    """Read the text of a TOML file, a byte order mark left out.
+    """Read the text of a TOML file without its byte order mark.
 
     Raises:
-        CaseError: there is no such file, it is none, too large, or not UTF-8.
+        CaseError: the file is missing, not a regular file, too large, or not UTF-8.
     """
     fault = fault_of(path, MOST_BYTES)
     if fault:
@@ -32,26 +32,26 @@ def read_text(path: Path) -> str:
 
 
 def parse_toml(source: str, text: str) -> dict:
-    """Read a TOML text.
+    """Parse a TOML text.
 
     Args:
-        source: what errors call it.
+        source: name of the text in errors.
         text: the text.
 
     Raises:
-        CaseError: it is not TOML; with line and column.
+        CaseError: the text is not TOML; with line and column.
     """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        place, (key, fault) = place_of_error(error, text), toml_fault(error, text)
-        problem = Problem(key, f"is not TOML: {fault}", None, "", "", place.line, place.column)
+        position, (key, fault) = place_of_error(error, text), toml_fault(error, text)
+        problem = Problem(key, f"is not TOML: {fault}", None, "", "", position.line, position.column)
         raise CaseError(source, [problem]) from error
     except RecursionError:
         raise CaseError(source, [_too_deep()]) from None
-    except ValueError as error:  # a whole number of thousands of digits, a date that is none
-        place = _first_unreadable(text)
-        problem = Problem("", f"has a value that cannot be read: {error}", None, "", "", place.line, place.column)
+    except ValueError as error:  # an integer of thousands of digits, an invalid date
+        position = _first_unreadable(text)
+        problem = Problem("", f"has a value that cannot be read: {error}", None, "", "", position.line, position.column)
         raise CaseError(source, [problem]) from error
     if is_too_deep(table):
         raise CaseError(source, [_too_deep()])
@@ -64,7 +64,7 @@ def read_toml(path: Path) -> dict:
 
 
 def is_too_deep(value: object) -> bool:
-    """Whether tables and lists are nested deeper than any case needs."""
+    """Return whether tables and lists are nested deeper than ``DEEPEST``."""
     level = [value]
     for _ in range(DEEPEST):
         level = [
@@ -79,29 +79,29 @@ def is_too_deep(value: object) -> bool:
 
 
 def fault_of(path: Path, most_bytes: int) -> str:
-    """Say why a path cannot be read as a file of at most so many bytes; empty where it can. Opens nothing."""
+    """Return why a path is not a readable file of at most ``most_bytes`` bytes, or an empty string."""
     try:
-        found = path.stat()
+        status = path.stat()
     except FileNotFoundError:
         return "does not exist"
     except (OSError, ValueError) as error:  # a loop of links, a name too long, a null character
         return f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         return "is a folder, not a file"
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return "is not a regular file"
     if not os.access(path, os.R_OK):
         return "cannot be read: permission denied"
-    if found.st_size > most_bytes:
-        return f"is too large: {1e-6 * found.st_size:.3g} MB; allowed: up to {1e-6 * most_bytes:g} MB"
+    if status.st_size > most_bytes:
+        return f"is too large: {1e-6 * status.st_size:.3g} MB; allowed: up to {1e-6 * most_bytes:g} MB"
     return ""
 
 
-def beside(folder: Path, name: str) -> str:
-    """Return the path of a file that a case names, relative to the folder of the case."""
+def resolved_path(folder: Path, name: str) -> str:
+    """Return the absolute path of a file named relative to the folder of the case."""
     try:
         return str((folder / name).resolve())
-    except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: the gate says what is wrong
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: reported later by the gate
         return str(folder / name)
 
 
@@ -110,7 +110,7 @@ def _too_deep() -> Problem:
 
 
 def _first_unreadable(text: str) -> Place:
-    """Return the first line at which a text stops being readable for another reason than that it ends there."""
+    """Return the first line with a value that cannot be read, by bisection."""
     lines = text.split("\n")
     low, high = 0, len(lines)
     while high - low > 1:

@@ -1,4 +1,4 @@
-"""Where keys stand in a TOML file: the standard library tells no positions of what it has read."""
+"""Positions of keys in a TOML file, which the standard library does not provide."""
 
 import re
 import time
@@ -8,28 +8,28 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-MOST_SECONDS = 1.0  # without a position a message is still right
-NAMES = re.compile(r"\(['\"].*\)")  # of a table, as the parser shows them
+MOST_SECONDS = 1.0  # messages without a position are still correct
+NAMES = re.compile(r"\(['\"].*\)")  # names of a table in errors of the parser
 INLINE = "Duplicate inline table key "
 AT = re.compile(r"\(at line (\d+), column (\d+)\)$")
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Line and column in a file, both from 1 on."""
+    """Position in a file: line and column, counted from 1."""
 
     line: int
     column: int
 
 
 def place_of_error(error: tomllib.TOMLDecodeError, text: str) -> Place:
-    """Return where a text is not TOML; its end where the error says so."""
-    found = AT.search(str(error))
-    return Place(int(found[1]), int(found[2])) if found else Place(text.count("\n") + 1, 1)
+    """Return the position of a TOML error, or the end of the text if the error has none."""
+    match = AT.search(str(error))
+    return Place(int(match[1]), int(match[2])) if match else Place(text.count("\n") + 1, 1)
 
 
 def toml_fault(error: tomllib.TOMLDecodeError, text: str) -> tuple[str, str]:
-    """Return of which key a text is not TOML, or an empty string, and what is wrong; without the place."""
+    """Return key (or an empty string) and message of a TOML error, without its position."""
     message = AT.sub("", str(error)).strip()
     has_value = "this key already has a value"
     if names := NAMES.search(message):
@@ -42,16 +42,16 @@ def toml_fault(error: tomllib.TOMLDecodeError, text: str) -> tuple[str, str]:
 
 
 def _key_in(line: str) -> str:
-    """Return the first key that a line gives, or an empty string."""
+    """Return the first key defined in a line, or an empty string."""
     with suppress(ValueError, RecursionError):
         return next(_keys(tomllib.loads(line), ""), "")
     return ""
 
 
 class Places:
-    """The places of all keys of a TOML text that can be read.
+    """Positions of all keys of a valid TOML text.
 
-    Every table's head and every line "key = value" is TOML by itself: lines are taken together until they can be read.
+    Every table header and every "key = value" is valid TOML by itself: lines are joined until they can be parsed.
     """
 
     def __init__(self, text: str) -> None:
@@ -67,7 +67,7 @@ class Places:
                 self._places.setdefault(name, Place(line, _column(chunk, name)))
 
     def __call__(self, key: str) -> Place | None:
-        """Return the place of a dotted key, or of the table nearest around it; None where that is the whole file."""
+        """Return the position of a dotted key or of the nearest enclosing table, or None at the top level."""
         while key:
             if key in self._places:
                 return self._places[key]
@@ -76,7 +76,7 @@ class Places:
 
 
 def _expressions(text: str) -> Iterator[tuple[int, str, dict]]:
-    """Yield first line, text and content of each head of a table or key with its value."""
+    """Yield first line, text and parsed content of each table header and each key with its value."""
     deadline = time.monotonic() + MOST_SECONDS
     lines = [f"{line}\n" for line in text.split("\n")]
     start = 0
@@ -97,7 +97,7 @@ def _expressions(text: str) -> Iterator[tuple[int, str, dict]]:
 
 
 def _keys(content: object, before: str) -> Iterator[str]:
-    """Yield the dotted keys in a table, each after those around it."""
+    """Yield the dotted keys in a table, each after its enclosing keys."""
     while isinstance(content, list) and len(content) == 1:  # the head of a list of tables
         content = content[0]
     for name, value in content.items() if isinstance(content, dict) else ():
@@ -107,11 +107,11 @@ def _keys(content: object, before: str) -> Iterator[str]:
 
 
 def _column(chunk: str, key: str) -> int:
-    """Return the column of a key in the first line of the text that gives it: of as much of its end as stands there."""
+    """Return the column of a key in its first line, searching for the longest suffix of the key."""
     first, names = chunk.partition("\n")[0], key.split(".")
     for start in range(len(names)):
         name = ".".join(names[start:])
-        found = re.search(rf"(?<![\w-])[\"']?{re.escape(name)}[\"']?(?![\w-])", first)
-        if found:
-            return found.start() + 1
+        match = re.search(rf"(?<![\w-])[\"']?{re.escape(name)}[\"']?(?![\w-])", first)
+        if match:
+            return match.start() + 1
     return len(first) - len(first.lstrip()) + 1

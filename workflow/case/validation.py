@@ -1,4 +1,4 @@
-"""Validation errors of pydantic, said in the words of a case file."""
+"""Translation of pydantic's validation errors to the keys and values of a case file."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -15,27 +15,27 @@ from reflowshock.workflow.case.names import wrong_name
 RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 
 
-def translate(model: type[BaseModel], error: ValidationError, table: dict, known: set[str]) -> list[Problem]:
+def translate(model: type[BaseModel], error: ValidationError, table: dict, reported: set[str]) -> list[Problem]:
     """Translate validation errors.
 
     Args:
         model: the validated model.
-        error: what pydantic found.
-        table: what the user wrote.
-        known: keys of which a problem is already known; those are left out.
+        error: error of pydantic.
+        table: table as written by the user.
+        reported: keys with a problem already reported, which are skipped.
 
     Returns:
-        One problem a key.
+        One problem per key.
     """
-    found: dict[str, Problem] = {}
+    problems: dict[str, Problem] = {}
     for record in error.errors():
         names = _names(model, record["loc"])
         key = ".".join(names)
-        if key not in known:
+        if key not in reported:
             is_explained = bool({"allowed", "names"} & record.get("ctx", {}).keys())
             problem = _explained(names, record, table) if is_explained else _problem(model, names, record, table)
-            found.setdefault(key, problem)
-    return list(found.values())
+            problems.setdefault(key, problem)
+    return list(problems.values())
 
 
 def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, table: dict) -> Problem:
@@ -65,11 +65,11 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
 
 
 def _meant(root: type[BaseModel], names: list[str], siblings: list[str]) -> str:
-    """Return the key that is meant by one that does not exist, or nothing: one beside it, else one of another table."""
-    own = nearest(names[-1], siblings) or next((one for one in siblings if one.startswith(names[-1])), "")
-    beside = ".".join([*names[:-1], own]) if own else ""
+    """Return the existing key nearest to an unknown one, in the same or another table, or an empty string."""
+    sibling = nearest(names[-1], siblings) or next((key for key in siblings if key.startswith(names[-1])), "")
+    same_table = ".".join([*names[:-1], sibling]) if sibling else ""
     elsewhere = min(_places(root, names[-1]), key=len, default="")
-    return elsewhere or beside if len(names) == 1 else beside or elsewhere
+    return elsewhere or same_table if len(names) == 1 else same_table or elsewhere
 
 
 def _places(model: type[BaseModel], name: str, prefix: str = "") -> Iterator[str]:
@@ -83,7 +83,7 @@ def _places(model: type[BaseModel], name: str, prefix: str = "") -> Iterator[str
 
 
 def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
-    """Pass on the error of a check that says itself what is allowed, or which names are."""
+    """Return the problem of a check that provides the allowed values or names itself."""
     context, value = record["ctx"], _value(table, names)
     choices = context.get("names", ())
     allowed = context.get("allowed", "one of " + ", ".join(choices))
@@ -91,26 +91,26 @@ def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
 
 
 def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
-    """Say that a table has no ``kind``, or none that exists."""
+    """Return the problem of a table with a missing or unknown ``kind``."""
     kinds = [fields.tag_of(candidate) for candidate in fields.models_of(field)]
     choice = "one of " + ", ".join(kinds)
     if not isinstance(value, dict):
         return Problem(key, "must be a table", value)
     if "kind" not in value:
         return Problem(f"{key}.kind", "is missing", None, choice)
-    given = str(value["kind"])
-    return Problem(f"{key}.kind", "unknown kind", given, choice, nearest(given, kinds))
+    kind = str(value["kind"])
+    return Problem(f"{key}.kind", "unknown kind", kind, choice, nearest(kind, kinds))
 
 
 def _nearest_name(value: Any, field: FieldInfo) -> str:
-    """Valid name most like a wrong one, which may be an item of a list."""
+    """Return the valid name nearest to a wrong one, which may be an item of a list."""
     valid = fields.literal_names(field)
     wrong = [str(item) for item in (value if isinstance(value, list) else [value]) if item not in valid]
     return nearest(wrong[0], valid) if wrong else ""
 
 
 def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Drop from a pydantic location what is no key: tags and members of unions, positions in lists."""
+    """Return the keys in a pydantic location, without tags and members of unions and list positions."""
     names: list[str] = []
     candidates: tuple[type[BaseModel], ...] = (model,)
     is_own_name = False
@@ -134,18 +134,18 @@ def _is_tag(candidates: tuple[type[BaseModel], ...], part: str) -> bool:
 
 
 def _field(root: type[BaseModel], names: list[str], table: dict) -> tuple[type[BaseModel] | None, FieldInfo | None]:
-    """Return the model that a key's table follows, and the key's field in it."""
+    """Return the model of a key's table and the field of the key in it."""
     model: type[BaseModel] | None = root
     field = None
-    given: Any = table
+    content: Any = table
     is_own_name = False
     for position, name in enumerate(names):
-        given = given.get(name, {}) if isinstance(given, dict) else {}
+        content = content.get(name, {}) if isinstance(content, dict) else {}
         if not is_own_name:
             field = model.model_fields.get(name) if model else None
         is_own_name = not is_own_name and field is not None and fields.holds_named_tables(field)
         if field is not None and not is_own_name and position < len(names) - 1:
-            model = fields.model_of(field, given if isinstance(given, dict) else {})
+            model = fields.model_of(field, content if isinstance(content, dict) else {})
     return model, field
 
 

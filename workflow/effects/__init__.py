@@ -1,1 +1,1 @@
-"""The effects of the program: what each adds, when it matters, where it lives, what it costs."""
+"""Effects of the model: description, criterion, cost and source."""

@@ -1,4 +1,4 @@
-"""The page of the registry, and that of a case, in a terminal."""
+"""Terminal pages with all effects of the program and the effects of a case."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -36,8 +36,8 @@ def _add(table: Table, effect: Effect) -> None:
     if effect.name in measured():
         lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} to a step ({MEASURED.name})"))
     lines.append(("source", effect.source))
-    for place, (title, text) in enumerate(lines):
-        name = effect.name.replace("_", " ") if place == 0 else ""
+    for row, (title, text) in enumerate(lines):
+        name = effect.name.replace("_", " ") if row == 0 else ""
         table.add_row(styled("[bold]{}[/]", name), styled("[dim]{}[/]", title), text)
 
 

@@ -1,16 +1,16 @@
-"""All effects of the program, in the order of the pipeline: each package lists its own."""
+"""Registry of all effects in the order of the pipeline, collected from the packages."""
 
 from functools import cache
 
 from reflowshock.effect import Effect
 
-# Names that a stage gives to effects of which an earlier stage has one of the same name.
+# Suffix of an effect whose name an earlier stage already uses.
 APART = "_in_the_shock"
 
 
 @cache
 def registry() -> dict[str, Effect]:
-    """Return the effects by name: those of reflows, of heating, of drops and of flows."""
+    """Return the effects of reflow, heating, drop and flow by name."""
     from reflowshock.workflow.flows.registry import FLOWS
     from reflowshock.workflow.kinds import BOARD_DROP
 
@@ -21,11 +21,11 @@ def registry() -> dict[str, Effect]:
 
 
 def effect_of(name: str, reflowed: bool) -> Effect | None:
-    """Return the effect of a name in a plan or record; None for what is a load or a part of the method.
+    """Return the effect with a name in a plan or record, or None for loads and parts of the method.
 
     Args:
-        name: in the plan.
-        reflowed: whether the case has a reflow, whose effects come first where names are equal.
+        name: name in the plan or record.
+        reflowed: whether the case has a reflow, whose effects take precedence if names are equal.
     """
-    known = registry()
-    return known.get(name if reflowed else f"{name}{APART}", known.get(name))
+    effects = registry()
+    return effects.get(name if reflowed else f"{name}{APART}", effects.get(name))

@@ -1,8 +1,8 @@
-"""The effects of a case as rows of text: state, expected influence, why, and the predicted share of the cost.
+"""Table of the effects of a case: state, expected influence, reason, and predicted share of the cost.
 
-Their cost is predicted from forecasts of the case the other way (``Effect.other_way``), or from ratios that
-``benchmarks/effects.py`` measured (``costs.json``). The ``influence`` of a decision is the expected relative change of
-the result.
+The cost of an effect is predicted from the forecast of the case with the effect toggled (``Effect.other_way``), or from
+ratios measured by ``benchmarks/effects.py`` (``costs.json``). The ``influence`` of a decision is the expected relative
+change of the result.
 """
 
 import json
@@ -23,19 +23,19 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 @cache
 def measured() -> dict[str, float]:
-    """Return effect -> processor seconds of a step with it over those of one without."""
+    """Return measured ratios of the processor time per step with and without an effect, by effect."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 
 def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
-    """Return effect -> its share of the predicted cost; of one that is off, what it would add.
+    """Return the share of each effect in the predicted cost; for inactive effects, the share that it would add.
 
-    Negative where the effect saves time. Effects whose cost is neither predicted nor measured are left out.
+    Shares are negative if the effect saves time. Effects without predicted or measured cost are omitted.
     """
     try:
         seconds = kind_of(case).forecast(case).seconds
     except PulseError:
-        return {}  # a report of a run whose table of the pulse is no longer there
+        return {}  # the report of a run whose pulse table has been removed
     total = sum(seconds.values())
     shares = {}
     for name, decision in effects.items():
@@ -47,9 +47,9 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
-    """Return the predicted cost [s] of the case with an effect the other way; None where nothing tells it."""
-    total, own = sum(seconds.values()), {effect.name: effect for effect in kind_of(case).effects}
-    switched = own[name].other_way(case, acts) if name in own else None
+    """Return the predicted cost of the case with an effect toggled [s], or None if it cannot be predicted."""
+    total, effects = sum(seconds.values()), {effect.name: effect for effect in kind_of(case).effects}
+    switched = effects[name].other_way(case, acts) if name in effects else None
     if switched is not None:
         try:
             return sum(kind_of(switched).forecast(switched).seconds.values())
@@ -64,13 +64,13 @@ def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) 
 
 HEAD = ("effect", "", "influence", "cost", "why")
 CAPTION = (
-    "influence: expected change of the result; if off, the error of leaving it out. cost: share of the predicted time;"
-    " if off, what it would add (below 0: it saves time). –: not predicted."
+    "influence: expected change of the result; if off, the error of omitting the effect. cost: share of the predicted"
+    " time; if off, the share it would add (negative: it saves time). –: not predicted."
 )
 
 
 def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, str, str, str]]:
-    """Yield name, whether it is on, influence, cost and why of each effect of a case."""
+    """Yield name, state (True: on), influence, cost and reason of each effect of a case."""
     shares = cost_shares(case, effects)
     for name, decision in effects.items():
         influence, share = decision.get("influence"), shares.get(name)
@@ -85,7 +85,7 @@ def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, st
 
 
 def per_cent(share: float) -> str:
-    """Write a share, which may be negative."""
+    """Format a share in per cent, which may be negative."""
     if share == 0.0:
         return "0 %"
     if abs(share) < 1e-6:
@@ -94,9 +94,9 @@ def per_cent(share: float) -> str:
 
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
-    """Which effects were simulated, their expected influence and predicted cost, and why: in prose."""
-    shown = [
+    """Return the report table of simulated effects: influence, predicted cost and reason."""
+    table_rows = [
         [name, "on" if acts else "off", influence, cost, why]
         for name, acts, influence, cost, why in rows(case, effects)
     ]
-    return {"head": ["effect", "state", *HEAD[2:]], "rows": shown, "prose": True, "caption": CAPTION}
+    return {"head": ["effect", "state", *HEAD[2:]], "rows": table_rows, "prose": True, "caption": CAPTION}

@@ -1,1 +1,1 @@
-"""Making products: jobs of Snakemake on this machine or on a cluster; start with `batch.py`."""
+"""Jobs that make products: Snakemake on this machine or on a cluster; start with ``batch.py``."""

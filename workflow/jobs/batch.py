@@ -1,4 +1,4 @@
-"""Making products: one Snakemake job for each that is missing; those that fail leave the others finished."""
+"""Batches of products: one Snakemake job per missing product; a failed job does not stop independent jobs."""
 
 import json
 import shutil
@@ -15,23 +15,23 @@ from reflowshock.workflow.store.state import StageState, examine, why_stale
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import show
 
-BATCH = "batch"  # below the store: jobs, logs and marks of the last call
+BATCH = "batch"  # folder in the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"
 UNTRIED = "was not started"
-LEAST_FREE = 2**20  # bytes of a device on which a stage could still have said why it ended
+LEAST_FREE = 2**20  # free bytes below which a full device explains a silent end
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What points are computed with.
+    """Resources for computing points.
 
     Attributes:
-        cores: number of cores that may be used.
-        exclusive: one stage at a time, with all cores, for measurements that must not disturb each other.
+        cores: number of available cores.
+        exclusive: whether stages run one at a time with all cores, for undisturbed measurements.
         oversubscribe: whether MPI may have more ranks than cores.
-        slurm: where stages are jobs of a cluster.
-        live: whether stages show on the terminal how far they are.
-        each_second: called while points are computed, and once more in the end.
+        slurm: cluster executor, or None for this machine.
+        live: whether stages show their progress on the terminal.
+        each_second: function called every second during the computation, and once at the end.
     """
 
     cores: int
@@ -43,12 +43,12 @@ class Machine:
 
     @property
     def executor(self) -> Executor:
-        """Where stages run."""
+        """Executor of the stages."""
         return self.slurm or Local(self.cores, self.oversubscribe)
 
 
 def machine_of(executor: Local | Slurm, *, one_run: bool = False) -> Machine:
-    """Return what points are computed with where the user chose where stages run."""
+    """Return the resources for computing points with a chosen executor."""
     if isinstance(executor, Slurm):
         return Machine(executor.largest, oversubscribe=executor.oversubscribe, slurm=executor, live=one_run)
     return Machine(executor.cores, one_run, executor.oversubscribe, live=one_run)
@@ -56,12 +56,12 @@ def machine_of(executor: Local | Slurm, *, one_run: bool = False) -> Machine:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A product that has to be made.
+    """Product to be made.
 
     Attributes:
-        stage: whose product it is.
-        point: the first of the points that want it.
-        needs: names of the jobs whose products its stage reads.
+        stage: stage that makes the product.
+        point: first point that needs the product.
+        needs: names of the jobs whose products the stage reads.
     """
 
     stage: str
@@ -76,10 +76,9 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """A job as the Snakefile reads it, paths relative to the store's home.
+    """Job as the Snakefile reads it, paths relative to the home of the store.
 
-    ``live``: whether it shows on the terminal how far it is; ``resources``: what it asks a cluster for, if it is a job
-    there.
+    ``live``: whether the job shows its progress on the terminal; ``resources``: resources requested from a cluster.
     """
 
     stage: str
@@ -96,7 +95,7 @@ def job_name(point: Point, stage: str) -> str:
 
 
 def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
-    """List the products, up to those of one stage, that have to be made for points; each once."""
+    """List the missing products of points, up to one stage, without duplicates."""
     jobs: dict[str, Job] = {}
     for point in points:
         before: list[str] = []
@@ -110,9 +109,9 @@ def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
 
 
 def show_products(store: Store, point: Point) -> list[str]:
-    """Show in a point's run folder what is there, intact, and made from what is there; return files put back."""
+    """Link all intact, current products into the run folder of a point; return the restored files."""
     states = examine(store, point)
-    return show(store, point, [name for name, one in states.items() if not (one.stale or one.because_of)])
+    return show(store, point, [name for name, state in states.items() if not (state.stale or state.because_of)])
 
 
 def run_points(
@@ -122,23 +121,23 @@ def run_points(
     machine: Machine,
     lock: int,
 ) -> dict[str, str]:
-    """Make what is missing or damaged of points; what is there and intact is never computed again.
+    """Make all missing or damaged products of points; intact products are never computed again.
 
-    Should this process be killed, all that is complete stays, and checkpoints of stages that were at work. A product
-    that a damaged one was read for is made again if that comes out otherwise than it was.
+    If this process is killed, complete products and the checkpoints of running stages stay. A product made from a
+    damaged one is rebuilt only if the repaired product differs from the original.
 
     Args:
-        store: where products are.
-        points: what is wanted.
-        until: the last stage.
-        machine: what they are computed with.
-        lock: what ``locked`` yields for the store's folder.
+        store: Store of the products.
+        points: Points to complete.
+        until: Last stage to run.
+        machine: Cores and executor.
+        lock: File descriptor that ``locked`` yields for the folder of the store.
 
     Returns:
-        Key of each point that is not complete -> why.
+        Reason of failure by key of each incomplete point.
 
     Raises:
-        RunFolderBusy: jobs of an earlier command are still at work in the store.
+        RunFolderBusy: jobs of an earlier command are still running in the store.
     """
     tried: set[str] = set()
     try:
@@ -159,27 +158,28 @@ def run_points(
 
 
 def why(store: Store, point: Point, until: str) -> str:
-    """Say why a point is not complete: its first stage that is not there, and what it said; nothing where it is."""
+    """Return the first missing stage of an incomplete point and its message; empty if the point is complete."""
     failure = failure_of(store, point, until)
     return f"stage {failure[0]}: {failure[1]}" if failure else ""
 
 
 def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None:
-    """Return the first stage of a point that is not there, and why; None where all are."""
+    """Return the first missing stage of a point and the reason, or None if all stages exist."""
     states = examine(store, point)
-    stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
-    if not stale:
+    stale_stages = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
+    if not stale_stages:
         return None
-    return stale[0], store.message(point, stale[0]) or _untold(store, point, stale[0], states[stale[0]])
+    first = stale_stages[0]
+    return first, store.message(point, first) or _describe_silent_end(store, point, first, states[first])
 
 
 def log_of(store: Store, point: Point, stage: str) -> Path:
-    """Return the file that takes what a job says beside the terminal, as the Snakefile names it."""
+    """Return the log file of a job, as named in the Snakefile."""
     return store.home / BATCH / "logs" / f"{job_name(point, stage)}.txt"
 
 
-def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
-    """Say what is known of a stage that said nothing when it ended."""
+def _describe_silent_end(store: Store, point: Point, stage: str, state: StageState) -> str:
+    """Describe the end of a stage that left no message."""
     name, said, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
     if by_cluster := failures_of(said).get(name):
         return f"{by_cluster}; see {said}"
@@ -194,7 +194,7 @@ def _untold(store: Store, point: Point, stage: str, state: StageState) -> str:
 
 
 def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:
-    """Run Snakemake once for some jobs; what jobs of a cluster say is shown as it comes."""
+    """Run Snakemake once for some jobs; output of cluster jobs is shown as it arrives."""
     discard(store.home / BATCH)
     (store.home / BATCH / "logs").mkdir(parents=True)
     for job in jobs:
@@ -212,27 +212,27 @@ def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool
 
 
 def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
-    """Write the jobs for the Snakefile; later stages first, so that points are complete one after the other."""
+    """Write the jobs for the Snakefile; later stages get priority, so that points complete one by one."""
     tasks = {}
-    wanted = {job.point.key: machine.executor.jobs(job.point.case) for job in jobs}
+    resources = {job.point.key: machine.executor.jobs(job.point.case) for job in jobs}
     for job in jobs:
         tasks[job.name] = _Task(
             stage=job.stage,
             needs=job.needs,
-            threads=_threads(job, jobs, machine, wanted[job.point.key]),
+            threads=_threads(job, jobs, machine, resources[job.point.key]),
             priority=job.point.case.pipeline.names.index(job.stage),
             live=machine.live and not machine.slurm,
-            resources=wanted[job.point.key].get(job.stage, {}),
+            resources=resources[job.point.key].get(job.stage, {}),
         )
     path = store.home / JOBS
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps({name: asdict(task) for name, task in tasks.items()}, indent=1) + "\n", encoding="utf-8")
 
 
-def _threads(job: Job, jobs: Sequence[Job], machine: Machine, wanted: Jobs) -> int:
-    """Return the cores of a job: a shock's are its ranks, a reflow has its share, other stages are serial."""
+def _threads(job: Job, jobs: Sequence[Job], machine: Machine, resources: Jobs) -> int:
+    """Return the cores of a job: the ranks of a shock, an equal share for each reflow, one for other stages."""
     if machine.slurm:
-        return wanted[job.stage]["cpus_per_task"] if job.stage in wanted else 1
+        return resources[job.stage]["cpus_per_task"] if job.stage in resources else 1
     if machine.exclusive:
         return machine.cores
     if job.stage == "shock":

@@ -1,4 +1,4 @@
-"""What Snakemake needs to run a case without the command line: the jobs of a run, written into its store."""
+"""Preparation of a run that the user starts with Snakemake directly: the jobs, written into its store."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -12,19 +12,19 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import Store
 
-_held = ExitStack()  # the lock of the run folder, until Snakemake ends: its jobs are at work in it
+_held = ExitStack()  # holds the lock of the run folder until Snakemake ends
 
 
 def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
-    """Read a case and write the jobs that make what is missing of its run.
+    """Read a case and write the jobs for the missing products of its run.
 
     Args:
-        config: ``case``, and perhaps ``set``, ``out``, ``oversubscribe``.
-        cores: that Snakemake may use.
+        config: ``case`` and, optionally, ``set``, ``out``, ``oversubscribe``.
+        cores: number of cores for Snakemake.
 
     Raises:
-        CaseError: the case, or the folder of the run, is not possible.
-        RunFolderBusy: a run is at work in the folder.
+        CaseError: the case or the run folder is invalid.
+        RunFolderBusy: another run is active in the folder.
     """
     oversubscribe = bool(int(config.get("oversubscribe", 0)))
     case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)

@@ -1,4 +1,4 @@
-"""Slurm: its partitions, the jobs of a folder, and what can be wrong before any job is submitted."""
+"""Slurm queries: partitions, jobs of a folder, and checks before any job is submitted."""
 
 import re
 import shutil
@@ -14,19 +14,19 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.profile import FILE, Profile
 
-WAIT = 60  # seconds for an answer
+WAIT = 60  # time limit of a Slurm command [s]
 
 
 PLUGIN = "snakemake_executor_plugin_slurm"
 
 
 class NoAnswer(RuntimeError):
-    """Slurm's commands do not answer; the message has their words."""
+    """Failure of a Slurm command; the message contains its output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Partition:
-    """A partition: its name, all its cores, those of its largest machine, and whether it is the default."""
+    """Slurm partition: name, total cores, cores of its largest node, whether it is the default."""
 
     name: str
     cores: int
@@ -40,22 +40,22 @@ def partitions() -> list[Partition]:
     Raises:
         NoAnswer: Slurm cannot be reached.
     """
-    found: dict[str, Partition] = {}
+    partition_by_name: dict[str, Partition] = {}
     for line in _ask("sinfo", "--noheader", "--format=%P|%C|%c"):
         name, cores, of_node = line.strip().split("|")
         number = re.match(r"\d+", of_node)
-        before = found.get(name.rstrip("*"), Partition("", 0, 0, False))
-        found[name.rstrip("*")] = Partition(
+        previous = partition_by_name.get(name.rstrip("*"), Partition("", 0, 0, False))
+        partition_by_name[name.rstrip("*")] = Partition(
             name.rstrip("*"),
-            before.cores + int(cores.split("/")[-1]),
-            max(before.largest, int(number.group()) if number else 1),
+            previous.cores + int(cores.split("/")[-1]),
+            max(previous.largest, int(number.group()) if number else 1),
             name.endswith("*"),
         )
-    return list(found.values())
+    return list(partition_by_name.values())
 
 
 def jobs_in(folder: Path) -> list[str]:
-    """Return the jobs of this user that are queued or at work with a folder as their working directory.
+    """Return the queued or running jobs of this user whose working directory is a folder.
 
     Raises:
         NoAnswer: Slurm cannot be reached.
@@ -65,7 +65,7 @@ def jobs_in(folder: Path) -> list[str]:
 
 
 def cancel(jobs: list[str]) -> None:
-    """Cancel jobs; those that have ended are none."""
+    """Cancel jobs that have not ended."""
     if jobs:
         subprocess.run(["scancel", *jobs], capture_output=True, timeout=WAIT, check=False)
 
@@ -83,26 +83,26 @@ def _ask(*command: str) -> Iterator[str]:
 
 
 def check_slurm(profile: Profile, cases: Sequence[Case]) -> Partition:
-    """Find out whether jobs can be submitted, and whether a case asks for more than there is.
+    """Check that jobs can be submitted and that the cases fit into the partition.
 
     Args:
-        profile: of the cluster.
-        cases: that are to be run.
+        profile: profile of the cluster.
+        cases: cases to run.
 
     Returns:
-        The partition that jobs go to.
+        The partition of the jobs.
 
     Raises:
-        CaseError: with all that is wrong.
+        CaseError: jobs cannot be submitted, or a case is too large; with all problems.
     """
     problems = list(_missing())
     if problems:
         raise CaseError("run", problems)
     try:
-        found = partitions()
+        available = partitions()
     except NoAnswer as error:
         raise CaseError("run", [Problem("--executor", f"Slurm does not answer: {error}", "slurm")]) from error
-    partition = _chosen(profile, found)
+    partition = _select_partition(profile, available)
     problems = [problem for case in cases for problem in _too_large(case, partition)]
     if problems:
         raise CaseError("run", problems)
@@ -111,25 +111,25 @@ def check_slurm(profile: Profile, cases: Sequence[Case]) -> Partition:
 
 def _missing() -> Iterator[Problem]:
     if shutil.which("sbatch") is None:
-        where = "a machine with Slurm's commands, or --executor local"
+        where = "a machine with the Slurm commands, or --executor local"
         yield Problem("--executor", "sbatch is not installed here", "slurm", where)
     if find_spec(PLUGIN) is None:
-        message = "Snakemake's plugin for Slurm is not installed; pip install 'reflowshock[cluster]' brings it"
+        message = "the Slurm plugin of Snakemake is not installed; try: pip install 'reflowshock[cluster]'"
         yield Problem("--executor", message, "slurm")
 
 
-def _chosen(profile: Profile, found: Sequence[Partition]) -> Partition:
-    """Return the partition of the profile, else the default one; where there is none, the first."""
-    if not found:
-        raise CaseError("run", [Problem("--executor", "Slurm has no partition for you", "slurm")])
+def _select_partition(profile: Profile, available: Sequence[Partition]) -> Partition:
+    """Return the partition of the profile, otherwise the default partition, otherwise the first."""
+    if not available:
+        raise CaseError("run", [Problem("--executor", "no Slurm partition is available to you", "slurm")])
     if not profile.partition:
-        return next((partition for partition in found if partition.is_default), found[0])
-    names = [partition.name for partition in found]
+        return next((partition for partition in available if partition.is_default), available[0])
+    names = [partition.name for partition in available]
     if profile.partition not in names:
         key, hint = "default-resources.slurm_partition", nearest(profile.partition, names)
         problem = Problem(key, "is not a partition here", profile.partition, ", ".join(names), hint)
         raise CaseError(str(profile.folder / FILE), [problem])
-    return found[names.index(profile.partition)]
+    return available[names.index(profile.partition)]
 
 
 def _too_large(case: Case, partition: Partition) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""Running Snakemake in a store: it starts the stages that are missing and ends with this process; its output."""
+"""Snakemake in a store: starting it, ending it with this process, and reading its output."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from reflowshock.workflow.jobs.executor import Executor
 from reflowshock.workflow.process.terminal import console
 from reflowshock.workflow.store.folders import RunFolderBusy
 
-# How Snakemake says that a job failed: its message ends where the command, advice or the next entry begins.
+# Failure entries of Snakemake: the message ends where the command, advice or the next entry begins.
 FAILED = re.compile(r"^Error in (?:rule|group) .*?(?=^Error in |^\[|\Z)", re.MULTILINE | re.DOTALL)
 MESSAGE = re.compile(
     r"^\s+message: (?P<why>.*?)\s*(?:sbatch call:|For further error details|\n    \w+:)", re.MULTILINE | re.DOTALL
@@ -21,7 +21,7 @@ OUTPUT = re.compile(r"^\s+output: (?P<mark>\S+)", re.MULTILINE)
 
 
 SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
-SAID = "batch/snakemake.txt"  # what Snakemake says, below the store
+SAID = "batch/snakemake.txt"  # output of Snakemake, relative to the store
 LAST_LINES = 12
 
 
@@ -32,22 +32,22 @@ def snakemake(
     lock: int,
     each_second: Callable[[], None] | None = None,
 ) -> bool:
-    """Run Snakemake to its end; it ends with this process, and all stages with it, which have time to clean up.
+    """Run Snakemake to its end; if this process ends first, Snakemake and all stages are ended in an orderly way.
 
-    No path of the user's is on its command line or in its rules: all are relative to the store, in which it works.
+    All paths on its command line and in its rules are relative to the store, its working directory.
 
     Args:
-        home: the store's own folder.
-        executor: where stages run.
-        arguments: further ones.
-        lock: what ``locked`` yields; Snakemake holds it, too.
-        each_second: called while it runs, and once more in the end.
+        home: folder of the store.
+        executor: executor of the stages.
+        arguments: additional arguments of Snakemake.
+        lock: file descriptor from ``locked``, inherited by Snakemake.
+        each_second: function called every second while Snakemake runs, and once at the end.
 
     Returns:
-        Whether all went well.
+        Whether all jobs succeeded.
 
     Raises:
-        RunFolderBusy: jobs of an earlier command are still at work in the store.
+        RunFolderBusy: jobs of an earlier command are still running in the store.
     """
     jobs = " ".join(executor.left_over(home))
     if jobs:
@@ -59,7 +59,7 @@ def snakemake(
         "--rerun-triggers", "mtime", "--rerun-incomplete", "--nolock", "--keep-going", *arguments,
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"} | executor.environment
-    tell = each_second or (lambda: None)
+    report_progress = each_second or (lambda: None)
     with (home / SAID).open("w") as said:
         process = subprocess.Popen(
             command, env=environment, cwd=home, stderr=said, start_new_session=True, pass_fds=(lock,)
@@ -68,7 +68,7 @@ def snakemake(
             while True:
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(1.0 if each_second else None)
-                tell()
+                report_progress()
                 if process.returncode is not None:
                     return process.returncode == 0
         except BaseException:
@@ -77,20 +77,20 @@ def snakemake(
 
 
 def last_words(home: Path) -> str:
-    """Return the last lines that Snakemake said."""
+    """Return the last lines of Snakemake's output."""
     path = home / SAID
     lines = path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
     return "\n".join(lines[-LAST_LINES:])
 
 
 class JobOutput:
-    """Follows the files that take what jobs say."""
+    """Reader that follows the log files of jobs."""
 
     def __init__(self, logs: Iterable[Path]) -> None:
         self._read = dict.fromkeys(logs, 0)
 
     def show(self) -> None:
-        """Print the lines that are new."""
+        """Print the lines that are new since the last call."""
         for path, done in self._read.items():
             if not path.is_file():
                 continue
@@ -104,18 +104,18 @@ class JobOutput:
 
 
 def failures_of(said: Path) -> dict[str, str]:
-    """Return what Snakemake says of jobs that failed without a word of their own, as those that Slurm has ended.
+    """Return Snakemake's messages about failed jobs that left no message, such as jobs ended by Slurm.
 
     Args:
         said: file with the output of Snakemake.
 
     Returns:
-        Name of the job -> why.
+        Message by name of the job.
     """
     text = said.read_text(encoding="utf-8", errors="replace") if said.is_file() else ""
-    found = {}
+    reasons = {}
     for entry in FAILED.findall(text):
         why, mark = MESSAGE.search(entry), OUTPUT.search(entry)
         if why is not None and mark is not None and why["why"] != "None":
-            found[Path(mark["mark"]).name] = why["why"]
-    return found
+            reasons[Path(mark["mark"]).name] = why["why"]
+    return reasons

@@ -1,4 +1,4 @@
-"""Where stages run: on this machine, or as jobs of a cluster; options of Snakemake for that, and how it is ended."""
+"""Executors of stages, on this machine or on a Slurm cluster: options for Snakemake, and how to end it."""
 
 import signal
 import subprocess
@@ -19,21 +19,21 @@ from reflowshock.workflow.pipeline.resources import MOST_CORES, stage_resources
 from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LAUNCHER, end_group
 
-LONGEST_END = 70.0  # seconds that Snakemake has to cancel its jobs
-JOBS = 20  # that may be queued or at work at a time, unless the user says how many
+LONGEST_END = 70.0  # time for Snakemake to cancel its jobs [s]
+JOBS = 20  # default limit of queued and running jobs
 
-Jobs = dict[str, dict[str, Any]]  # stage -> resources of its job, as Snakemake knows them
+Jobs = dict[str, dict[str, Any]]  # stage -> resources of its job, as Snakemake names them
 
 
 class ExecutorName(StrEnum):
-    """Where stages run."""
+    """Names of the executors."""
 
     LOCAL = "local"
     SLURM = "slurm"
 
 
 class Executor(Protocol):
-    """Where stages run, one of `Local`, `Slurm`."""
+    """Executor of stages, either ``Local`` or ``Slurm``."""
 
     @property
     def oversubscribe(self) -> bool:
@@ -41,32 +41,32 @@ class Executor(Protocol):
 
     @property
     def options(self) -> Sequence[str]:
-        """Options of Snakemake."""
+        """Command-line options of Snakemake."""
 
     @property
     def guard(self) -> Sequence[str]:
-        """What stands before Snakemake, and ends it should this process be killed."""
+        """Command prefix that ends Snakemake if this process is killed."""
 
     @property
     def environment(self) -> dict[str, str]:
-        """Variables that stages see."""
+        """Environment variables of the stages."""
 
     def jobs(self, case: Case) -> Jobs:
-        """Return what the job of each stage asks for; nothing where stages are no jobs."""
+        """Return the resources that the job of each stage requests; empty on this machine."""
 
     def left_over(self, folder: Path) -> list[str]:
-        """Return the jobs of an earlier command that are still at work in a folder."""
+        """Return the jobs of an earlier command that are still running in a folder."""
 
     def end(self, process: subprocess.Popen, folder: Path) -> None:
-        """End Snakemake, which works in a folder, and all that it started."""
+        """End Snakemake and all processes or jobs that it started in a folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """Stages are processes of this machine and end with the command.
+    """Executor that runs stages as processes of this machine, which end with the command.
 
     Attributes:
-        cores: that they may use.
+        cores: number of cores for all stages.
         oversubscribe: whether MPI may have more ranks than cores.
     """
 
@@ -77,15 +77,15 @@ class Local:
 
     @property
     def options(self) -> Sequence[str]:
-        """Cores that may be used."""
+        """Option with the number of cores."""
         return ("--cores", str(self.cores))
 
     def jobs(self, case: Case) -> Jobs:
-        """No stage is a job."""
+        """Return an empty table: no stage is a job."""
         return {}
 
     def left_over(self, folder: Path) -> list[str]:
-        """Nothing outlives a command."""
+        """Return an empty list: no process outlives a command."""
         return []
 
     def end(self, process: subprocess.Popen, folder: Path) -> None:
@@ -95,12 +95,12 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Slurm:
-    """Stages are jobs of Slurm, submitted, watched and cancelled by Snakemake's own plugin.
+    """Executor that runs stages as Slurm jobs, submitted, monitored and cancelled by Snakemake's plugin.
 
     Attributes:
-        profile: of the cluster.
-        at_once: how many jobs may be queued or at work at a time.
-        largest: cores of the largest machine.
+        profile: profile of the cluster.
+        at_once: maximum number of queued and running jobs.
+        largest: number of cores of the largest node.
         oversubscribe: whether MPI may have more ranks than cores.
     """
 
@@ -108,34 +108,34 @@ class Slurm:
     at_once: int = JOBS
     largest: int = MOST_CORES
     oversubscribe: bool = False
-    # Interrupted, Snakemake cancels its jobs; in the background of a script it would ignore that.
+    # Snakemake cancels its jobs on SIGINT, which background processes of a script would ignore by default.
     guard: Sequence[str] = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
 
     @property
     def environment(self) -> dict[str, str]:
-        """What starts MPI ranks in the jobs."""
+        """Variable with the launcher of MPI ranks in the jobs."""
         return {LAUNCHER: self.profile.launcher}
 
     @property
     def options(self) -> Sequence[str]:
-        """The profile, and how many jobs there may be."""
+        """Options with the profile and the number of jobs."""
         profile = str(self.profile.folder.resolve())
         jobs = ("--executor", "slurm", "--jobs", str(self.at_once), "--workflow-profile", profile)
         return (*jobs, "--nocolor", "--quiet", "progress", "host")
 
     def jobs(self, case: Case) -> Jobs:
-        """What ``plan`` predicts, with a margin."""
-        wanted = stage_resources(case, self.profile.walltime_factor, self.largest)
-        return {stage: resources.of_rule(self.profile.launcher) for stage, resources in wanted.items()}
+        """Return the predicted resources with the margin of the profile."""
+        stages = stage_resources(case, self.profile.walltime_factor, self.largest)
+        return {stage: resources.of_rule(self.profile.launcher) for stage, resources in stages.items()}
 
     def left_over(self, folder: Path) -> list[str]:
-        """Those that Slurm knows; none where it does not answer."""
+        """Return the jobs known to Slurm, or an empty list if it does not answer."""
         with suppress(NoAnswer):
             return jobs_in(folder)
         return []
 
     def end(self, process: subprocess.Popen, folder: Path) -> None:
-        """Interrupt Snakemake, which cancels its jobs at once, but may wait long before it ends; leave no job."""
+        """Interrupt Snakemake, which then cancels its jobs; end it after ``LONGEST_END`` and cancel remaining jobs."""
         process.send_signal(signal.SIGINT)
         deadline = time.monotonic() + LONGEST_END
         while process.poll() is None and time.monotonic() < deadline and self.left_over(folder):
@@ -147,17 +147,17 @@ class Slurm:
 def executor_for(
     name: ExecutorName, profile: Path | None, at_once: int | None, oversubscribe: bool, cases: Sequence[Case]
 ) -> Local | Slurm:
-    """Return where stages run, when it is known that they can.
+    """Return the executor of the stages after checking that it is available.
 
     Args:
-        name: where.
-        profile: folder of the cluster's profile; None for the default one.
-        at_once: cores of this machine, or jobs, that may be used at a time; None for all cores, ``JOBS`` jobs.
+        name: name of the executor.
+        profile: folder of the cluster profile; None for the default profile.
+        at_once: maximum number of cores (local) or jobs (Slurm); None for all cores or ``JOBS`` jobs.
         oversubscribe: whether MPI may have more ranks than cores.
-        cases: that are to be run.
+        cases: cases to run.
 
     Raises:
-        CaseError: jobs cannot be submitted here, or a case asks for more than there is.
+        CaseError: jobs cannot be submitted here, or a case is too large for the cluster.
     """
     if name == ExecutorName.SLURM:
         chosen = read_profile(profile)

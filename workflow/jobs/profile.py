@@ -1,4 +1,4 @@
-"""The profile of a cluster: a folder with the options of Snakemake that its users set once."""
+"""Profile of a cluster: a folder with Snakemake options that users set once."""
 
 import shlex
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import MOST_BYTES, fault_of
 
-OWN = Path("profiles/slurm")  # of the user, below the working directory
+OWN = Path("profiles/slurm")  # the user's profile, relative to the working directory
 SHIPPED = Path(__file__).parents[1] / "profiles/slurm"
 FILE = "config.yaml"
 KEYS = ("launcher", "walltime_factor")
@@ -21,13 +21,13 @@ KEYS = ("launcher", "walltime_factor")
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What the program takes from a profile; Snakemake reads the rest of its file.
+    """Values of a cluster profile that the program uses; Snakemake reads the rest of the file.
 
     Attributes:
-        folder: of the file.
-        partition: where jobs go; empty: the cluster's default.
-        launcher: what starts MPI ranks within a job, as a command line.
-        walltime_factor: by which the time that jobs ask for is longer.
+        folder: folder of the file.
+        partition: partition of the jobs; empty for the default of the cluster.
+        launcher: command line that starts MPI ranks within a job.
+        walltime_factor: factor on the requested wall time.
     """
 
     folder: Path
@@ -40,10 +40,10 @@ def read_profile(folder: Path | None) -> Profile:
     """Read a profile.
 
     Args:
-        folder: of the profile; None for ``profiles/slurm`` where the user has one, else that of the program.
+        folder: folder of the profile; None for the user's ``profiles/slurm`` or, if missing, the shipped one.
 
     Raises:
-        CaseError: there is no such file, it cannot be read, or a value in it is not possible.
+        CaseError: the file is missing or unreadable, or a value is invalid.
     """
     folder = folder or (OWN if (OWN / FILE).is_file() else SHIPPED)
     path = folder / FILE
@@ -83,10 +83,10 @@ def _factor(path: Path, value: object) -> float:
 
 
 def _table(path: Path, table: object, key: str) -> Mapping[str, Any]:
-    found = table.get(key, {}) if isinstance(table, dict) else None
-    if not isinstance(found, dict):
+    value = table.get(key, {}) if isinstance(table, dict) else None
+    if not isinstance(value, dict):
         raise _wrong(path, Problem(key, "must be a table of keys and values", None, "lines KEY: VALUE"))
-    return found
+    return value
 
 
 def _wrong(path: Path, problem: Problem) -> CaseError:

@@ -13,7 +13,7 @@ from reflowshock.parameters import changed
 from reflowshock.particles.parameters.solder import Reflow, Solder
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
-from reflowshock.workflow.case.toml_file import beside
+from reflowshock.workflow.case.toml_file import resolved_path
 from reflowshock.workflow.package import given_surfaces
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ class BoardDropCase(PackageCase, BoardFittings):
         """Take surfaces and the shock's table as relative to the folder of the case file."""
         shock = table.get("shock")
         if isinstance(shock, dict) and isinstance(shock.get("table"), str):
-            shock["table"] = beside(folder, shock["table"])
+            shock["table"] = resolved_path(folder, shock["table"])
         return super().located(table, folder)
 
     @property

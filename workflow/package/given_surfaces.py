@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.names import nearest
 from reflowshock.problem import Problem
-from reflowshock.workflow.case.toml_file import beside
+from reflowshock.workflow.case.toml_file import resolved_path
 
 if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
@@ -22,7 +22,7 @@ def located(table: dict, folder: Path) -> dict:
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):
         for name, path in surfaces.items():
-            surfaces[name] = beside(folder, path) if isinstance(path, str) else path
+            surfaces[name] = resolved_path(folder, path) if isinstance(path, str) else path
     return table
 
 

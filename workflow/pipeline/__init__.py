@@ -1,1 +1,1 @@
-"""Reading a case and running its stages: the gate, one stage after the other, the report."""
+"""Pipeline of a case: reading, checks before a run, stages, report."""

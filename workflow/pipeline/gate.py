@@ -1,8 +1,8 @@
-"""The gate: what is checked of a case before anything is computed, and asked before anything that takes long.
+"""Checks of a case before a run (the gate), and confirmation of long runs.
 
-Every file that a case names is read before anything runs. Values that are not plausible need ``--force``, more ranks
-than cores ``--oversubscribe``, more than a predicted hour ``--yes`` in scripts. A case that does not fit into memory is
-refused.
+All input files are read before anything runs. Implausible values need ``--force``, more ranks than cores need
+``--oversubscribe``, and runs predicted to take more than an hour need ``--yes`` in scripts. Cases that do not fit into
+memory are rejected.
 """
 
 import resource
@@ -24,42 +24,42 @@ from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.environment import available_cores
 
-LONG = 3600.0  # seconds of a run before which its user is asked
-LARGEST_FILE = 100_000_000  # bytes of a file that a case names
-LARGEST_MEMORY = 1e15  # bytes; beyond it a case is for no machine
+LONG = 3600.0  # predicted wall time above which the user must confirm a run [s]
+LARGEST_FILE = 100_000_000  # limit on input files [B]
+LARGEST_MEMORY = 1e15  # limit on the memory of a case on any machine [B]
 CGROUPS = Path("/sys/fs/cgroup")
 UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """What a user allows: a case that is larger than this machine, values that are not plausible."""
+    """Exceptions granted by the user: cases larger than this machine, implausible values."""
 
     oversubscribe: bool = False
     force: bool = False
 
 
 def problems_of(case: Case, leave: Leave) -> list[Problem]:
-    """Find why a case whose values are valid, each for itself, cannot be run; the cheapest checks first."""
+    """Return the problems of a case whose individual values are valid; the cheapest checks run first."""
     with np.errstate(all="ignore"):
         try:
             return _values(case, leave) or kind_of(case).problems(case) or list(too_large(case, leave))
         except CaseError as error:
             return error.problems
-        except (ArithmeticError, ValueError, MemoryError) as error:  # beyond what floats can tell
-            return [Problem("", f"has values that cannot be computed with: {error or type(error).__name__}")]
+        except (ArithmeticError, ValueError, MemoryError) as error:  # outside the range of floats
+            return [Problem("", f"has values outside the range of the computation: {error or type(error).__name__}")]
 
 
 def _values(case: Case, leave: Leave) -> list[Problem]:
-    """Find ranks that there are not, values and tables that are not plausible, files that cannot be read."""
-    found = [] if leave.oversubscribe else list(too_many_ranks(case))
-    found += [] if leave.force else list(implausible(case))
-    found += unreadable_files(case)
-    return found if found or leave.force else list(implausible_tables(case))
+    """Return problems with the number of ranks, implausible values and tables, and unreadable files."""
+    problems = [] if leave.oversubscribe else list(too_many_ranks(case))
+    problems += [] if leave.force else list(implausible(case))
+    problems += unreadable_files(case)
+    return problems if problems or leave.force else list(implausible_tables(case))
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:
-    """Find files that a case names and that are not there, or none that can be read whole."""
+    """Yield a problem for each input file that is missing, unreadable or too large."""
     for key, path in case.files.items():
         fault = fault_of(path, LARGEST_FILE)
         if fault:
@@ -67,7 +67,7 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
-    """Find out whether a case asks for more MPI ranks than there are cores."""
+    """Yield a problem for each key that requests more MPI ranks than this machine has cores."""
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
@@ -76,7 +76,7 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
-    """Find out whether a case needs more memory than this machine has, or, with leave, than any machine."""
+    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed)."""
     needed, leave = needed_memory(case), leave or Leave()
     if leave.force:
         return
@@ -95,7 +95,7 @@ def needed_memory(case: Case) -> float:
 
 
 def machine_memory() -> float:
-    """Return the memory [B] that a new process of this user may have: free, of its control group, of ulimit -v."""
+    """Return the memory available to a new process [B]: minimum of free memory, control groups and ulimit -v."""
     limits = [*_free_memory(), *_group_memory()]
     soft = resource.getrlimit(resource.RLIMIT_AS)[0]
     if soft != resource.RLIM_INFINITY:
@@ -104,19 +104,19 @@ def machine_memory() -> float:
 
 
 def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
-    """Ask before a run that takes long.
+    """Ask the user to confirm a long run.
 
     Args:
-        name: of what is to be run.
-        seconds: its predicted wall time.
-        yes: whether the answer is known.
-        console: where to ask.
+        name: name of the run.
+        seconds: predicted wall time [s].
+        yes: whether the user has already agreed.
+        console: console for the question.
 
     Returns:
-        Whether to run.
+        Whether the run may start.
 
     Raises:
-        CaseError: there is nobody to ask.
+        CaseError: the console is not interactive.
     """
     if yes or seconds <= LONG:
         return True
@@ -127,10 +127,10 @@ def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
 
 
 def bytes_text(number: float) -> str:
-    """Write a number of bytes with two digits."""
+    """Format a number of bytes with two digits."""
     size, unit = next(((size, unit) for size, unit in UNITS if number >= size), UNITS[-1])
-    shown = number / size
-    return f"{shown:.2g} {unit}" if shown < 100.0 or shown >= 1e6 else f"{shown:.0f} {unit}"
+    figure = number / size
+    return f"{figure:.2g} {unit}" if figure < 100.0 or figure >= 1e6 else f"{figure:.0f} {unit}"
 
 
 def _free_memory() -> Iterator[float]:
@@ -144,7 +144,7 @@ def _free_memory() -> Iterator[float]:
 
 
 def _group_memory() -> Iterator[float]:
-    """Yield what the control groups of this process, and those around them, leave to it (versions 2 and 1)."""
+    """Yield the memory left in each enclosing control group of this process (versions 2 and 1) [B]."""
     try:
         groups = [line.split(":", 2) for line in Path("/proc/self/cgroup").read_text().splitlines()]
     except OSError:
@@ -159,7 +159,7 @@ def _group_memory() -> Iterator[float]:
 
 
 def _left(folder: Path) -> Iterator[float]:
-    """Yield what a control group leaves; files that are only cached do not count."""
+    """Yield the memory left in a control group, where cached files do not count as used [B]."""
     for limit, used, cached in (
         ("memory.max", "memory.current", "inactive_file"),
         ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
@@ -168,5 +168,5 @@ def _left(folder: Path) -> Iterator[float]:
             most, taken = float((folder / limit).read_text()), float((folder / used).read_text())
             stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
             yield max(0.0, most - taken + float(stat.get(cached, 0.0)))
-        except (OSError, ValueError):  # there is no such limit, or it is "max"
+        except (OSError, ValueError):  # no limit, or "max"
             continue

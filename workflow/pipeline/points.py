@@ -1,4 +1,4 @@
-"""Points of a study read and checked; the case of a run folder read back."""
+"""Reading the points of a study, and the case of a run folder."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -16,25 +16,25 @@ from reflowshock.workflow.store.store import CASE
 
 
 class PointsError(CaseError):
-    """Points that must not run, each with everything that is wrong with it."""
+    """Invalid points of a study, each with all its problems."""
 
     def __init__(self, source: str, impossible: Mapping[int, CaseError], settings: Sequence[Mapping[str, str]]) -> None:
-        """Take the file, what is wrong with a point, by its place in the list, and the settings of all."""
+        """Store the file, the errors by index of the point, and the settings of all points."""
         self.impossible = impossible
         self.settings = settings
         super().__init__(source, [problem for error in impossible.values() for problem in error.problems])
 
     def lines(self) -> list[str]:
-        """One line a problem, with the first point that has it, and how many others have."""
-        places: dict[str, list[int]] = {}
-        for place, error in self.impossible.items():
+        """Return one line per problem with its first point and the number of further points."""
+        numbers: dict[str, list[int]] = {}
+        for number, error in self.impossible.items():
             for line in error.lines():
-                places.setdefault(line.removeprefix(f"{SETTING}: "), []).append(place)
-        return [f"{self._told(those)}: {line}" for line, those in places.items()]
+                numbers.setdefault(line.removeprefix(f"{SETTING}: "), []).append(number)
+        return [f"{self._location(numbers_of_line)}: {line}" for line, numbers_of_line in numbers.items()]
 
-    def _told(self, places: Sequence[int]) -> str:
-        others = f" and {len(places) - 1} more" if len(places) > 1 else ""
-        return f"{self.source}: point {places[0] + 1} ({settings_text(self.settings[places[0]])}){others}"
+    def _location(self, numbers: Sequence[int]) -> str:
+        others = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
+        return f"{self.source}: point {numbers[0] + 1} ({settings_text(self.settings[numbers[0]])}){others}"
 
 
 def read_possible_points(
@@ -44,30 +44,30 @@ def read_possible_points(
 
     Args:
         case: TOML file.
-        settings: of each point, dotted key -> value, as text for ``--set``.
-        oversubscribe: whether more MPI ranks than cores are welcome.
-        force: whether values that are not plausible are welcome.
+        settings: for each point, values as text by dotted key.
+        oversubscribe: whether more MPI ranks than cores are allowed.
+        force: whether implausible values are allowed.
 
     Returns:
-        The points that can be, and what is wrong with the others, by place in the list.
+        The valid points, and the errors of the others by index in ``settings``.
     """
     points: list[Point] = []
     impossible: dict[int, CaseError] = {}
-    for place, chosen in enumerate(settings):
+    for number, values in enumerate(settings):
         try:
-            points.append(Point(chosen, read_case(case, overrides(chosen), oversubscribe, force)))
+            points.append(Point(values, read_case(case, overrides(values), oversubscribe, force)))
         except CaseError as error:
-            impossible[place] = error
+            impossible[number] = error
     return points, impossible
 
 
 def overrides(settings: Mapping[str, str]) -> list[str]:
-    """Write settings as ``--set`` takes them."""
+    """Return settings in the form of ``--set`` arguments."""
     return [f"{key}={value}" for key, value in settings.items()]
 
 
 def settings_text(settings: Mapping[str, str]) -> str:
-    """Write settings for a reader."""
+    """Return settings as readable text."""
     return ", ".join(f"{key} = {value}" for key, value in settings.items()) or "the case as it is"
 
 
@@ -75,7 +75,7 @@ def read_case_of_run(folder: Path) -> Case:
     """Return the case of a run folder.
 
     Raises:
-        CaseError: there is none, or it is damaged.
+        CaseError: the folder is not a run folder, or its case is damaged.
     """
     path = folder / CASE
     try:

@@ -1,4 +1,4 @@
-"""Reading a case file: its kind, by the table that only this kind has, every value converted and checked."""
+"""Case file reader: detects the kind by its characteristic table, converts and checks every value."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,26 +17,26 @@ from reflowshock.workflow.kinds import kind_named_in
 from reflowshock.workflow.pipeline import gate
 from reflowshock.workflow.pipeline.gate import Leave
 
-SETTING = "--set"  # where a value is from that an option gives
+SETTING = "--set"  # origin of overridden values in error messages
 
 
 def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = False, force: bool = False) -> Case:
-    """Read and check a case file, and every file that it names: what it returns can be run.
+    """Read and check a case file and all its input files, so that the case can run.
 
     Args:
         path: TOML file.
-        overrides: "dotted.key=value" settings, applied over the file and its scale; values are TOML, quotes may be
-            left out.
-        oversubscribe: whether more MPI ranks than cores are welcome, and more memory than this machine has: the case
-            is for other machines, or not to be run.
-        force: whether values that are not plausible are welcome where they can be computed with.
+        overrides: "dotted.key=value" settings that override the file and its scale; values are TOML, quotes may be
+            omitted.
+        oversubscribe: whether more MPI ranks than cores and more memory than this machine has are allowed, e.g. for
+            cases that run elsewhere.
+        force: whether implausible values are allowed.
 
     Returns:
         The case, every value checked.
 
     Raises:
-        CaseError: with all problems found, each with its place: syntax, names, units, ranges, geometry that cannot be,
-            files that cannot be read, sizes that this machine cannot hold.
+        CaseError: with all problems and their positions: syntax, names, units, ranges, impossible geometry, unreadable
+            files, too large models.
     """
     text = read_text(path)
     table = parse_toml(str(path), text)
@@ -48,7 +48,7 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
 
 
 def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: dict[str, Origin], leave: Leave) -> Case:
-    """Return the case of a table; its origins are noted; errors as ``read_case``, without their places."""
+    """Return the case of a table and record origins of overridden keys; errors have no positions yet."""
     problems: list[Problem] = []
     origins |= _override(table, overrides, problems)
     try:
@@ -70,7 +70,7 @@ def _checked_case(path: Path, table: dict, overrides: Sequence[str], origins: di
 
 
 def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) -> dict[str, Origin]:
-    """Write the values of the chosen scale, then overrides, into a table; return where each key was given."""
+    """Write the values of the chosen scale, then overrides, into a table; return the origin of each key."""
     settings = [_setting(override, problems) for override in overrides]
     scales, chosen = take_scales(table, problems), table.get("scale", FULL)
     chosen = next((value for key, value in reversed(settings) if key == "scale"), chosen)
@@ -84,7 +84,7 @@ def _override(table: dict, overrides: Sequence[str], problems: list[Problem]) ->
 
 
 def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
-    """Return key and value of an override; what is not one is its own key, and a problem."""
+    """Return key and value of an override; add a problem if it has no valid key or value."""
     key, equals, text = override.partition("=")
     key, value = key.strip(), override_value(text.strip())
     if not equals or not is_key(key):
@@ -95,7 +95,7 @@ def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
 
 
 def set_value(table: dict, path: list[str], value: object) -> bool:
-    """Write a value at a path of names; False where the path leads through a value."""
+    """Set a value in nested tables; return False if the path leads through a value that is not a table."""
     for name in path[:-1]:
         table = table.setdefault(name, {})
         if not isinstance(table, dict):

@@ -1,4 +1,4 @@
-"""report.html and summary.json of a run, from its products: nothing is computed here that a product holds."""
+"""Report of a run: report.html and summary.json, assembled from the products without new computations."""
 
 import base64
 import json
@@ -24,34 +24,34 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
     """Write ``report.html`` and ``summary.json``.
 
     Args:
-        run_folder: folder of the run; stages that have not run are left out of the page.
+        run_folder: folder of the run; stages without a product are omitted from the page.
         case: the resolved case.
-        folder: where they are written.
+        folder: output folder.
 
     Returns:
         The summary.
     """
-    summary, known = _concluded(run_folder, case)
+    summary, errors = _concluded(run_folder, case)
     write_summary(folder, summary)
-    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary, known))
+    write_page(folder / "report.html", "report.html.j2", _context(run_folder, case, summary, errors))
     return summary
 
 
 def moving_scene(run_folder: Path, case: Case) -> Scene | None:
-    """Return the first scene of a run's report that moves: the drop, else the solder; None where nothing moves yet."""
+    """Return the first animated scene of a report: the drop, otherwise the solder; None without animation."""
     scenes = _context(run_folder, case, *_concluded(run_folder, case))["scenes"]
-    found = (scenes[name] for name in ("view", "body") if name in scenes)
-    return next((scene for scene in found if len(scene.frames) > 1), None)
+    candidates = (scenes[name] for name in ("view", "body") if name in scenes)
+    return next((scene for scene in candidates if len(scene.frames) > 1), None)
 
 
 def _concluded(run_folder: Path, case: Case) -> tuple[dict, Discretisation]:
-    """Return the summary of a run with its conclusion, and the errors of its figures."""
-    summary, known = collect_summary(run_folder, case), discretisation(run_folder, case)
-    kind_of(case).conclude(run_folder, case, summary, known)
-    return summary, known
+    """Return the summary of a run with its conclusions, and its discretisation errors."""
+    summary, errors = collect_summary(run_folder, case), discretisation(run_folder, case)
+    kind_of(case).conclude(run_folder, case, summary, errors)
+    return summary, errors
 
 
-def _context(run_folder: Path, case: Case, summary: dict, known: Discretisation) -> dict:
+def _context(run_folder: Path, case: Case, summary: dict, errors: Discretisation) -> dict:
     context = {
         "case": case.case,
         "version": summary["version"],
@@ -67,7 +67,7 @@ def _context(run_folder: Path, case: Case, summary: dict, known: Discretisation)
             "effects": report_table(case, summary["effects"]),
             "versions": tables.versions(),
         },
-        "discretisation": known,
+        "discretisation": errors,
         "warnings": summary.get("warnings", []),
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
         "missed": [name.replace("_", " ") for name, check in summary["health"].items() if not check["ok"]],
@@ -94,7 +94,7 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
 
     Returns:
         The contents of ``summary.json``: case, version, inputs_sha256, metrics, timings [s], effects, health.
-        A stage that has not run contributes nothing.
+        Stages without a product contribute nothing.
     """
     summary: dict[str, Any] = {
         "case": case.case.name,
@@ -112,13 +112,13 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
         summary["timings"][stage] = record["seconds"]
         for key in ("metrics", "health"):
             summary[key].update(record[key])
-        for name, effect in record["effects"].items():  # the shock has a gravity of its own
+        for name, effect in record["effects"].items():  # e.g. gravity, which reflow and shock both have
             summary["effects"][f"{name}_in_the_{stage}" if name in summary["effects"] else name] = effect
     return summary
 
 
 def write_summary(folder: Path, summary: dict) -> None:
-    """Write ``summary.json`` under a temporary name, then rename it."""
+    """Write ``summary.json`` atomically."""
     partial = folder / ".summary.json.partial"
     partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     partial.rename(folder / "summary.json")

@@ -1,4 +1,4 @@
-"""What the job of each stage asks a cluster for: ranks, cores, memory, time; as `plan` predicts, with a margin."""
+"""Resources of cluster jobs per stage: ranks, cores, memory and time, from the prediction of `plan` and a margin."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -6,20 +6,20 @@ from math import ceil
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.kinds import kind_of
 
-# Short and serial: they run beside the command, not as jobs.
+# Short serial stages, which run in the command instead of a job.
 WITH_COMMAND = ("comparison", "report")
-MOST_CORES = 16  # of a reflow by processes, which share a machine
+MOST_CORES = 16  # for a reflow with processes on one node
 MEGABYTES, MEGABYTES_OF_PROCESS = 1500, 500  # interpreter, Snakemake, libraries
-MINUTES, MARGIN = 10, 3.0  # of the walltime: to start and compile, over the forecast
+MINUTES, MARGIN = 10, 3.0  # wall time: constant part for start and compilation, factor on the forecast
 
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a job asks for.
+    """Resources that a job requests.
 
     Attributes:
         tasks: MPI ranks.
-        cpus_per_task: cores of each.
+        cpus_per_task: cores per rank.
         mem_mb: memory on each node [MB].
         runtime: walltime [min].
     """
@@ -30,10 +30,10 @@ class Resources:
     runtime: int
 
     def of_rule(self, launcher: str) -> dict[str, int | str]:
-        """Return the resources as Snakemake knows them.
+        """Return the resources under the names of Snakemake.
 
         Args:
-            launcher: what starts MPI ranks.
+            launcher: command that starts MPI ranks.
         """
         mpi = {"mpi": launcher} if self.tasks > 1 else {}
         return {
@@ -46,20 +46,20 @@ class Resources:
 
 
 def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_CORES) -> dict[str, Resources]:
-    """Predict what the jobs of a case need.
+    """Predict the resources of the jobs of a case.
 
     Args:
         case: the case.
-        walltime_factor: by which they are given more time.
-        cores: of the largest machine.
+        walltime_factor: factor on the wall time.
+        cores: number of cores of the largest node.
 
     Returns:
-        Stage -> resources, of those stages that are jobs.
+        Resources by name of the stage, for stages that are jobs.
     """
     size = kind_of(case).size(case)
     ranks = {"shock": case.ranks, "reflow": case.ranks_by_key.get("reflow.ranks", 1)}
     threads = {"reflow": max(1, min(size.joints, cores, MOST_CORES))} if ranks["reflow"] == 1 else {}
-    found = {}
+    resources = {}
     for stage in case.pipeline.names:
         if stage in WITH_COMMAND:
             continue
@@ -69,5 +69,5 @@ def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_
             seconds /= min(tasks * cpus, size.joints)
         memory = MEGABYTES + MEGABYTES_OF_PROCESS * tasks * cpus + 1e-6 * size.memory
         runtime = walltime_factor * (MINUTES + MARGIN * seconds / 60.0)
-        found[stage] = Resources(tasks, cpus, ceil(memory), ceil(runtime))
-    return found
+        resources[stage] = Resources(tasks, cpus, ceil(memory), ceil(runtime))
+    return resources

@@ -1,4 +1,4 @@
-"""JSON schema of the case file, in which a quantity is a string with its unit."""
+"""JSON schema of the case file, where quantities are strings with units."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -15,7 +15,7 @@ from reflowshock.workflow.case.names import NAME
 from reflowshock.workflow.kinds import KINDS
 
 SCALES = {
-    "description": "values, by dotted keys, that replace those of the file where its scale is chosen",
+    "description": "values by dotted keys, which replace values of the file if this scale is selected",
     "type": "object",
     "propertyNames": {"pattern": NAME},
     "additionalProperties": {"type": "object"},
@@ -24,10 +24,10 @@ SCALES = {
 
 @cache
 def case_schema() -> dict:
-    """Return the JSON schema (draft 2020-12) of a case file: that of any kind. All callers share it."""
+    """Return the JSON schema (draft 2020-12) of case files of all kinds; the result is cached, do not modify it."""
     kinds: list[dict] = []
     definitions: dict = {}
-    for kind in (one.case for one in KINDS):
+    for kind in (record.case for record in KINDS):
         schema = _with_own_names(_kind_schema(kind), kind.kind, definitions)
         definitions |= schema.pop("$defs")
         schema["properties"]["scales"] = SCALES
@@ -41,16 +41,16 @@ def case_schema() -> dict:
 
 
 def _with_own_names(schema: dict, kind: str, taken: dict) -> dict:
-    """Put the kind before the names of its definitions, if another kind has one of them for something else."""
-    own = schema["$defs"]
-    if all(taken.get(name, definition) == definition for name, definition in own.items()):
+    """Prefix the names of definitions with the kind if another kind defines one of them differently."""
+    definitions = schema["$defs"]
+    if all(taken.get(name, definition) == definition for name, definition in definitions.items()):
         return schema
-    renamed = _replaced(schema, {f"#/$defs/{name}": f"#/$defs/{kind}.{name}" for name in own})
+    renamed = _replaced(schema, {f"#/$defs/{name}": f"#/$defs/{kind}.{name}" for name in definitions})
     return renamed | {"$defs": {f"{kind}.{name}": definition for name, definition in renamed["$defs"].items()}}
 
 
 def _replaced(node: Any, texts: dict[str, str]) -> Any:
-    """Replace texts wherever they stand as values."""
+    """Replace texts in all values of a nested structure."""
     if isinstance(node, dict):
         return {key: _replaced(value, texts) for key, value in node.items()}
     if isinstance(node, list):
@@ -67,13 +67,13 @@ def _kind_schema(kind: type[Case]) -> dict:
                 _add_range_and_default(properties["properties"][name], quantity, field)
             if holds_named_tables(field):
                 properties["properties"][name]["propertyNames"] = {"pattern": NAME}
-    # Defaults of whole tables would be repeated in SI floats; each field has its own.
+    # Defaults of whole tables would repeat the defaults of their fields as SI floats.
     _drop_table_defaults(schema)
     return schema
 
 
 def _add_range_and_default(schema: dict, quantity: Quantity, field: FieldInfo) -> None:
-    """Add to the schema of a quantity what its annotation does not know: which values it may have, and has."""
+    """Add description with range, and default, to the schema of a quantity."""
     schema["description"] = f"{quantity.described}; {allowed(field)}"
     if field.default in (PydanticUndefined, None):
         schema.pop("default", None)

@@ -1,4 +1,4 @@
-"""Running one stage: a fresh partial folder, a record of what was used and found, a rename when all is there."""
+"""Stage runner: runs a stage in a partial folder, records inputs and results, and publishes the product."""
 
 import resource
 import time
@@ -18,20 +18,20 @@ from reflowshock.workflow.store.store import MESSAGE, TRACEBACK, reads
 
 
 def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> dict:
-    """Run a stage; its product appears at once and complete, or not at all.
+    """Run a stage; its complete product is published atomically.
 
     Args:
         name: name of the stage.
-        function: writes products into the given folder and returns what it found.
-        run: what the stage works with.
-        product: the folder that its product becomes; one that is there is replaced.
+        function: stage function, which writes products into a folder and returns findings.
+        run: input of the stage.
+        product: folder of the product; an existing one is replaced.
 
     Returns:
         The record: seconds, core_seconds, forecast, machine, metrics, health, effects, continued, key, inputs, reads,
         files.
 
     Raises:
-        StageError: a file that the case names has changed since the command began, or a product was not written.
+        StageError: an input file has changed since the start of the command, or a product is missing.
     """
     stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
     before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}
@@ -61,18 +61,18 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
 
 
 def _reads(run: Run, stage: Stage) -> dict[str, str | None]:
-    return reads({one.name: run.folder / one.name for one in run.case.pipeline.stages}, run.case, stage)
+    return reads({name: run.folder / name for name in run.case.pipeline.names}, run.case, stage)
 
 
 def _check_key(run: Run, stage: Stage, inputs: dict, key: str) -> None:
-    """See to it that what a stage finds is what its product is named after, when the command began."""
+    """Raise if the inputs of a stage no longer match the key of its product."""
     follows = [(read_record(run.folder / name) or {}).get("key") for name in stage.follows]
     if None not in follows and product_key(run.case, stage, inputs, follows) != key:
         raise StageError("a file of the case or the program itself has changed since the command started; run it again")
 
 
 def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
-    """See to it that what a stage has used is still so, and that it has written what it is to write."""
+    """Raise if inputs have changed during the stage, or products are missing."""
     changed = compare(before["inputs"], stage_inputs(run.case, stage))
     if changed:
         names = ", ".join(change.key.removesuffix(".sha256") for change in changed)
@@ -85,23 +85,23 @@ def _check(run: Run, stage: Stage, before: dict, partial: Path) -> None:
 
 
 def core_seconds() -> float:
-    """Processor time [s] of this process and of all that it started on this machine and that have ended.
+    """Return the processor time of this process and its ended children on this machine [s].
 
-    Those are workers of a pool and, through the launcher that waits for them, MPI ranks; not ranks elsewhere.
+    This includes pool workers and local MPI ranks, but not ranks on other machines.
     """
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(one.ru_utime + one.ru_stime for one in used)
+    return sum(usage.ru_utime + usage.ru_stime for usage in used)
 
 
 def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool:
-    """Run a stage and tell the user how it ended, if it did well.
+    """Run a stage and print its result, or write its error message to the work folder.
 
     Returns:
-        Whether it completed. If not, ``.<stage>.partial`` of the run folder has the traceback and the message.
+        Whether the stage completed. If not, traceback and message are in ``.<stage>.partial`` of the run folder.
     """
     try:
         record = run_stage(name, function, run, product)
-    except Exception as error:  # the boundary of a stage: whatever went wrong is reported with the stage's name
+    except Exception as error:  # any error is reported with the name of the stage
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         _write_message(name, run.folder / f".{name}.partial", error)
@@ -111,7 +111,7 @@ def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool
 
 
 def _write_message(name: str, folder: Path, error: Exception) -> None:
-    """Leave traceback and message for the command, which tells the user; say it at once where they cannot be."""
+    """Write traceback and message for the command, which reports them; print the message if this fails."""
     message = describe_error(error, folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Writing a case file: every parameter, its value, its default and its range."""
+"""Case file writer: every parameter with value, default and range."""
 
 import json
 import textwrap
@@ -32,14 +32,14 @@ COMMENT_COLUMN = 44
 HEADER = """\
 #:schema reflowshock.schema.json
 # Case "{name}", from the template "{template}".
-# Every parameter is here, but for the constants of materials that have a name. A quantity is a string with a unit, any
-# unit of its dimension ("0.48 mm", "480 um").
-# Tables named "numerics" say how something is computed, all others what. Lines that repeat a default can be removed.
+# All parameters are listed, except constants of library materials. A quantity is a string with any unit of its
+# dimension ("0.48 mm", "480 um").
+# Tables named "numerics" contain solver settings, all others the model. Lines that repeat a default can be removed.
 """
 
 
 def templates() -> dict[str, Path]:
-    """Return the cases that a new one can start from: name -> case file."""
+    """Return the paths of the shipped case files by name."""
     return {path.parent.name: path for path in sorted(CASES.glob("*/case.toml"))}
 
 
@@ -48,33 +48,33 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
 
     Args:
         name: name of the case.
-        template: name of the case whose values are taken.
-        folder: where to write.
+        template: name of the shipped case to copy.
+        folder: output folder.
 
     Returns:
         The path of the file.
 
     Raises:
-        CaseError: the name is not valid, the template does not exist, or the file does.
+        CaseError: the name is invalid, the template does not exist, or the file exists already.
     """
-    known = templates()
-    if template not in known:
-        choice, hint = "one of " + ", ".join(known), nearest(template, known)
+    cases = templates()
+    if template not in cases:
+        choice, hint = "one of " + ", ".join(cases), nearest(template, cases)
         raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
     if not is_name(name):
         raise CaseError("new", [wrong_name("NAME", name)])
     path = folder / f"{name}.toml"
     if path.exists():
         raise CaseError("new", [Problem("NAME", f"{path} exists already", name)])
-    case = read_case(known[template], [f"case.name='{name}'"], oversubscribe=True)
-    scales = scales_text(take_scales(read_toml(known[template]), []))
+    case = read_case(cases[template], [f"case.name='{name}'"], oversubscribe=True)
+    scales = scales_text(take_scales(read_toml(cases[template]), []))
     path.write_text("\n".join([case_text(case, template), *scales]), encoding="utf-8")
     write_schema(folder)
     return path
 
 
 def write_schema(folder: Path) -> None:
-    """Write the JSON schema that new case files name in their first line, by which editors help, beside them."""
+    """Write the JSON schema to the folder of a new case file, where editors use it for completion."""
     (folder / "reflowshock.schema.json").write_text(json.dumps(case_schema(), indent=2), encoding="utf-8")
 
 
@@ -86,17 +86,17 @@ def case_text(case: Case, template: str) -> str:
 
 
 def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
-    """Append a table's block, then those of the tables in it."""
+    """Append the block of a table, then the blocks of its subtables."""
     lines, tables, absent = [], [], []
     for name, field in type(parameters).model_fields.items():
         value = getattr(parameters, name)
-        if known := _library_name(value, field):
-            remark = f" # a name of the library, or a table; default {_library_name(field.default, field)}"
-            lines.append(f'{name} = "{known}"'.ljust(COMMENT_COLUMN) + remark)
+        if library_name := _library_name(value, field):
+            remark = f" # name of the library, or a table; default {_library_name(field.default, field)}"
+            lines.append(f'{name} = "{library_name}"'.ljust(COMMENT_COLUMN) + remark)
         elif isinstance(value, BaseModel):
             tables.append((f"{key}.{name}".lstrip("."), value))
         elif holds_named_tables(field) and not models_of(field):
-            lines.append(f"{name} = {{ {', '.join(f'{own} = {as_toml(item)}' for own, item in value.items())} }}")
+            lines.append(f"{name} = {{ {', '.join(f'{kind} = {as_toml(item)}' for kind, item in value.items())} }}")
         elif holds_named_tables(field):
             tables += [(f"{key}.{name}.{own_name}".lstrip("."), table) for own_name, table in value.items()]
         elif value is None and models_of(field):
@@ -107,19 +107,19 @@ def _add_table(blocks: list[str], key: str, parameters: BaseModel) -> None:
     if header or lines:
         blocks.append("\n".join([*header, *lines, ""]))
     blocks.extend(absent)
-    own = getattr(parameters, "kind", "")
-    for name, table in sorted(tables, key=lambda item: item[0] not in ("case", own)):
+    kind = getattr(parameters, "kind", "")
+    for name, table in sorted(tables, key=lambda item: item[0] not in ("case", kind)):
         _add_table(blocks, name, table)
 
 
 def _library_name(value: object, field: FieldInfo) -> str | None:
-    """Return the name of a material of the library, which says more than its constants."""
+    """Return the library name of a material, or None for other values."""
     choices = next((item.choices for item in field.metadata if isinstance(item, ByName)), {})
     return next((name for name, material in choices.items() if material == value), None)
 
 
 def _absent_table(key: str, model: type[BaseModel]) -> str:
-    """Describe a table that is not given, commented out."""
+    """Return an absent table as comments."""
     lines, tables = [], []
     for name, field in model.model_fields.items():
         value = None if field.is_required() else field.get_default()
@@ -157,7 +157,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _describe(model: type[BaseModel], before: str = "") -> list[str]:
-    """Comment lines from a model's docstring, ReST marks taken out."""
+    """Return comment lines from the docstring of a model, without ReST marks."""
     if model is Title:
         return []
     text = before + " ".join((model.__doc__ or "").replace("``", "").split())

@@ -1,7 +1,7 @@
-"""What this process and all that it starts need around them: text in UTF-8, places to write to, no MPI job of others.
+"""Process environment: UTF-8 text, writable folders, resource limits, and isolation from an outer MPI job.
 
-Containers have no home, clusters a home that cannot be written to, scripts no locale: the libraries (Numba, FFCx,
-Matplotlib, Snakemake, Open MPI) each fail in their own way then. Here it is mended for all of them, once.
+Containers without a home, clusters with a read-only home and scripts without a locale make the libraries (Numba, FFCx,
+Matplotlib, Snakemake, Open MPI) fail in various ways. This module corrects the environment once for all of them.
 """
 
 import os
@@ -20,25 +20,25 @@ from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 
 UTF8 = "PYTHONUTF8"
 OUTPUT_ENCODING = "PYTHONIOENCODING"
-ESCAPES = "backslashreplace"  # what an encoding does not have is written out
-# The number of ranks, and the own one, as Open MPI, MPICH and Slurm's PMI say them.
+ESCAPES = "backslashreplace"  # characters missing in an encoding are written as escapes
+# Variables with the number of ranks and the own rank: Open MPI, then MPICH and Slurm's PMI.
 RANKS = (("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"), ("PMI_SIZE", "PMI_RANK"))
-# Folders that the libraries take from a variable, else from a place below the home.
-PLACES = {
+# Variables of user folders, and the default subfolders of the home.
+USER_FOLDERS = {
     "XDG_CACHE_HOME": ".cache", "XDG_CONFIG_HOME": ".config", "XDG_DATA_HOME": ".local/share",
     "XDG_STATE_HOME": ".local/state",
 }  # fmt: skip
-TEMPORARY = ("/tmp", "/var/tmp", "/dev/shm")  # where no variable names a folder
-LAST_WORD = 3.0  # s: what a rank that says nothing leaves to the first one
+TEMPORARY = ("/tmp", "/var/tmp", "/dev/shm")  # used if no variable names a folder
+RANK_DELAY = 3.0  # time that the other ranks leave to the first one for its message [s]
 DEFAULTS = {
-    # PETSc would end a command whose reader has gone, or a stage whose structure was killed, before it can say so.
+    # The signal handler of PETSc would end the process before it can report its error.
     "PETSC_OPTIONS": "-no_signal_handler",
-    # A thread for each core would take memory that is limited, for products of small matrices.
+    # One thread per core would waste memory on products of small matrices.
     "OPENBLAS_NUM_THREADS": "1",
     "PATH": os.defpath,
 }
-# Limits of the shell below which nothing runs: a small case needs 1.4 GB of addresses, 24 files, 4 MB of MPI's own.
-LEAST = (
+# Limits of the shell below which nothing runs: a small case needs 1.4 GB of addresses, 24 files, 4 MB for MPI.
+MINIMUM_LIMITS = (
     (resource.RLIMIT_AS, 2_000_000_000, "only {:.3g} MB of memory may be used (ulimit -v), {:g} MB are needed"),
     (
         resource.RLIMIT_FSIZE,
@@ -46,16 +46,16 @@ LEAST = (
         "only files of {:.3g} MB may be written (ulimit -f), {:g} MB are needed",
     ),
 )
-LEAST_FILES = 64
-WANTED_FILES = 4096
-LEAST_THREADS, AMPLE_THREADS = 24, 1000
+MINIMUM_FILES = 64
+TARGET_FILES = 4096
+MINIMUM_THREADS, AMPLE_THREADS = 24, 1000
 
 
 class EnvironmentProblem(RuntimeError):
-    """The program cannot work where it was started."""
+    """Unsuitable environment, such as a resource limit that is too small."""
 
     def __init__(self, message: str, exit_code: int = 1, silent: bool = False) -> None:
-        """Take what is wrong, with what the process ends, and whether another process says it."""
+        """Store message and exit code; silent if another process prints the message."""
         super().__init__(message)
         self.exit_code, self.silent = exit_code, silent
 
@@ -64,7 +64,7 @@ def prepare() -> None:
     """Complete the environment of this process; heavy libraries must not be loaded yet.
 
     Raises:
-        EnvironmentProblem: the program cannot work here.
+        EnvironmentProblem: the environment is unsuitable.
     """
     check_ranks(os.environ)
     check_limits()
@@ -73,9 +73,9 @@ def prepare() -> None:
 
 
 def begin_again_in_utf8() -> None:
-    """Replace this process by the same one in Python's UTF-8 mode, where the locale has another encoding.
+    """Restart this process in Python's UTF-8 mode if the locale has another encoding.
 
-    Names of files, arguments and texts then are the same everywhere. Only the terminal keeps its own encoding.
+    File names, arguments and texts are then independent of the locale. Only the terminal keeps its encoding.
     """
     if sys.flags.utf8_mode or sys.getfilesystemencoding() == "utf-8" or os.environ.get(UTF8) == "1":
         return
@@ -86,7 +86,7 @@ def begin_again_in_utf8() -> None:
 
 
 def write_any_text() -> None:
-    """Let standard output and error write any text, in escapes where their encoding does not have it."""
+    """Make standard output and error write characters missing in their encoding as escapes."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -94,65 +94,65 @@ def write_any_text() -> None:
 
 
 def complete(environment: MutableMapping[str, str]) -> None:
-    """Add what is missing to an environment, for this process and its children; twice is as once.
+    """Complete an environment for this process and its children; repeated calls change nothing.
 
     Raises:
-        EnvironmentProblem: nowhere can a temporary file be written.
+        EnvironmentProblem: no folder for temporary files is writable.
     """
-    own = without_mpi_job(environment)
-    for name in set(environment) - set(own):
+    cleaned = without_mpi_job(environment)
+    for name in set(environment) - set(cleaned):
         del environment[name]
     environment[UTF8] = "1"
     for name, value in DEFAULTS.items():
         environment.setdefault(name, value)
     if "DISPLAY" not in environment:
-        # VTK would look for an X server first, and complain.
+        # VTK would otherwise look for an X server and print warnings.
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    give_places(environment)
+    set_writable_folders(environment)
     choose_kernel_folder(environment)
 
 
 def check_ranks(environment: Mapping[str, str]) -> None:
-    """Refuse to be started on several ranks: each would do all the work, in the same folder.
+    """Raise if the command was started on several MPI ranks, each of which would do all the work.
 
     Raises:
-        EnvironmentProblem: it was; the first rank says so, while the others wait: Open MPI 5 ends all ranks, heard or
-            not, as soon as one has failed.
+        EnvironmentProblem: there are several ranks. The first rank prints the message while the others wait, because
+            Open MPI 5 ends all ranks as soon as one has failed.
     """
     for size, rank in RANKS:
         count = environment.get(size, "")
         if count.isdigit() and int(count) > 1:
             is_first = environment.get(rank, "0") == "0"
             if not is_first:
-                time.sleep(LAST_WORD)
+                time.sleep(RANK_DELAY)
             message = f"started on {count} MPI ranks; start it without mpirun, it starts its own ranks"
             raise EnvironmentProblem(message, 2, silent=not is_first)
 
 
 def check_limits() -> None:
-    """Refuse to work within limits of the shell that are too small, since libraries end in their own ways then.
+    """Raise if a limit of the shell is too small, since libraries would fail without a clear message.
 
     Raises:
         EnvironmentProblem: a limit is too small.
     """
-    for number, least, message in LEAST:
+    for number, least, message in MINIMUM_LIMITS:
         soft, _ = resource.getrlimit(number)
         if soft != resource.RLIM_INFINITY and soft < least:
             raise EnvironmentProblem(message.format(soft / 1e6, least / 1e6))
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = WANTED_FILES if hard == resource.RLIM_INFINITY else min(hard, WANTED_FILES)
+    most = TARGET_FILES if hard == resource.RLIM_INFINITY else min(hard, TARGET_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
         soft = most
-    if soft != resource.RLIM_INFINITY and soft < LEAST_FILES:
-        raise EnvironmentProblem(f"only {soft} files may be open (ulimit -n), at least {LEAST_FILES} are needed")
+    if soft != resource.RLIM_INFINITY and soft < MINIMUM_FILES:
+        raise EnvironmentProblem(f"only {soft} files may be open (ulimit -n), at least {MINIMUM_FILES} are needed")
     soft, _ = resource.getrlimit(resource.RLIMIT_NPROC)
-    if soft != resource.RLIM_INFINITY and soft < AMPLE_THREADS and not _can_start(LEAST_THREADS):
-        raise EnvironmentProblem(f"{LEAST_THREADS} more processes or threads cannot be started (ulimit -u {soft})")
+    if soft != resource.RLIM_INFINITY and soft < AMPLE_THREADS and not _can_start(MINIMUM_THREADS):
+        raise EnvironmentProblem(f"{MINIMUM_THREADS} more processes or threads cannot be started (ulimit -u {soft})")
 
 
 def _can_start(count: int) -> bool:
-    """Return whether some threads can be started beside all that this user has: by starting them."""
+    """Return whether a number of threads can be started in addition to the user's processes, by trying it."""
     over = threading.Event()
     threads = [threading.Thread(target=over.wait) for _ in range(count)]
     started = []
@@ -169,64 +169,64 @@ def _can_start(count: int) -> bool:
     return True
 
 
-def give_places(environment: MutableMapping[str, str]) -> None:
-    """Name folders that can be written to, where those of the user cannot.
+def set_writable_folders(environment: MutableMapping[str, str]) -> None:
+    """Replace folders of the user that are not writable by private temporary folders.
 
     Args:
-        environment: HOME stays where it can be read, TMPDIR, MPLCONFIGDIR and ``PLACES`` where they can be written to.
+        environment: Variables to correct. A readable HOME and writable TMPDIR, MPLCONFIGDIR and ``USER_FOLDERS`` stay.
 
     Raises:
-        EnvironmentProblem: nowhere can a temporary file be written.
+        EnvironmentProblem: no folder for temporary files is writable.
     """
     temporary = temporary_folder(environment)
     home = environment.get("HOME") or _home_of_user()
     if not os.path.isdir(home) or not os.access(home, os.R_OK | os.X_OK):
         home = str(private_folder(temporary))
     environment["HOME"] = home
-    for name, place in PLACES.items():
-        given = environment.get(name)
-        if not (can_write(Path(given), make=True) if given else _can_hold(Path(home, place))):
-            folder = private_folder(temporary) / place
+    for name, subfolder in USER_FOLDERS.items():
+        folder_of_user = environment.get(name)
+        if not (can_write(Path(folder_of_user), make=True) if folder_of_user else _can_hold(Path(home, subfolder))):
+            folder = private_folder(temporary) / subfolder
             folder.mkdir(parents=True, exist_ok=True)
             environment[name] = str(folder)
-    given = environment.get("MPLCONFIGDIR")
-    if given and not can_write(Path(given), make=True):
+    folder_of_user = environment.get("MPLCONFIGDIR")
+    if folder_of_user and not can_write(Path(folder_of_user), make=True):
         del environment["MPLCONFIGDIR"]
 
 
 def temporary_folder(environment: MutableMapping[str, str]) -> Path:
-    """Return where temporary files go, and name it to children where it is not what they would take.
+    """Return a writable folder for temporary files and set TMPDIR if children would choose another one.
 
     Raises:
-        EnvironmentProblem: nowhere can a file be written.
+        EnvironmentProblem: no folder is writable.
     """
     named = [environment[name] for name in ("TMPDIR", "TEMP", "TMP") if environment.get(name)]
-    tried = [*named, *TEMPORARY]
-    found = next((folder for folder in tried if can_write(Path(folder))), None)
-    if found is None:
-        raise EnvironmentProblem(f"no folder for temporary files can be written to; tried: {', '.join(tried)}")
-    if found != (named or TEMPORARY)[0]:
-        environment["TMPDIR"] = found
-        tempfile.tempdir = None  # what this process has found before
-    return Path(found)
+    candidates = [*named, *TEMPORARY]
+    writable = next((folder for folder in candidates if can_write(Path(folder))), None)
+    if writable is None:
+        raise EnvironmentProblem(f"no folder for temporary files can be written to; tried: {', '.join(candidates)}")
+    if writable != (named or TEMPORARY)[0]:
+        environment["TMPDIR"] = writable
+        tempfile.tempdir = None  # clears the cached choice of this process
+    return Path(writable)
 
 
 def private_folder(temporary: Path) -> Path:
-    """Return a folder for temporary files of this user alone, the same each time, so that what is compiled is kept."""
+    """Return a private temporary folder of this user, always the same so that compiled code is reused."""
     folder = temporary / f"reflowshock-{os.getuid()}"
     with suppress(OSError):
         folder.mkdir(mode=0o700)
     try:
-        found = folder.lstat()
+        info = folder.lstat()
     except OSError:
-        found = None
-    if found is not None and stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
+        info = None
+    if info is not None and stat.S_ISDIR(info.st_mode) and info.st_uid == os.getuid() and not info.st_mode & 0o022:
         return folder
-    return Path(tempfile.mkdtemp(prefix="reflowshock-", dir=temporary))  # somebody else has made it
+    return Path(tempfile.mkdtemp(prefix="reflowshock-", dir=temporary))  # created by another user
 
 
 def can_write(folder: Path, make: bool = False) -> bool:
-    """Return whether a file can be written in a folder: by writing one, since rights alone do not tell."""
+    """Return whether a file can be written in a folder, by trying it, since permissions alone are not sufficient."""
     try:
         if make:
             folder.mkdir(parents=True, exist_ok=True)
@@ -240,13 +240,13 @@ def can_write(folder: Path, make: bool = False) -> bool:
 
 
 def _can_hold(folder: Path) -> bool:
-    """Return whether files can be written in a folder, or it can be made, in the nearest one that is there."""
-    nearest = next(one for one in (folder, *folder.parents) if os.path.lexists(one))
+    """Return whether a folder, or its nearest existing parent, is writable."""
+    nearest = next(path for path in (folder, *folder.parents) if os.path.lexists(path))
     return can_write(nearest)
 
 
 def _home_of_user() -> str:
-    """Return the home that the system knows of this user; nothing where it knows none."""
+    """Return the home of this user from the password database, or an empty string."""
     import pwd
 
     try:

@@ -1,4 +1,4 @@
-"""One run of the package fem: input file, MPI run, progress."""
+"""Launch of the package fem: input file, MPI run, progress."""
 
 import json
 import logging
@@ -19,13 +19,13 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     """Run the package fem on the MPI ranks of the case, showing its progress.
 
     Args:
-        run: case, cores.
-        folder: where its products go; made here.
-        request: what it reads as input, but for ``output``.
-        title: what the user sees.
+        run: case and cores.
+        folder: folder of the products, created here.
+        request: contents of the input file except ``output``.
+        title: title of the progress bar.
 
     Raises:
-        LaunchError: the run failed; the message has its last words.
+        LaunchError: the run failed; the message contains its last output.
     """
     folder.mkdir()
     path = folder / "input.json"
@@ -37,13 +37,13 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
 
 
 def _patience(request: dict) -> float:
-    """Return how long a rank may be stopped [s]: a little longer than ranks wait, which can tell more of it."""
+    """Return how long a rank may be stopped [s]: slightly longer than the ranks' own watchdog, which reports more."""
     model = request.get("shock") or request.get("dynamics") or {}
     return float(model.get("numerics", {}).get("watchdog_seconds", PATIENCE)) + AFTER_THE_RANKS
 
 
 def _pass_on(line: str, progress: Callable[[float], None]) -> None:
-    """Show how far a run is, or what it warns of, if a line of its output says so."""
+    """Show the progress or the warning in a line of output."""
     if line.startswith('{"progress"'):
         progress(json.loads(line)["progress"])
     if line.startswith('{"warning"'):

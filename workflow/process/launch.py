@@ -1,4 +1,4 @@
-"""Launching MPI programs: command line, lines of output, a clean end whatever happens, also of stopped processes."""
+"""Launch of MPI programs: command line, lines of output, and an orderly end, also of stopped processes."""
 
 import os
 import shlex
@@ -15,22 +15,22 @@ from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.fem.parallel.status_board import ERROR
 from reflowshock.workflow.process.error_exit import describe_text
 
-PATIENCE = 60.0  # [s] that a process may be stopped
-TICK = 1.0  # [s] between two looks
+PATIENCE = 60.0  # how long a process may be stopped [s]
+TICK = 1.0  # interval between two checks [s]
 STOPPED = "T"
 RANK = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")  # variables with the number of an MPI rank
 PROC = Path("/proc")
 
 
 class StoppedProcesses:
-    """Looks, while its block lasts, whether a process or one of its descendants is stopped; kills those that stay so.
+    """Watchdog that kills a process and its descendants if they stay stopped (SIGSTOP) while its block runs.
 
     Attributes:
-        message: which it was and how long, in words; empty before that.
+        message: Message with the killed processes; empty before that.
     """
 
     def __init__(self, process: int, patience: float = PATIENCE) -> None:
-        """Take the process id, and how long one may be stopped [s]."""
+        """Store the process id and the time that a process may be stopped [s]."""
         self.message = ""
         self._process, self._patience = process, patience
         self._over = threading.Event()
@@ -41,17 +41,17 @@ class StoppedProcesses:
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Look no longer."""
+        """End the watchdog thread."""
         self._over.set()
         self._thread.join()
 
     def _watch(self) -> None:
-        """Count looks, not seconds: while all is stopped, this one included, nobody waits."""
-        looks: dict[int, int] = {}
+        """Check periodically; count checks, not seconds, since this process may be stopped, too."""
+        checks: dict[int, int] = {}
         tick = min(TICK, self._patience / 4)
         while not self._over.wait(tick):
-            looks = {process: looks.get(process, 0) + 1 for process in stopped(self._process)}
-            late = [process for process, count in looks.items() if count * tick > self._patience]
+            checks = {process: checks.get(process, 0) + 1 for process in stopped(self._process)}
+            late = [process for process, count in checks.items() if count * tick > self._patience]
             if late:
                 names = " and ".join(name(process) for process in late)
                 self.message = f"{names} had been stopped (SIGSTOP) for {self._patience:g} s, so the run was ended"
@@ -61,7 +61,7 @@ class StoppedProcesses:
 
 
 def stopped(root: int) -> list[int]:
-    """Return the processes that are stopped, of one and all that it started, directly or not."""
+    """Return the stopped processes among a process and its descendants."""
     parents: dict[int, int] = {}
     halted = []
     for folder in PROC.iterdir():
@@ -85,31 +85,31 @@ def _descends(process: int, root: int, parents: dict[int, int]) -> bool:
 
 
 def name(process: int) -> str:
-    """Return the name of a process in words: that of an MPI rank, where it is one."""
+    """Return the name of a process for messages, with its MPI rank if it has one."""
     with suppress(OSError):
         variables = (PROC / str(process) / "environ").read_bytes().split(b"\0")
-        known = dict(os.fsdecode(one).partition("=")[::2] for one in variables)
-        number = next((known[key] for key in RANK if key in known), None)
+        environment = dict(os.fsdecode(variable).partition("=")[::2] for variable in variables)
+        number = next((environment[key] for key in RANK if key in environment), None)
         if number is not None:
             return f"rank {number} (process {process})"
     return f"process {process}"
 
 
-GRACE = 5.0  # seconds that a program has to end by itself after SIGTERM
+GRACE = 5.0  # time for a program to end after SIGTERM [s]
 TRACEBACK = "Traceback (most recent call last):"
-TOLD = "error: "  # begins what a program says of an error that it knows
+ERROR_PREFIX = "error: "  # prefix of the error messages of the program
 LAST_LINES = 15
-LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable: what starts MPI ranks, e.g. "srun --mpi=pmix" within a job of Slurm
+LAUNCHER = "REFLOWSHOCK_MPI_LAUNCHER"  # variable with the MPI launcher, e.g. "srun --mpi=pmix" within a Slurm job
 MPIRUN = "mpirun"
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}  # of a rank
-# Open MPI binds the ranks of each run to the first cores, so that runs side by side would share these.
+# Open MPI binds the ranks of each run to the first cores, which simultaneous runs would share.
 UNBOUND = ("--bind-to", "none")
-QUIET = ("--mca", "orte_execute_quiet", "1")  # of Open MPI 4; 5 has no option --quiet, and lets this one pass
+QUIET = ("--mca", "orte_execute_quiet", "1")  # for Open MPI 4; Open MPI 5 ignores it
 
-# In front of a command: the system sends the signal when the process that starts it ends, however that happens.
+# Command prefixes: the system sends the signal when the parent process ends for any reason.
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")
-# Options of env: Open MPI would take a stage that is a step of Slurm for one of the ranks that srun starts.
+# Options of env: Open MPI would mistake a stage within a Slurm step for a rank started by srun.
 OWN_STEP = "-u SLURM_STEPID -u SLURM_STEP_ID"
 ENDINGS: dict[int, str] = {
     signal.SIGKILL: "was killed, probably because memory ran out",
@@ -121,11 +121,11 @@ ENDINGS: dict[int, str] = {
 
 
 class LaunchError(RuntimeError):
-    """A launched program ended with an error; the message has its last words."""
+    """Error end of a launched program; the message contains its last output."""
 
 
 def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list[str]:
-    """Return the command that starts a program on a number of MPI ranks: by Open MPI, or by what ``LAUNCHER`` says.
+    """Return the command that starts a program on MPI ranks, with Open MPI or the launcher in ``LAUNCHER``.
 
     Args:
         ranks: number of MPI ranks.
@@ -149,16 +149,16 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     Args:
         command: program and arguments.
         on_line: called with each line of standard output.
-        log: file that takes standard error; a program may say in ``ERROR`` beside it, too, why it ended.
-        patience: how long one of its processes may be stopped [s]; all are ended then.
+        log: file for standard error; a program may also explain its end in the file ``ERROR`` of the same folder.
+        patience: how long a process may be stopped [s] before the program is ended.
 
     Raises:
-        LaunchError: the program cannot be started, its exit code is not 0, or one of its processes was stopped.
+        LaunchError: the program is missing, its exit code is not 0, or one of its processes was stopped.
     """
     program = command[0]
     if shutil.which(program) is None:
         raise LaunchError(f"{program} is not installed")
-    # What it writes is read here, not on a terminal: in UTF-8, whatever the terminal has.
+    # The output is read here, not on a terminal: always in UTF-8.
     environment = without_mpi_job(os.environ) | ONE_THREAD | {"PYTHONIOENCODING": "utf-8:backslashreplace"}
     with log.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
@@ -192,13 +192,13 @@ def _read(path: Path) -> list[str]:
 
 
 def error_of(lines: Sequence[str]) -> str:
-    """Return what a program says of an error that it knows, from the last line that begins so; nothing without one."""
-    begins = [k for k, line in enumerate(lines) if line.startswith(TOLD)]
-    return "\n".join(lines[begins[-1] :]).removeprefix(TOLD) if begins else ""
+    """Return the message that follows the last ``ERROR_PREFIX`` in the output of a program, or an empty string."""
+    begins = [k for k, line in enumerate(lines) if line.startswith(ERROR_PREFIX)]
+    return "\n".join(lines[begins[-1] :]).removeprefix(ERROR_PREFIX) if begins else ""
 
 
 def without_traceback(text: str, log: Path) -> str:
-    """Return what a program says without the way through its code, which stays in its log: where, and what it was."""
+    """Replace the traceback in an error message by its last line and the path of the log."""
     before, traceback, after = text.partition(TRACEBACK)
     if not traceback:
         return text
@@ -208,7 +208,7 @@ def without_traceback(text: str, log: Path) -> str:
 
 
 def ending(code: int) -> str:
-    """Say how a program ended, from its exit code: below 0 or above 128 by a signal."""
+    """Describe how a program ended, from its exit code: below 0 or above 128 by a signal."""
     number = -code if code < 0 else code - 128
     if number in ENDINGS:
         return ENDINGS[number]
@@ -216,7 +216,7 @@ def ending(code: int) -> str:
 
 
 def end_group(process: subprocess.Popen) -> None:
-    """End a program that leads a process group, with all that it started; by force after ``GRACE`` seconds."""
+    """End the process group of a program with SIGTERM, and with SIGKILL after ``GRACE`` seconds."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGTERM)
     try:

@@ -1,4 +1,4 @@
-"""How far a stage is, in a file that a second terminal reads: what goes on, the share that is done, since when."""
+"""Progress of a stage in a file, which ``status`` reads in a second terminal."""
 
 import json
 import os
@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 NAME = "progress.json"
-INTERVAL = 1.0  # s between two writes
-VARIABLE = "REFLOWSHOCK_PROGRESS"  # names the file, for what a stage starts, too
+INTERVAL = 1.0  # interval between two writes [s]
+VARIABLE = "REFLOWSHOCK_PROGRESS"  # path of the file, inherited by the processes of a stage
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a stage is.
+    """Progress of a stage.
 
     Attributes:
-        what: in words.
-        share: 0 to 1.
-        seconds: since it began.
+        what: current activity.
+        share: completed share, 0 to 1.
+        seconds: time since the start of the activity [s].
     """
 
     what: str
@@ -29,41 +29,41 @@ class Progress:
 
     @property
     def left(self) -> float | None:
-        """Seconds that it takes from now on, at the speed so far; none before there is one."""
+        """Predicted remaining time [s] at the average speed; None at share 0."""
         return self.seconds * (1.0 / self.share - 1.0) if self.share > 0.0 else None
 
 
 def tell_in(folder: Path) -> None:
-    """Let this process and what it starts tell their progress in a folder."""
+    """Write the progress of this process and its children to a folder."""
     os.environ[VARIABLE] = str((folder / NAME).resolve())
 
 
 def teller(what: str) -> Callable[[float, str], None]:
-    """Return what writes the progress of something that begins now; without ``tell_in`` it does nothing.
+    """Return a function that writes the progress of an activity starting now; without ``tell_in`` it does nothing.
 
-    A progress that cannot be written (a full device) is no reason to end.
+    Write errors (a full device) are ignored.
     """
     begin, last = time.time(), [0.0]
-    place = os.environ.get(VARIABLE)
+    path = os.environ.get(VARIABLE)
 
     def tell(share: float, text: str) -> None:
         now = time.time()
-        if place is None or (now - last[0] < INTERVAL and share > 0.0):
+        if path is None or (now - last[0] < INTERVAL and share > 0.0):
             return
         last[0] = now
-        partial = Path(f"{place}.partial")
+        partial = Path(f"{path}.partial")
         with suppress(OSError):
             partial.write_text(json.dumps({"what": text or what, "share": share, "begin": begin}), encoding="utf-8")
-            partial.replace(place)
+            partial.replace(path)
 
     tell(0.0, "")
     return tell
 
 
 def read_progress(folder: Path) -> Progress | None:
-    """Return how far the stage is that works in a folder; none where it has not said."""
+    """Return the progress of the stage that runs in a folder, or None if it has not written any."""
     try:
-        found = json.loads((folder / NAME).read_text(encoding="utf-8"))
-        return Progress(str(found["what"]), float(found["share"]), max(time.time() - float(found["begin"]), 0.0))
+        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        return Progress(str(content["what"]), float(content["share"]), max(time.time() - float(content["begin"]), 0.0))
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -1,6 +1,6 @@
-r"""What the user sees: one console that takes no text for markup, errors, tables, progress bars, health lines.
+r"""Terminal output: console without markup, errors, tables, progress bars, health lines.
 
-A title, a folder or a message may hold anything: brackets are shown as they are, control characters as ``\x1b``.
+Titles, paths and messages are printed literally: brackets stay as they are, control characters appear as ``\x1b``.
 """
 
 import os
@@ -21,53 +21,53 @@ from reflowshock.workflow.process.progress_file import teller
 REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
 
 
-# All that a terminal obeys (but for line end and tab), that turns the direction of text, or that no encoding has.
+# Control characters (except line end and tab), marks of text direction, and surrogates without an encoding.
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 PLACE = "{}"
-WIDTHS = {1: 100, 2: 200}  # of lines in a file or a pipe: what a report or a log can hold
+WIDTHS = {1: 100, 2: 200}  # line width in a file or a pipe
 
 
 def visible(text: str) -> str:
-    r"""Return a text whose control characters are written out, as ``\x1b``."""
-    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    r"""Return text with control characters written as escapes such as ``\x1b``."""
+    return CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def styled(template: str, *values: object) -> Text:
-    """Style the program's own words; each ``{}`` among them takes a value, which is no markup whatever it holds.
+    """Style a template with markup and insert values, which are never interpreted as markup.
 
     Args:
-        template: a constant with markup, as ``"[bold]{}[/] in {}"``.
-        values: in the order of their places.
+        template: constant with markup and one ``{}`` per value, such as ``"[bold]{}[/] in {}"``.
+        values: values in the order of their placeholders.
     """
     words = Text.from_markup(template, emoji=False)
-    ends = [end for found in re.finditer(re.escape(PLACE), words.plain) for end in found.span()]
+    ends = [end for match in re.finditer(re.escape(PLACE), words.plain) for end in match.span()]
     pieces = list(words.divide(ends))
-    for place, value in zip(range(1, len(pieces), 2), values, strict=True):
+    for position, value in zip(range(1, len(pieces), 2), values, strict=True):
         line = visible(str(value))
-        pieces[place] = Text(line, spans=[Span(0, len(line), span.style) for span in pieces[place].spans])
+        pieces[position] = Text(line, spans=[Span(0, len(line), span.style) for span in pieces[position].spans])
     return Text("").join(pieces)
 
 
 class Terminal(Console):
-    """A console that shows text as it is: no markup, no emoji, no colours but those of ``styled``, nothing obeyed."""
+    """Console that prints text literally: no markup, no emoji, no colours except those of ``styled``."""
 
     def __init__(self, descriptor: int = 1, **options: Any) -> None:
-        """Take standard output (1) or standard error (2); into a file or a pipe go no control sequences."""
-        shown = _is_terminal(descriptor)
-        width = None if shown else WIDTHS[descriptor]
-        defaults = {"stderr": descriptor == 2, "width": width, "force_terminal": shown}
+        """Open standard output (1) or standard error (2); files and pipes receive no control sequences."""
+        is_terminal = _is_terminal(descriptor)
+        width = None if is_terminal else WIDTHS[descriptor]
+        defaults = {"stderr": descriptor == 2, "width": width, "force_terminal": is_terminal}
         super().__init__(**defaults | options, markup=False, emoji=False, highlight=False)
 
     def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
-        """Print as ``Console.print``; lines that a file has as they are (``soft_wrap``) end on a terminal at words."""
+        """Print like ``Console.print``; with ``soft_wrap``, lines are wrapped at words on terminals only."""
         super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return a text, which is no markup, unless it is asked for, with its control characters visible."""
+        """Return text without markup (unless requested) and with visible control characters."""
         return super().render_str(visible(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Yield the segments of anything; what it obeys are those of rich alone."""
+        """Yield the segments of a renderable; only rich itself may emit control segments."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=visible(segment.text))
 
@@ -93,7 +93,7 @@ def print_error(text: str) -> None:
 
 @contextmanager
 def interruptible(what: str) -> Iterator[None]:
-    """End with exit code 1 on Ctrl-C, and say what is kept."""
+    """Exit with code 1 on Ctrl-C and print the given note."""
     try:
         yield
     except KeyboardInterrupt as error:
@@ -102,13 +102,13 @@ def interruptible(what: str) -> Iterator[None]:
 
 
 def health_line(stage: str, seconds: float, health: dict, continued: str = "") -> None:
-    """Print how a stage ended: its time, the checks that did not hold, or else the one closest to its limit.
+    """Print the result of a stage: time, failed checks, or otherwise the check closest to its limit.
 
     Args:
-        stage: its name.
-        seconds: its time.
-        health: check -> value, limit, ok.
-        continued: what continued from checkpoints, in words.
+        stage: name of the stage.
+        seconds: wall time of the stage [s].
+        health: value, limit and ok by name of the check.
+        continued: names of parts that continued from checkpoints, or empty.
     """
     failed = [name for name, result in health.items() if not result["ok"]]
     mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
@@ -116,7 +116,7 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = ", ".join(_against_limit(name, health[name]) for name in failed)
     elif health:
         closest = max(health, key=lambda name: _closeness(health[name]))
-        checks = f"{len(health)} checks hold" if len(health) > 1 else "1 check holds"
+        checks = f"{len(health)} checks passed" if len(health) > 1 else "1 check passed"
         text = f"{checks}; closest: {_against_limit(closest, health[closest])}"
     else:
         text = "done"
@@ -132,26 +132,26 @@ def _against_limit(name: str, result: dict) -> str:
 
 
 def _closeness(result: dict) -> float:
-    """How near a value that holds is to its limit, which it may exceed or fall below: 1 is at the limit."""
+    """Return the ratio of a passing value and its limit, the smaller over the larger: 1 is at the limit."""
     smaller, larger = sorted((abs(result["value"]), abs(result["limit"])))
     return smaller / larger if larger > 0.0 else 0.0
 
 
 class ProgressBar(Protocol):
-    """Is called with how far something is."""
+    """Callback that updates a progress bar."""
 
     def __call__(self, share: float, text: str = "") -> None:
-        """Take the share that is done, 0 to 1, and what is going on, which stands in place of the description."""
+        """Set the completed share, 0 to 1, and a text that replaces the description."""
 
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[ProgressBar]:
-    """Show a bar with share, time spent and time left while something runs; it vanishes in the end.
+    """Show a transient progress bar with share, elapsed time and remaining time.
 
-    Where there is no terminal, only the description is printed. A second terminal sees it by ``status --follow``.
+    Without a terminal, only the description is printed. ``status --follow`` shows it in a second terminal.
 
     Yields:
-        What is called with the progress.
+        Callback that updates the bar.
     """
     columns = (
         TextColumn("  {task.description}", markup=False),
@@ -175,19 +175,19 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
 
 
 def text_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], remarks: bool = False) -> Table:
-    """Lay out rows of text; heads are broken into words, values are not: names and remarks in the last column are."""
-    shown = Table(title=title or None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
-    for place, name in enumerate(head):
-        last = remarks and place == len(head) - 1
-        justify: Literal["left", "right"] = "left" if last or place == 0 else "right"
-        shown.add_column(name.replace(" ", "\n"), no_wrap=not last and place > 0, justify=justify, overflow="fold")
+    """Return a table of text; column titles wrap at words, values only in the first column and in remarks."""
+    table = Table(title=title or None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    for column, name in enumerate(head):
+        last = remarks and column == len(head) - 1
+        justify: Literal["left", "right"] = "left" if last or column == 0 else "right"
+        table.add_column(name.replace(" ", "\n"), no_wrap=not last and column > 0, justify=justify, overflow="fold")
     for row in rows:
-        shown.add_row(*row)
-    return shown
+        table.add_row(*row)
+    return table
 
 
 def new_table(title: str, *columns: str) -> Table:
-    """Return an empty table; its last column takes what room is left."""
+    """Return an empty table whose last column takes the remaining width."""
     table = Table(title=title, title_justify="left", title_style="bold", expand=True, show_edge=False, pad_edge=False)
     for position, name in enumerate(columns):
         last = position == len(columns) - 1

@@ -1,10 +1,9 @@
-"""One store of stage products for runs, studies and accuracy; start with `store.py`, then `state.py` and `batch.py`.
+"""Store of stage products for runs, studies and accuracy tests; start with ``store.py``, then ``state.py``.
 
-keys.py     what a product depends on, as one digest: its key
-product.py  a product folder: sealed with the digests of its files, checked, published at once
-store.py    where products are, and where they are being made
-state.py    which products are there and intact, which have to be made and why
-view.py     a run folder: the products of one case under the names that users know
-folders.py  folders that are the program's: marked, locked, cleaned
-batch.py    making what is missing, by Snakemake (`engine.py`)
+keys.py     product key: digest of all inputs of a product
+product.py  product folder: sealed with the digests of its files, checked, published atomically
+store.py    paths of products and of unfinished work
+state.py    state of each product: intact, missing, stale or damaged, and why
+view.py     run folder: links to the products of one case under readable names
+folders.py  run folders: marked, locked, cleaned
 """

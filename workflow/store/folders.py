@@ -1,4 +1,4 @@
-"""Folders that are the program's own: marked as such, used by one command at a time, cleaned of what it has written."""
+"""Run folders: marked as the program's, locked by one command at a time, and cleaned of the program's files."""
 
 import fcntl
 import json
@@ -16,7 +16,7 @@ from reflowshock.workflow.store.store import HOME
 
 MARK = ".reflowshock.json"
 LOCK = ".lock"
-PARTIAL = ".reflowshock.partial"  # a mark that was being written when the program was killed
+PARTIAL = ".reflowshock.partial"  # an unfinished mark after a kill
 UNKNOWN = {"holds": "run", "name": "an unknown case (its mark is damaged)"}
 
 
@@ -25,16 +25,16 @@ class RunFolderBusy(RuntimeError):
 
 
 def check_folder(folder: Path, what: str, name: str, force: bool = False) -> None:
-    """See to it that a folder may be written into: it is empty or new, or the program's own for the same thing.
+    """Check that a folder is new, empty, or already used by the program for the same case or study.
 
     Args:
         folder: the folder.
-        what: it is to hold, such as "run".
-        name: of the case or study.
-        force: whether it may hold another case or study.
+        what: kind of content, such as "run".
+        name: name of the case or study.
+        force: whether the folder may contain another case or study.
 
     Raises:
-        CaseError: it is a file, has files of somebody else, or holds another case or study.
+        CaseError: the path is a file, or the folder contains foreign files or another case or study.
     """
     try:
         folder.lstat()
@@ -56,12 +56,12 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
             folder, "contains files that the program did not write", "an empty folder, or the name of a new one"
         )
     if mark is not None and (mark["holds"], mark["name"]) != (what, name) and not force:
-        held = f"holds the {mark['holds']} of {mark['name']}, not the {what} of {name}"
+        held = f"contains the {mark['holds']} of {mark['name']}, not the {what} of {name}"
         raise _refused(folder, held, "another folder, or --force")
 
 
 def read_mark(folder: Path) -> dict[str, str] | None:
-    """Return what a folder of the program's holds; None where it is none."""
+    """Return kind and name of the contents of a run folder, or None for other folders."""
     try:
         mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
         return {"holds": str(mark["holds"]), "name": str(mark["name"])}
@@ -73,20 +73,20 @@ def read_mark(folder: Path) -> dict[str, str] | None:
 
 @contextmanager
 def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
-    """Make a folder, mark it as the program's and hold its lock, which the system releases when this process ends.
+    """Create and mark a folder and hold its lock, which the system releases when this process ends.
 
     Args:
         folder: the folder.
-        what: it is to hold, such as "run".
-        name: of the case or study.
-        force: whether it may hold another case or study.
+        what: kind of content, such as "run".
+        name: name of the case or study.
+        force: whether the folder may contain another case or study.
 
     Yields:
         The file descriptor that holds the lock.
 
     Raises:
-        RunFolderBusy: another process holds it.
-        CaseError: the folder must not, or cannot be written into.
+        RunFolderBusy: another process holds the lock.
+        CaseError: the folder belongs to something else or is not writable.
     """
     check_folder(folder, what, name, force)
     try:
@@ -111,7 +111,7 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
 
 
 def is_busy(folder: Path) -> bool:
-    """Whether a process works in a folder."""
+    """Return whether a process holds the lock of a folder."""
     try:
         descriptor = os.open(folder / LOCK, os.O_RDONLY)
     except OSError:
@@ -126,10 +126,10 @@ def is_busy(folder: Path) -> bool:
 
 
 def remove_own(folder: Path) -> list[str]:
-    """Remove a folder's store, logs, mark and lock; and the folder, if nothing else is in it and nobody works in it.
+    """Remove store, logs, mark and lock of a folder, and the folder itself if it is then empty and not in use.
 
     Returns:
-        Names of what is left.
+        Names of the remaining entries.
     """
     if (folder / HOME).is_symlink():
         raise _refused(folder / HOME, "is a link", "a folder; remove the link yourself")
@@ -144,7 +144,7 @@ def remove_own(folder: Path) -> list[str]:
 
 
 def _remove_logs(folder: Path) -> None:
-    """Remove what the program wrote of its errors, and the folder if nothing else is in it."""
+    """Remove the program's error logs, and their folder if it is empty then."""
     if folder.is_symlink() or not folder.is_dir():
         return
     for path in folder.glob(f"{LOG}*.txt"):
@@ -164,17 +164,17 @@ def _mark(folder: Path, what: str, name: str) -> None:
 
 
 def _is_there(lock: Path, descriptor: int) -> bool:
-    """Whether a lock that is held is still the one that others would try to hold."""
+    """Return whether the open lock file is still the one in the folder."""
     with suppress(FileNotFoundError):
         return os.path.samestat(lock.stat(), os.fstat(descriptor))
     return False
 
 
 def _clear_store(folder: Path) -> None:
-    """Remove files that stand where folders of the store belong, in which only the program has written."""
+    """Remove files that occupy the paths of the store's folders, where only the program writes."""
     for name in ("", "products", "work", "views", ".snakemake"):
-        if (place := folder / HOME / name).is_file():
-            discard(place)
+        if (path := folder / HOME / name).is_file():
+            discard(path)
 
 
 def _refused(folder: Path, message: str, allowed: str) -> CaseError:

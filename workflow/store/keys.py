@@ -10,12 +10,12 @@ from reflowshock.workflow import __version__
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Stage
 
-DIGITS = 12  # hexadecimal: two of a million products are alike with a probability of 0.2 %
+DIGITS = 12  # hexadecimal: two of a million products collide with a probability of 0.2 %
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A parameter that has another value than when a product was made; SI values, None where it did not exist."""
+    """Changed parameter of a product: key, old and new SI value (None if the key did not exist)."""
 
     key: str
     old: object
@@ -23,21 +23,21 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the parameters that a stage depends on, as dotted key -> SI value; of files, also what they hold."""
+    """Return the parameters that a stage depends on, as dotted key -> SI value, and digests of its files."""
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
 
 def product_keys(case: Case) -> dict[str, str]:
-    """Return for each stage the key of its product: stages with equal keys have equal products.
+    """Return the product key of each stage; equal keys mean equal products.
 
-    It is a digest of the stage's own parameters, of those of all stages that it follows, and of the version. Names of
-    case and scale enter the report's only.
+    A key is a digest of the parameters of the stage and of all upstream stages, and of the program version. The names
+    of case and scale enter only the key of the report.
     """
-    found: dict[str, str] = {}
+    keys: dict[str, str] = {}
     for stage in case.pipeline.stages:
-        found[stage.name] = product_key(case, stage, stage_inputs(case, stage), [found[name] for name in stage.follows])
-    return found
+        keys[stage.name] = product_key(case, stage, stage_inputs(case, stage), [keys[name] for name in stage.follows])
+    return keys
 
 
 def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | None]) -> str:
@@ -45,9 +45,9 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
 
     Args:
         case: the case.
-        stage: whose product it is.
-        inputs: of the stage.
-        follows: keys of the products of the stages that it follows.
+        stage: stage that makes the product.
+        inputs: parameters of the stage, as returned by ``stage_inputs``.
+        follows: product keys of the stages that it follows.
     """
     content = {"version": __version__, "stage": f"{case.kind} {stage.name}", "inputs": inputs, "follows": follows}
     return digest_of(content)[:DIGITS]
@@ -59,12 +59,12 @@ def inputs_digest(case: Case) -> str:
 
 
 def digest_of(content: dict) -> str:
-    """Return the SHA-256 of a table, whatever the order of its keys."""
+    """Return the SHA-256 of a table, independent of the order of its keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def compare(old: dict, new: dict) -> tuple[Change, ...]:
-    """List the keys of which two sets of inputs differ, in the order of the new one."""
+    """List the keys whose values differ between two sets of inputs, in the order of the new set."""
     keys = [*new, *(key for key in old if key not in new)]
     return tuple(Change(key, old.get(key), new.get(key)) for key in keys if old.get(key) != new.get(key))
 

@@ -1,4 +1,4 @@
-"""A point: a case file with settings, known by what all its stages depend on."""
+"""Point of a run or study: a case with settings, identified by the inputs of all its stages."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from reflowshock.workflow.store.keys import product_keys
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A case with settings.
+    """Case with settings.
 
     Attributes:
         settings: dotted key -> value, as text for ``--set``.
@@ -26,5 +26,5 @@ class Point:
 
     @property
     def key(self) -> str:
-        """The digest of its last stage, the report, which follows all others."""
+        """Product key of the last stage, the report, which follows all other stages."""
         return self.digests[self.case.pipeline.names[-1]]

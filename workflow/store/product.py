@@ -1,7 +1,7 @@
-"""A product: the folder that a stage has made, sealed with the digests of its files, so that damage is noticed.
+"""Product of a stage: a folder sealed with the digests of its files, so that damage is detected.
 
-Its record, ``stage.json``, says what the stage used, found and read, lists every file with its SHA-256, and has a
-digest of its own.
+The record ``stage.json`` holds the inputs and results of the stage, the SHA-256 of every file, and a digest of
+itself.
 """
 
 import hashlib
@@ -17,23 +17,23 @@ from reflowshock.workflow.store.keys import digest_of
 RECORD = "stage.json"
 SEAL = "sha256"  # key of the record's own digest
 CHUNK = 1 << 20
-TICK = 100_000_000  # two changes within this time may leave a file with one time stamp [ns]
+TICK = 100_000_000  # two changes within this time may get the same time stamp [ns]
 
-_known: dict[tuple[int, int], tuple[tuple[int, int], str]] = {}  # file -> state when it was read, digest
+_digests: dict[tuple[int, int], tuple[tuple[int, int], str]] = {}  # file -> state when read, digest
 
 
 def seal(folder: Path, record: dict) -> dict:
-    """Write the record of a product whose files are complete, and see to it that all of it is on the disk.
+    """Write the record of a complete product and flush all its files to disk.
 
     Args:
-        folder: the product.
-        record: what the stage says of itself.
+        folder: folder of the product.
+        record: results of the stage, without ``files``.
 
     Returns:
-        The record with ``files`` and its own digest.
+        The record with ``files`` and the digest of the record itself.
     """
     files = {path.relative_to(folder).as_posix(): file_digest(path) for path in _files(folder)}
-    sealed = json.loads(json.dumps(record | {"files": files}))  # as it will be read
+    sealed = json.loads(json.dumps(record | {"files": files}))  # the same types as after reading
     sealed[SEAL] = digest_of(sealed)
     (folder / RECORD).write_text(json.dumps(sealed, indent=1) + "\n", encoding="utf-8")
     for path in [*_files(folder), folder / RECORD, *(item for item in folder.rglob("*") if item.is_dir()), folder]:
@@ -42,7 +42,7 @@ def seal(folder: Path, record: dict) -> dict:
 
 
 def publish(made: Path, product: Path) -> None:
-    """Move what a stage has made and sealed to its place, at once; what is there already goes."""
+    """Move a sealed product to its final path atomically and remove an older product there."""
     product.parent.mkdir(parents=True, exist_ok=True)
     if os.path.lexists(product):
         old = made.with_name(f".{product.name}.old")
@@ -56,7 +56,7 @@ def publish(made: Path, product: Path) -> None:
 
 
 def discard(path: Path) -> None:
-    """Remove what stands at a path of the store, if anything does; a link, not what it leads to."""
+    """Remove a file, folder or link of the store if it exists; targets of links stay."""
     if path.is_symlink() or not path.is_dir():
         path.unlink(missing_ok=True)
     else:
@@ -64,7 +64,7 @@ def discard(path: Path) -> None:
 
 
 def read_record(product: Path) -> dict | None:
-    """Return the record of a product; None where there is none, or it is not as it was written."""
+    """Return the record of a product, or None if it is missing or damaged."""
     try:
         record = json.loads((product / RECORD).read_text(encoding="utf-8"))
         unsealed = {key: value for key, value in record.items() if key != SEAL}
@@ -74,50 +74,50 @@ def read_record(product: Path) -> dict | None:
 
 
 def damage(product: Path) -> tuple[str, ...]:
-    """List what is wrong with a product that is there, in words; nothing where every file is as it was written."""
+    """List the damaged or missing files of a product as messages; empty if all files are intact."""
     record = read_record(product)
     if record is None:
-        return (f"{RECORD} is {'not as it was written' if (product / RECORD).exists() else 'missing'}",)
-    found = []
+        return (f"{RECORD} {'was modified' if (product / RECORD).exists() else 'is missing'}",)
+    messages = []
     for name, digest in record["files"].items():
         try:
             same = file_digest(product / name) == digest
         except FileNotFoundError:
-            found.append(f"{name} is missing")
+            messages.append(f"{name} is missing")
         except OSError as error:
-            found.append(f"{name} cannot be read ({error.strerror})")
+            messages.append(f"{name} cannot be read ({error.strerror})")
         else:
-            found += [] if same else [f"{name} is not as it was written"]
-    return tuple(found)
+            messages += [] if same else [f"{name} was modified"]
+    return tuple(messages)
 
 
 def content_digest(record: dict) -> str:
-    """Return the digest of all that a product holds but for its record, whose times are those of one run."""
+    """Return the digest of all files of a product except its record, which contains wall times."""
     return digest_of(record["files"])
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file; one that has not changed since this process read it is not read again."""
+    """Return the SHA-256 of a file; unchanged files are read only once per process."""
     status = path.stat()
-    place, state = (status.st_dev, status.st_ino), (status.st_size, status.st_ctime_ns)
-    if (known := _known.get(place)) is not None and known[0] == state:
-        return known[1]
-    found = hashlib.sha256()
+    identity, state = (status.st_dev, status.st_ino), (status.st_size, status.st_ctime_ns)
+    if (cached := _digests.get(identity)) is not None and cached[0] == state:
+        return cached[1]
+    sha256 = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
-            found.update(chunk)
+            sha256.update(chunk)
     if time.time_ns() - status.st_ctime_ns > TICK:
-        _known[place] = (state, found.hexdigest())
-    return found.hexdigest()
+        _digests[identity] = (state, sha256.hexdigest())
+    return sha256.hexdigest()
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield the files of a product, but for its record, in an order that is always the same."""
+    """Yield the files of a product except its record, in sorted order."""
     yield from sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / RECORD)
 
 
 def _sync(path: Path) -> None:
-    """See to it that a file, or the names in a folder, outlast a power cut."""
+    """Flush a file, or the names in a folder, to disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

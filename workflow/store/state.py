@@ -1,4 +1,4 @@
-"""What is there of a case's products: intact, damaged, missing, or made from others than those that are there now."""
+"""State of the products of a case: intact, damaged, missing or stale."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from reflowshock.workflow.store.view import shown_records
 
 @dataclass(frozen=True, slots=True)
 class StageState:
-    """Whether a stage has to run, and why.
+    """State of the product of a stage: whether the stage has to run, and why.
 
     Attributes:
         stale: whether it has to run.
-        missing: whether the run folder shows no product of it, of these parameters or others.
-        changes: its own parameters that differ from those of the product that the run folder shows.
-        because_of: stages before it that have to run, or have made something else than what it read.
-        damaged: what is wrong with the files of its product, in words.
+        missing: whether the run folder contains no product of the stage, for any parameters.
+        changes: parameters of the stage whose values differ from the product in the run folder.
+        because_of: upstream stages that have to run, or whose products have changed since this stage read them.
+        damaged: messages about damaged or missing files of the product.
     """
 
     stale: bool
@@ -31,53 +31,53 @@ class StageState:
 
 
 def examine(store: Store, point: Point) -> dict[str, StageState]:
-    """Say for each stage, in order, whether it has to run, and why; every file of every product is looked at.
+    """Return the state of each stage, in order, by checking every file of every product.
 
-    A product that is intact stays when one before it is made again, as long as that comes out the same.
+    An intact product stays valid when an upstream product is rebuilt with the same content.
     """
     states: dict[str, StageState] = {}
-    shown = shown_records(store, point)
+    records = shown_records(store, point)
     for stage in point.case.pipeline.stages:
         if store.product(point, stage.name).exists():
             states[stage.name] = _of_product(store, point, stage.name, states)
         else:
-            states[stage.name] = _of_absence(point, stage.name, shown, states)
+            states[stage.name] = _of_absence(point, stage.name, records, states)
     return states
 
 
 def _of_product(store: Store, point: Point, name: str, before: Mapping[str, StageState]) -> StageState:
-    """Judge a product that is there."""
+    """Return the state of a stage whose product exists."""
     stage, product = point.case.pipeline[name], store.product(point, name)
-    if found := damage(product):
-        return StageState(stale=True, missing=False, damaged=found)
-    folders = {one.name: store.product(point, one.name) for one in point.case.pipeline.stages}
+    if damages := damage(product):
+        return StageState(stale=True, missing=False, damaged=damages)
+    folders = {name: store.product(point, name) for name in point.case.pipeline.names}
     present = reads(folders, point.case, stage)
     was = (store.record(point, name) or {}).get("reads", {})
-    redone = tuple(one for one in present if before[one].stale)
-    changed = tuple(one for one in present if one not in redone and present[one] != was.get(one))
+    redone = tuple(stage_name for stage_name in present if before[stage_name].stale)
+    changed = tuple(key for key in present if key not in redone and present[key] != was.get(key))
     if changed:
         return StageState(stale=True, missing=False, because_of=changed)
-    # Whether the pads are the same is seen when the geometry is there.
+    # Whether the pads have changed can only be decided once the geometry has been rebuilt.
     return StageState(stale=False, missing=False, because_of=() if stage.pads else redone)
 
 
-def _of_absence(point: Point, name: str, shown: Mapping[str, dict], before: Mapping[str, StageState]) -> StageState:
-    """Say why there is no product: what differs from the one that the run folder shows."""
+def _of_absence(point: Point, name: str, records: Mapping[str, dict], before: Mapping[str, StageState]) -> StageState:
+    """Return why a product is missing: its differences from the product in the run folder."""
     stage = point.case.pipeline[name]
-    if name not in shown:
+    if name not in records:
         return StageState(stale=True, missing=True)
-    changes = compare(shown[name].get("inputs", {}), stage_inputs(point.case, stage))
-    because_of = tuple(one for one in stage.follows if before[one].stale or _differs(shown, one, point))
+    changes = compare(records[name].get("inputs", {}), stage_inputs(point.case, stage))
+    because_of = tuple(s for s in stage.follows if before[s].stale or _differs(records, s, point))
     return StageState(stale=True, missing=False, changes=changes, because_of=because_of)
 
 
-def _differs(shown: Mapping[str, dict], name: str, point: Point) -> bool:
-    """Whether the run folder shows another product of a stage than the one that is wanted."""
-    return name in shown and shown[name].get("key") != point.digests[name]
+def _differs(records: Mapping[str, dict], name: str, point: Point) -> bool:
+    """Return whether the product in the run folder has another key than the current one."""
+    return name in records and records[name].get("key") != point.digests[name]
 
 
 def why_stale(state: StageState) -> str:
-    """Say in a few words why a stage has to run, but for its parameters."""
+    """Return in a few words why a stage has to run, except for changed parameters."""
     if state.damaged:
         return "its product is damaged: " + ", ".join(state.damaged)
     if state.because_of:
@@ -86,7 +86,7 @@ def why_stale(state: StageState) -> str:
 
 
 def failed_checks(store: Store, point: Point, until: str) -> list[str]:
-    """List the health checks of stages that did not hold, in words; a stage without a record has not held either."""
+    """List the failed health checks of stages as messages; a stage without a record counts as failed."""
     failures = []
     for stage in point.case.pipeline.upstream(until):
         record = store.record(point, stage.name)

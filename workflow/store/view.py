@@ -1,6 +1,6 @@
-"""A run folder: the products of one case under the names that users know, as hard links to those of the store.
+"""View of the store as a run folder: the products of one case under readable names, as hard links into the store.
 
-What the program has put there is listed in ``.store/views/<key of the folder>.json``; nothing else is ever removed.
+Links and files of the program are listed in ``.store/views/<key of the folder>.json``; nothing else is ever removed.
 """
 
 import json
@@ -16,121 +16,121 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import RECORD, discard, file_digest, read_record
 from reflowshock.workflow.store.store import CASE, Store, write_case
 
-NO_PRODUCT = "views/none"  # in place of the product that a file is of
+NO_PRODUCT = "views/none"  # source of files that belong to no product
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """A file of a run folder: the file of the store that it shows, relative to the store, and its SHA-256."""
+class Link:
+    """Link from a run folder to a file of the store: path relative to the store, and SHA-256."""
 
     source: str
     digest: str
 
 
 def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
-    """Show the products of some stages of a point in its run folder, and no others.
+    """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
-        store: where the products are.
-        point: whose run folder it is.
-        stages: those whose products are there and intact.
+        store: store of the products.
+        point: point of the run folder.
+        stages: stages whose products exist and are intact.
 
     Returns:
-        Files that were missing from the run folder, or were not as they were written, and have been put back.
+        Names of files that were missing or modified in the run folder and have been restored.
     """
     folder = store.run_folder(point)
-    wanted = _wanted(store, point, set(stages))
+    links = _wanted(store, point, set(stages))
     before = listed(store, folder)
     _make_way(folder, CASE)
     write_case(folder, point.case)
-    for name, shown in before.items():
-        if wanted.get(name) != shown:
-            _withdraw(store, folder, name, shown)
-    _write_list(store, folder, wanted)
-    lost = [name for name, shown in wanted.items() if before.get(name) == shown and not _holds(folder, name, shown)]
-    for name, shown in wanted.items():
-        _put(store, folder, name, shown)
+    for name, link in before.items():
+        if links.get(name) != link:
+            _withdraw(store, folder, name, link)
+    _write_list(store, folder, links)
+    lost = [name for name, link in links.items() if before.get(name) == link and not _holds(folder, name, link)]
+    for name, link in links.items():
+        _put(store, folder, name, link)
     return lost
 
 
-def listed(store: Store, folder: Path) -> dict[str, Shown]:
-    """Return what the program has put into a run folder: file -> what it shows."""
+def listed(store: Store, folder: Path) -> dict[str, Link]:
+    """Return the files of the program in a run folder, by name."""
     try:
         table = json.loads(_list(store, folder).read_text(encoding="utf-8"))
-        return {str(name): Shown(str(source), str(digest)) for name, (source, digest) in table.items()}
+        return {str(name): Link(str(source), str(digest)) for name, (source, digest) in table.items()}
     except (OSError, ValueError, AttributeError, TypeError):
         return _recognised(store, folder)
 
 
-def _recognised(store: Store, folder: Path) -> dict[str, Shown]:
-    """Return the files of a run folder that show files of products, where the list of them is lost.
+def _recognised(store: Store, folder: Path) -> dict[str, Link]:
+    """Recover the links of a run folder by content if their list is lost.
 
-    They have the names that products are shown under: a copy that a user has made under another name is the user's.
+    Only the standard names of products are considered; a copy under another name belongs to the user.
     """
-    known = []
+    candidates = []
     for product in (store.home / "products").glob("*"):
         files = (read_record(product) or {"files": {}})["files"]
         if (product / RECORD).is_file():
             files = files | {RECORD: file_digest(product / RECORD)}
         stage = product.name.rpartition("-")[0]
         for name, digest in files.items():
-            shown = Shown(f"products/{product.name}/{name}", digest)
-            known += [(place, shown) for place in (f"{stage}/{name}", *(one for one in PAGE if one == name))]
-    return {name: shown for name, shown in known if _holds(folder, name, shown)}
+            link = Link(f"products/{product.name}/{name}", digest)
+            candidates += [(path, link) for path in (f"{stage}/{name}", *(page for page in PAGE if page == name))]
+    return {name: link for name, link in candidates if _holds(folder, name, link)}
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
-    """Return the records of the products that a run folder shows, by stage."""
-    sources = {name: shown.source for name, shown in listed(store, store.run_folder(point)).items()}
-    wanted = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
-    records = {name: read_record((store.home / source).parent) for name, source in wanted.items() if source}
+    """Return the records of the products that a run folder links, by stage."""
+    sources = {name: link.source for name, link in listed(store, store.run_folder(point)).items()}
+    source_by_stage = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
+    records = {name: read_record((store.home / source).parent) for name, source in source_by_stage.items() if source}
     return {name: record for name, record in records.items() if record is not None}
 
 
 def adopt(store: Store, folder: Path, made: Path) -> None:
-    """Move files that are of no product to the top of a folder, and list them as the program's; such from before go.
+    """Move files that belong to no product to the top of a folder, replacing earlier files of this kind.
 
     Args:
-        store: of the folder.
-        folder: of a run or study; what a user has put there under their names is set aside.
-        made: the folder that holds them, and nothing else.
+        store: store of the folder.
+        folder: folder of a run or study; files of the user with the same names are renamed.
+        made: folder that contains exactly the files to move.
     """
     files = {path.name: path for path in made.iterdir()}
     before = listed(store, folder)
-    own = {name: Shown(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
-    for name, shown in list(before.items()):
-        if name in own or shown.source.startswith(NO_PRODUCT):
+    links = {name: Link(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
+    for name, link in list(before.items()):
+        if name in links or link.source.startswith(NO_PRODUCT):
             _withdraw(store, folder, name, before.pop(name))
-    _write_list(store, folder, before | own)
+    _write_list(store, folder, before | links)
     for name, path in files.items():
-        if os.path.lexists(folder / name) and not _holds(folder, name, own[name]):
+        if os.path.lexists(folder / name) and not _holds(folder, name, links[name]):
             _set_aside(folder / name)
         path.rename(folder / name)
 
 
 def not_as_put(store: Store, folder: Path) -> list[str]:
-    """List the files that the program has put into a run folder and that are missing, or others now, in words."""
+    """List missing or modified files of the program in a run folder as messages."""
     return [
-        f"{folder / name} is {'not as it was written' if os.path.lexists(folder / name) else 'missing'}"
-        for name, shown in listed(store, folder).items()
-        if not _holds(folder, name, shown)
+        f"{folder / name} {'was modified' if os.path.lexists(folder / name) else 'is missing'}"
+        for name, link in listed(store, folder).items()
+        if not _holds(folder, name, link)
     ]
 
 
 def withdraw_all(store: Store) -> None:
-    """Remove all that the program has put into the folders of a store, and folders that are empty then."""
+    """Remove all files of the program from the folders of a store, and then empty folders."""
     for folder in _folders(store):
-        for name, shown in listed(store, folder).items():
-            _withdraw(store, folder, name, shown)
+        for name, link in listed(store, folder).items():
+            _withdraw(store, folder, name, link)
         if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
             (folder / CASE).unlink()
             _remove_empty(folder / CASE, store.folder)
 
 
 def remove_unused(store: Store) -> tuple[int, int]:
-    """Remove products that no run folder shows, and work that was broken off; return how many of each."""
-    shown = {Path(one.source).parts[1] for folder in _folders(store) for one in listed(store, folder).values()}
-    products = [path for path in (store.home / "products").glob("*") if path.name not in shown]
+    """Remove products that no run folder links, and interrupted work; return the number of each."""
+    linked = {Path(link.source).parts[1] for folder in _folders(store) for link in listed(store, folder).values()}
+    products = [path for path in (store.home / "products").glob("*") if path.name not in linked]
     works = list((store.home / "work").glob("*"))
     for path in products + works:
         discard(path)
@@ -138,7 +138,7 @@ def remove_unused(store: Store) -> tuple[int, int]:
 
 
 def _folders(store: Store) -> list[Path]:
-    """Return the folder of a store, and the run folders of its points."""
+    """Return the folder of a store and the run folders of its points."""
     return [store.folder, *(store.folder / "points").glob("*")]
 
 
@@ -146,20 +146,20 @@ def _list(store: Store, folder: Path) -> Path:
     return store.home / "views" / f"{'run' if folder == store.folder else folder.name}.json"
 
 
-def _write_list(store: Store, folder: Path, wanted: dict[str, Shown]) -> None:
+def _write_list(store: Store, folder: Path, links: dict[str, Link]) -> None:
     path = _list(store, folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
-    table = {name: [shown.source, shown.digest] for name, shown in wanted.items()}
+    table = {name: [link.source, link.digest] for name, link in links.items()}
     partial.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     if path.is_dir():
         discard(path)
     partial.replace(path)
 
 
-def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Shown]:
-    """Return the files of a run folder: those of each product in the folder of its stage, some also at the top."""
-    found = {}
+def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Link]:
+    """Return the links that a run folder should contain: one folder per stage, some files also at the top."""
+    links = {}
     for stage in point.case.pipeline.stages:
         product = store.product(point, stage.name)
         record = read_record(product) if stage.name in stages else None
@@ -168,19 +168,19 @@ def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Shown]:
         source = product.relative_to(store.home).as_posix()
         files = record["files"] | {RECORD: file_digest(product / RECORD)}
         for name, digest in files.items():
-            shown = Shown(f"{source}/{name}", digest)
-            found[f"{stage.name}/{name}"] = shown
+            link = Link(f"{source}/{name}", digest)
+            links[f"{stage.name}/{name}"] = link
             if name in stage.on_top:
-                found[name] = shown
-    return found
+                links[name] = link
+    return links
 
 
-def _put(store: Store, folder: Path, name: str, shown: Shown) -> None:
-    """Let a name in a run folder show a file of the store; what stands there and is a user's is set aside."""
-    if _holds(folder, name, shown):
+def _put(store: Store, folder: Path, name: str, link: Link) -> None:
+    """Link a file of the store into a run folder; a user's file with the same name is renamed."""
+    if _holds(folder, name, link):
         return
     _make_way(folder, name)
-    path, source = folder / name, store.home / shown.source
+    path, source = folder / name, store.home / link.source
     if os.path.lexists(path):
         _set_aside(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -191,27 +191,27 @@ def _put(store: Store, folder: Path, name: str, shown: Shown) -> None:
 
 
 def _make_way(folder: Path, name: str) -> None:
-    """Set aside what stands where the folders of a file belong, and is none or leads elsewhere; or a folder for it."""
+    """Rename files and links that occupy the parent folders of a file, or a folder with its name."""
     for parent in reversed(_parents(name)):
-        place = folder / parent
-        if place.is_symlink() or (place.exists() and not place.is_dir()):
-            _set_aside(place)
+        path = folder / parent
+        if path.is_symlink() or (path.exists() and not path.is_dir()):
+            _set_aside(path)
     if (folder / name).is_dir():
         _set_aside(folder / name)
 
 
-def _withdraw(store: Store, folder: Path, name: str, shown: Shown) -> None:
-    """Remove a file that the program has put there; one that a user has put in its place, or written into, stays."""
+def _withdraw(store: Store, folder: Path, name: str, link: Link) -> None:
+    """Remove a file of the program; a file that the user has replaced or modified stays."""
     path = folder / name
-    if _holds(folder, name, shown):
+    if _holds(folder, name, link):
         path.unlink()
         _remove_empty(path, store.folder)
-    elif not _is_behind_link(folder, name) and _same(path, store.home / shown.source):
-        _set_aside(path)  # by an editor that keeps the file, so that the product has changed, too
+    elif not _is_behind_link(folder, name) and _same(path, store.home / link.source):
+        _set_aside(path)  # edited in place, so that the product has changed, too
 
 
 def _remove_empty(path: Path, top: Path) -> None:
-    """Remove the folders of a file that are empty, but not the top one."""
+    """Remove the empty parent folders of a file, except the top one."""
     for folder in path.parents:
         if folder == top:
             return
@@ -220,39 +220,39 @@ def _remove_empty(path: Path, top: Path) -> None:
 
 
 def _set_aside(path: Path) -> None:
-    """Rename what a user has put where a product belongs."""
+    """Rename a user's file that occupies the path of a product."""
     number = 1
     while os.path.lexists(aside := path.with_name(f"{path.name}.kept-{number}")):
         number += 1
     path.rename(aside)
 
 
-def _holds(folder: Path, name: str, shown: Shown) -> bool:
-    """Whether a run folder has what the program has put there under a name; none behind a link is."""
-    return not _is_behind_link(folder, name) and _shows(folder / name, shown)
+def _holds(folder: Path, name: str, link: Link) -> bool:
+    """Return whether an unmodified file of the program has this name; files behind a link do not count."""
+    return not _is_behind_link(folder, name) and _shows(folder / name, link)
 
 
 def _is_behind_link(folder: Path, name: str) -> bool:
-    """Whether a folder in which a file of a run folder would be is a link, which only a user makes."""
+    """Return whether a parent folder of a file is a link, which only a user creates."""
     return any((folder / parent).is_symlink() for parent in _parents(name))
 
 
 def _parents(name: str) -> tuple[Path, ...]:
-    """Return the folders of a file of a run folder, the nearest first, without the run folder itself."""
+    """Return the parent folders of a file, the nearest first, without the run folder itself."""
     return tuple(Path(name).parents)[:-1]
 
 
 def _same(path: Path, source: Path) -> bool:
-    """Whether two names are of one file."""
+    """Return whether two paths are the same file."""
     try:
         return os.path.samestat(path.lstat(), source.lstat())
     except OSError:
         return False
 
 
-def _shows(path: Path, shown: Shown) -> bool:
-    """Whether a file holds what it is to show."""
+def _shows(path: Path, link: Link) -> bool:
+    """Return whether a path is a file with the digest of a link."""
     try:
-        return not path.is_symlink() and path.is_file() and file_digest(path) == shown.digest
+        return not path.is_symlink() and path.is_file() and file_digest(path) == link.digest
     except OSError:
         return False

@@ -1,1 +1,1 @@
-"""Hard cases as data: what breaks solvers like these, tried within bounds, and random ones."""
+"""Stress test: fixed and random hard cases, each checked against bounds."""

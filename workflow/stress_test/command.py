@@ -1,4 +1,4 @@
-"""The command stress-test: reads the cases, lets pytest try them, tells each verdict and writes the page."""
+"""Command stress-test: reads hard cases, runs them with pytest, prints each verdict and writes the page."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,15 +24,15 @@ RANDOM_COUNT = 200
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the user asks for.
+    """Options of a stress test.
 
     Attributes:
-        files: of cases; none means all that the program has.
-        families: of which; none means all.
-        count: of random cases, over all these families.
-        seed: of the random cases.
-        cores: how many are tried at a time.
-        out: folder of the results.
+        files: files of hard cases; empty for all shipped files.
+        families: families to run; empty for all.
+        count: number of random cases in all families together.
+        seed: seed of the random cases.
+        cores: number of simultaneous cases.
+        out: output folder.
     """
 
     files: Sequence[Path]
@@ -44,21 +44,21 @@ class Request:
 
 
 def stress_test(request: Request) -> bool:
-    """Try hard cases, then random ones; write the results.
+    """Run fixed and random hard cases and write the results.
 
     Returns:
-        Whether all survived within their bounds.
+        Whether all cases stay within their bounds.
 
     Raises:
-        CaseError: a case cannot be tried, or results cannot be written; nothing was.
-        RunFolderBusy: another stress test is at work in the folder of the results.
+        CaseError: a case is invalid or results cannot be written; raised before any case runs.
+        RunFolderBusy: another stress test uses the output folder.
     """
     families = _families(request.families)
     fixed = {path: read_hard_cases(path) for path in _files(request.files) if read_random_file(path) is None}
     fixed = {path: cases for path, cases in fixed.items() if cases[0].family in families}
     samples = list(_samples(request, families))
     if not fixed and not samples:
-        raise CaseError("stress-test", [Problem("", "no case to try", None, "families " + ", ".join(FAMILIES))])
+        raise CaseError("stress-test", [Problem("", "no case to run", None, "families " + ", ".join(FAMILIES))])
     with locked(request.out, "stress test", "hard cases"):
         verdicts = _try_all(request, fixed, samples)
         show_table(verdicts, samples)
@@ -68,11 +68,11 @@ def stress_test(request: Request) -> bool:
 
 
 def _try_all(request: Request, fixed: Mapping[Path, list[HardCase]], samples: Sequence[Sample]) -> list[Verdict]:
-    """Try all; return the verdicts on fixed cases, and let samples have theirs and the simplest that misses."""
+    """Run all cases; return the verdicts on fixed cases and add verdicts and counterexamples to the samples."""
     verdicts: list[Verdict] = []
     by_name = {sample.name: sample for sample in samples}
 
-    def tell(verdict: Verdict) -> None:
+    def report(verdict: Verdict) -> None:
         if not verdict.case.may_be_refused:
             verdicts.append(verdict)
             show_verdict(verdict)
@@ -83,32 +83,32 @@ def _try_all(request: Request, fixed: Mapping[Path, list[HardCase]], samples: Se
             show_sample(sample)
 
     session = Session(request.cores, request.seed, {sample.name: len(sample.cases) for sample in samples})
-    session.attempt({**fixed, **{sample.file.path: sample.cases for sample in samples}}, tell)
+    session.attempt({**fixed, **{sample.file.path: sample.cases for sample in samples}}, report)
     missed = {sample.file.path: sample.cases.index(sample.missed[0].case) for sample in samples if sample.missed}
     simplest = session.simplest(missed) if missed else {}
     for path, number in missed.items():
         sample = by_name[path.stem]
-        sample.simplest = sample.file.file_table(simplest.get(sample.name, sample.cases[number].given))
+        sample.simplest = sample.file.file_table(simplest.get(sample.name, sample.cases[number].table))
     return verdicts
 
 
-def _files(given: Sequence[Path]) -> list[Path]:
-    """Return the files that are given, or all that the program has."""
-    return list(given) or sorted(HARD.glob("*.toml"))
+def _files(paths: Sequence[Path]) -> list[Path]:
+    """Return the chosen files, or all shipped files."""
+    return list(paths) or sorted(HARD.glob("*.toml"))
 
 
 def _samples(request: Request, families: Sequence[str]) -> Iterator[Sample]:
-    """Draw random cases of each family, from the program's own files."""
+    """Draw random cases of each family from the shipped files."""
     files = [file for path in _files(()) if (file := read_random_file(path)) is not None]
     for position, family in enumerate(families):
         count = request.count * (position + 1) // len(families) - request.count * position // len(families)
-        for file, own in shares([file for file in files if file.table["family"] == family], count):
-            yield Sample(file, file.cases(own, request.seed))
+        for file, share in shares([file for file in files if file.table["family"] == family], count):
+            yield Sample(file, file.cases(share, request.seed))
 
 
-def _families(wanted: Sequence[str]) -> list[str]:
-    for family in wanted:
+def _families(names: Sequence[str]) -> list[str]:
+    for family in names:
         if family not in FAMILIES:
             choice, hint = "one of " + ", ".join(FAMILIES), nearest(family, FAMILIES)
             raise CaseError("stress-test", [Problem("--family", "unknown family", family, choice, hint)])
-    return [family for family in FAMILIES if not wanted or family in wanted]
+    return [family for family in FAMILIES if not names or family in names]

@@ -1,4 +1,4 @@
-"""Results of a stress test: stress_test.json, .png and .html, and a TOML file for each counterexample."""
+"""Results of a stress test: stress_test.json, .png and .html, and a TOML file per counterexample."""
 
 import base64
 import json
@@ -24,19 +24,19 @@ from reflowshock.workflow.stress_test.sample import Sample
 from reflowshock.workflow.stress_test.words import sample_said
 
 TEMPLATES = Path(__file__).parent / "templates"
-LEAST, MOST = 0.05, 1000.0  # margins beyond are drawn at the edge
+LEAST, MOST = 0.05, 1000.0  # margins outside are drawn at the edge
 SURVIVED, MISSED, REFUSED = "#0b5fa5", "#b3261e", "#2a7d4f"
 ROW = 0.19  # height of a row [in]
 
 
 def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> None:
-    """Write all results to a folder; counterexamples of an earlier test stay.
+    """Write all results to a folder; counterexamples of earlier tests stay.
 
     Args:
-        folder: of the results.
-        verdicts: of the fixed cases.
+        folder: output folder.
+        verdicts: verdicts on the fixed cases.
         samples: random cases.
-        seed: from which they were drawn.
+        seed: seed of the random cases.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for sample in samples:
@@ -70,7 +70,7 @@ def _record(verdict: Verdict) -> dict[str, Any]:
 
 def _check(check: Check) -> dict[str, Any]:
     margin = check.margin if math.isfinite(check.margin) else None
-    return {"measure": check.measure, "found": check.found, "bound": check.bound, "margin": margin, "ok": check.holds}
+    return {"measure": check.measure, "found": check.value, "bound": check.bound, "margin": margin, "ok": check.holds}
 
 
 def _sample_record(sample: Sample) -> dict[str, Any]:
@@ -80,14 +80,14 @@ def _sample_record(sample: Sample) -> dict[str, Any]:
         "ok": sample.ok,
         "tried": len(sample.verdicts),
         "refused": sample.refused,
-        "cases": [_record(verdict) | {"parameters": verdict.case.given} for verdict in sample.verdicts],
+        "cases": [_record(verdict) | {"parameters": verdict.case.table} for verdict in sample.verdicts],
     }
 
 
 def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> str:
     environment = template_environment(TEMPLATES)
     environment.globals.update(sample_said=sample_said)
-    in_order = sorted(verdicts, key=lambda one: (FAMILIES.index(one.case.family), one.case.name))
+    in_order = sorted(verdicts, key=lambda verdict: (FAMILIES.index(verdict.case.family), verdict.case.name))
     return environment.get_template("stress_test.html.j2").render(
         version=__version__,
         seed=seed,
@@ -101,33 +101,33 @@ def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], 
 
 
 def draw_margins(path: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
-    """Write a PNG.
+    """Draw the margins of all cases to a PNG file.
 
     Args:
-        path: of the file.
-        verdicts: of the fixed cases.
-        samples: random cases; their row has a dot for each.
+        path: path of the PNG file.
+        verdicts: verdicts on the fixed cases.
+        samples: random cases, one row per sample with one dot per case.
     """
     rows = _rows(verdicts, samples)
     with pyplot.rc_context(STYLE | {"font.size": 8}):
         figure, axis = pyplot.subplots(figsize=(9.2, ROW * len(rows) + 1.2), constrained_layout=True)
         axis.axvspan(LEAST, 1.0, color=MISSED, alpha=0.07, lw=0)
         axis.axvline(1.0, color=MISSED, lw=1.2)
-        for place, (name, own) in enumerate(rows):
-            _draw_row(axis, place, own, 0.35 if "random" in name else 0.9)
+        for row, (name, row_verdicts) in enumerate(rows):
+            _draw_row(axis, row, row_verdicts, 0.35 if "random" in name else 0.9)
         axis.set_yticks(range(len(rows)), [name.replace("_", " ") for name, _ in rows])
         axis.set(xscale="log", xlim=(LEAST, 1.3 * MOST), ylim=(len(rows) - 0.3, -0.7))
-        axis.xaxis.set_major_formatter(LogFormatter())  # no formula, which STYLE does not write
+        axis.xaxis.set_major_formatter(LogFormatter())  # plain numbers, since STYLE cannot typeset formulas
         axis.set_xlabel("margin: bound over measured value (1: at the bound; left of it: a miss); square: refused")
         figure.savefig(path, dpi=110)
         pyplot.close(figure)
 
 
 def _rows(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> list[tuple[str, list[Verdict]]]:
-    """Names of files and random trials with their verdicts, family by family."""
+    """Return the names of files and samples with their verdicts, ordered by family."""
     rows: dict[str, list[Verdict]] = {}
     for family in FAMILIES:
-        for verdict in sorted(verdicts, key=lambda one: one.case.name):
+        for verdict in sorted(verdicts, key=lambda item: item.case.name):
             if verdict.case.family == family:
                 rows.setdefault(verdict.case.name, []).append(verdict)
         for sample in samples:
@@ -136,12 +136,12 @@ def _rows(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> list[tuple[
     return list(rows.items())
 
 
-def _draw_row(axis: Axes, place: int, verdicts: Sequence[Verdict], opacity: float) -> None:
-    """Draw the closest margin of each verdict; a case that broke, or was refused, has none and lies at an edge."""
+def _draw_row(axis: Axes, row: int, verdicts: Sequence[Verdict], opacity: float) -> None:
+    """Draw the smallest margin of each verdict; broken and refused cases without a margin are drawn at an edge."""
     for verdict in verdicts:
         closest = verdict.closest
         margin = closest.margin if closest else (MOST if verdict.ok else LEAST)
-        shown = LEAST if math.isnan(margin) else min(MOST, max(LEAST, margin))
+        clipped = LEAST if math.isnan(margin) else min(MOST, max(LEAST, margin))
         colour = MISSED if not verdict.ok else REFUSED if verdict.is_refused else SURVIVED
         marker = "s" if verdict.is_refused else "o" if closest else "X"
-        axis.plot(shown, place, marker, color=colour, alpha=opacity, ms=5, mew=0, clip_on=False)
+        axis.plot(clipped, row, marker, color=colour, alpha=opacity, ms=5, mew=0, clip_on=False)

@@ -1,4 +1,4 @@
-"""A sample: the random cases of one file, their verdicts, and the simplest that misses as a file."""
+"""Sample of random cases of one file with verdicts and simplest counterexample."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -7,18 +7,18 @@ from reflowshock.cases.hard.hard_case import HardCase
 from reflowshock.cases.hard.random_cases import RandomFile
 from reflowshock.cases.hard.verdict import Check, Verdict
 
-MOST_REFUSED = 0.2  # largest share of cases that may be refused in words instead of tried
+MOST_REFUSED = 0.2  # largest share of cases that may be refused with a message
 
 
 @dataclass(slots=True)
 class Sample:
-    """Random cases that were tried.
+    """Random cases of one file.
 
     Attributes:
-        file: what drew them.
-        cases: in the order in which they were drawn.
-        found: their verdicts, as they came.
-        simplest: the simplest case that misses, as a file has it; None where all survived.
+        file: file that defines the distribution.
+        cases: cases in the order of drawing.
+        found: verdicts in the order of completion.
+        simplest: simplest counterexample as the table of a file; None without one.
     """
 
     file: RandomFile
@@ -38,31 +38,31 @@ class Sample:
 
     @property
     def verdicts(self) -> list[Verdict]:
-        """The verdicts in the order in which the cases were drawn."""
+        """Verdicts in the order of the cases."""
         return sorted(self.found, key=lambda verdict: self.cases.index(verdict.case))
 
     @property
     def missed(self) -> list[Verdict]:
-        """Those that did not survive."""
+        """Verdicts on cases outside their bounds."""
         return [verdict for verdict in self.verdicts if not verdict.ok]
 
     @property
     def refused(self) -> int:
-        """How many were refused in words."""
+        """Number of cases refused with a message."""
         return sum(verdict.is_refused for verdict in self.found)
 
     @property
     def too_many_refused(self) -> bool:
-        """Whether so many were refused that the sample says little."""
+        """Whether more than the share ``MOST_REFUSED`` was refused."""
         return self.refused > MOST_REFUSED * len(self.found)
 
     @property
     def ok(self) -> bool:
-        """Whether all survived, and enough were tried."""
+        """Whether no case missed its bounds and not too many were refused."""
         return not self.missed and not self.too_many_refused
 
     @property
     def closest(self) -> Check | None:
-        """The check of all cases that was kept by the smallest factor."""
+        """Check with the smallest margin of all cases."""
         checks = [verdict.closest for verdict in self.found if verdict.closest is not None]
         return min(checks, key=lambda check: check.rank, default=None)

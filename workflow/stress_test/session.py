@@ -1,6 +1,6 @@
-"""A session of pytest that tries hard cases in several processes; one that hangs or dies is replaced.
+"""Pytest session that runs hard cases in several worker processes and replaces workers that hang or crash.
 
-It runs apart from what a user has configured for tests of his own.
+It ignores the user's pytest configuration.
 """
 
 import os
@@ -18,7 +18,7 @@ from reflowshock.cases.hard.hard_case import HardCase
 from reflowshock.cases.hard.verdict import Verdict
 
 PLUGINS = ("xdist.plugin", "pytest_timeout", "reflowshock.cases.hard.collector")
-# A process has one thread; plugins and options that a user has for tests of his own are left out.
+# Workers have one thread; the user's plugins and options of pytest are disabled.
 ENVIRONMENT = {
     "NUMBA_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
@@ -29,12 +29,12 @@ ENVIRONMENT = {
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is known of a test that has ended.
+    """Outcome of a test.
 
     Attributes:
-        properties: that it has recorded.
-        seconds: since it began [s].
-        code: with which its process ended; None where it goes on.
+        properties: properties recorded by the test.
+        seconds: time since the start of the test [s].
+        code: exit code of its worker; None if the worker goes on.
     """
 
     properties: Mapping[str, Any]
@@ -43,13 +43,13 @@ class Report:
 
 
 class Reports:
-    """A plugin that takes what tests report in the place of pytest's terminal.
+    """Pytest plugin that receives test reports in place of the terminal.
 
-    While a process starts, an interrupt waits: the process inherits that, and is never interrupted itself.
+    SIGINT is blocked while workers start: they inherit this and are never interrupted themselves.
     """
 
     def __init__(self, take: Callable[[str, Report], None]) -> None:
-        """Keep to whom a test's name and report go."""
+        """Store the function that receives the name and report of each test."""
         self._take = take
         self._since: dict[str, float] = {}
         self._code: int | None = None
@@ -61,33 +61,33 @@ class Reports:
         config.pluginmanager.unregister(name="terminalreporter")
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Take note that a process cannot read what this one could."""
+        """Note that a worker cannot read the cases."""
         if report.failed:
             self.broken = str(report.longrepr)
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """Take note that a test begins."""
+        """Note the start time of a test."""
         self._since[nodeid] = time.monotonic()
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self) -> None:
-        """Processes are about to start."""
+        """Block SIGINT before workers start."""
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodeready(self) -> None:
-        """They have started."""
+        """Unblock SIGINT after workers have started."""
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object) -> None:
-        """Take note how a process broke off, which is known before the report of its test; another will start."""
+        """Note the exit code of a crashed worker, which precedes the report of its test; another worker will start."""
         if error:
             self._code = node.gateway._io.wait()
             self.pytest_xdist_setupnodes()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Hand over what has ended: a call, or a process, of which xdist has a report without a phase."""
+        """Pass on the report of a completed test or crashed worker (which xdist reports without a phase)."""
         if report.when in ("setup", "teardown") and report.passed:
             return
         seconds = time.monotonic() - self._since[report.nodeid]
@@ -97,56 +97,56 @@ class Reports:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """How hard cases are tried.
+    """Settings of a pytest session for hard cases.
 
     Attributes:
-        cores: processes at a time.
-        seed: of random cases.
-        counts: of random cases, by the name of their file.
+        cores: number of workers.
+        seed: seed of the random cases.
+        counts: numbers of random cases by file name.
     """
 
     cores: int
     seed: int
     counts: Mapping[str, int]
 
-    def attempt(self, cases: Mapping[Path, Sequence[HardCase]], tell: Callable[[Verdict], None]) -> None:
-        """Try the cases of files, and tell their verdicts as they come."""
-        waiting = {_node_id(path, case.tried or case.name): case for path, own in cases.items() for case in own}
+    def attempt(self, cases: Mapping[Path, Sequence[HardCase]], report_verdict: Callable[[Verdict], None]) -> None:
+        """Run the cases of files and report each verdict as soon as it is available."""
+        waiting = {_node_id(path, case.tried or case.name): case for path, group in cases.items() for case in group}
 
         def take(name: str, report: Report) -> None:
-            case, found = waiting.pop(name), report.properties.get("verdict")
-            tell(_lost(case, report) if found is None else Verdict.of(case, found))
+            case, content = waiting.pop(name), report.properties.get("verdict")
+            report_verdict(_lost(case, report) if content is None else Verdict.of(case, content))
 
         code = self._pytest(cases, ["--every-combination"], take)
         for case in waiting.values():
-            tell(Verdict(case, (), f"was not tried: pytest ended with code {code}"))
+            report_verdict(Verdict(case, (), f"did not run: pytest ended with code {code}"))
 
     def simplest(self, missed: Mapping[Path, int]) -> dict[str, dict[str, Any]]:
-        """Search for the simplest case of random files that misses.
+        """Search for the simplest counterexample of random files.
 
         Args:
-            missed: number of a case that did, by file.
+            missed: number of a missed case, by file.
 
         Returns:
-            Parameters as a file has them by the name of their file; none where the search broke off.
+            Table of parameters by file name, without files whose search was interrupted.
         """
-        found: dict[str, dict[str, Any]] = {}
+        tables: dict[str, dict[str, Any]] = {}
 
         def take(name: str, report: Report) -> None:
             if "simplest" in report.properties:
-                found[Path(name.partition("::")[0]).stem] = report.properties["simplest"]
+                tables[Path(name.partition("::")[0]).stem] = report.properties["simplest"]
 
         self._pytest(missed, [f"--simplify={path.stem}={number}" for path, number in missed.items()], take)
-        return found
+        return tables
 
     def _pytest(
         self, files: Mapping[Path, Any], options: Sequence[str], take: Callable[[str, Report], None]
     ) -> pytest.ExitCode | int:
-        """Run pytest apart from what a user has configured for tests of his own; return its exit code.
+        """Run pytest without the user's configuration and return its exit code.
 
         Raises:
-            KeyboardInterrupt: it was interrupted.
-            RuntimeError: a process could not read the cases.
+            KeyboardInterrupt: the session was interrupted.
+            RuntimeError: a worker could not read the cases.
         """
         arguments = ["-c", os.devnull, "--rootdir=/", "--noconftest", "-p", "no:cacheprovider"]
         arguments += [part for plugin in PLUGINS for part in ("-p", plugin)]
@@ -164,15 +164,15 @@ class Session:
 
 
 def _node_id(path: Path, name: str) -> str:
-    """Return the name of a test to pytest, whose root is that of all files."""
+    """Return the pytest node id of a test, relative to the root of the file system."""
     return f"{path.resolve()}::{name}".removeprefix("/")
 
 
 def _lost(case: HardCase, report: Report) -> Verdict:
-    """Return the verdict on a case whose process has ended."""
+    """Return the verdict on a case whose worker has ended."""
     hangs = report.seconds > 0.95 * case.deadline
     message = (
-        f"no answer in {case.deadline:g} s: taken to hang" if hangs else f"the process ended with code {report.code}"
+        f"no answer in {case.deadline:g} s: assumed to hang" if hangs else f"the process ended with code {report.code}"
     )
     return Verdict(case, (), message, seconds=report.seconds)
 

@@ -1,4 +1,4 @@
-"""Verdicts in the terminal: a line a case, and a table of the families."""
+"""Verdicts in the terminal: one line per case, and a table of families."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
 
 
 def show_verdict(verdict: Verdict) -> None:
-    """Print one verdict: what was tried, the closest bound, what was measured, the margin."""
+    """Print one verdict: case, closest bound, measured value, margin."""
     line = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
     console.print(_mark(verdict.ok) + line, soft_wrap=True)
 
@@ -22,12 +22,12 @@ def _mark(ok: bool) -> Text:
 
 
 def named(verdict: Verdict) -> str:
-    """Name a case with the values that were varied."""
+    """Return the name of a case with its varied values."""
     return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
 
 
 def show_sample(sample: Sample) -> None:
-    """Print how the random cases of a trial ended, and what was missed."""
+    """Print the results of the random cases of a trial and its missed cases."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
     line = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
     console.print(_mark(sample.ok) + line, soft_wrap=True)
@@ -36,7 +36,7 @@ def show_sample(sample: Sample) -> None:
 
 
 def sample_said(sample: Sample) -> str:
-    """Say how the random cases of a trial ended."""
+    """Return a summary of the random cases of a trial."""
     counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
     if sample.too_many_refused:
         counts += f"; allowed to be refused: {MOST_REFUSED:.0%}"
@@ -44,16 +44,16 @@ def sample_said(sample: Sample) -> str:
 
 
 def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
-    """Print how many of each family were tried and missed, the closest of each, and what was refused too often."""
+    """Print tried and missed cases and the smallest margin per family, then samples with too many refusals."""
     table = Table(box=None, header_style="bold")
     for column in ("family", "fixed", "random", "missed", "smallest margin", "of"):
         table.add_column(column, justify="left" if column in ("family", "of") else "right")
     for family in FAMILIES:
         fixed = [verdict for verdict in verdicts if verdict.case.family == family]
         drawn = [verdict for sample in samples if sample.family == family for verdict in sample.verdicts]
-        if own := [*fixed, *drawn]:
-            missed = sum(not verdict.ok for verdict in own)
-            table.add_row(family, str(len(fixed)), str(len(drawn)), str(missed), *_least(own))
+        if all_verdicts := [*fixed, *drawn]:
+            missed = sum(not verdict.ok for verdict in all_verdicts)
+            table.add_row(family, str(len(fixed)), str(len(drawn)), str(missed), *_least(all_verdicts))
     console.print(table)
     for sample in samples:
         if sample.too_many_refused:
@@ -61,9 +61,9 @@ def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
 
 
 def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
-    """The smallest margin of all, and whose it is."""
-    found = [(verdict.closest, verdict) for verdict in verdicts if verdict.closest is not None]
-    if not found:
+    """Return the smallest margin and its case."""
+    pairs = [(verdict.closest, verdict) for verdict in verdicts if verdict.closest is not None]
+    if not pairs:
         return "", ""
-    check, verdict = min(found, key=lambda pair: pair[0].rank)
+    check, verdict = min(pairs, key=lambda pair: pair[0].rank)
     return check.margin_text, named(verdict)

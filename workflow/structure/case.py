@@ -9,7 +9,7 @@ from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
-from reflowshock.workflow.case.toml_file import beside
+from reflowshock.workflow.case.toml_file import resolved_path
 from reflowshock.workflow.structure.references import AnyReference, Record
 
 MESH_KEYS = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
@@ -44,7 +44,7 @@ class StructureCase(StructureProblem, Case):
         named = [group for key in ("loads", "references") if isinstance(group := table.get(key), dict)]
         for item in (item for group in named for item in group.values()):
             if isinstance(item, dict) and isinstance(item.get("table"), str):
-                item["table"] = beside(folder, item["table"])
+                item["table"] = resolved_path(folder, item["table"])
         return table
 
     @property

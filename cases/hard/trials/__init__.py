@@ -1,1 +1,1 @@
-"""What hard cases try: the trials of each family, and the small bodies, meshes and surfaces that they share."""
+"""Trials of each family of hard cases, and the small bodies, meshes and surfaces that they share."""

@@ -1,4 +1,4 @@
-"""Trials of elements that bend, against Timoshenko and a plastic hinge; and their order on distorted meshes."""
+"""Bending trials of elements against Timoshenko's beam and a plastic hinge, and orders of convergence."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,19 +16,21 @@ from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import boundary_facets
 from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material
 
-YOUNG = 1e9  # of beams [Pa]; nothing depends on it
-CURVATURE = 6.0  # of the hinge, over that at which the beam yields
+YOUNG = 1e9  # Young's modulus of the beams [Pa]; without influence on the measures
+CURVATURE = 6.0  # curvature of the hinge over the yield curvature
 HINGE_STEPS = 4000
 
 
-def bending(given: Bending) -> dict[str, float]:
-    """Return the error of the deflection of the end of a beam, over the exact one."""
-    along, across, up = given.cells
-    lines = [np.linspace(0, count * long, count + 1) for count, long in ((along, given.aspect), (across, 1), (up, 1))]
+def bending(parameters: Bending) -> dict[str, float]:
+    """Return the relative error of the tip deflection of a beam."""
+    along, across, up = parameters.cells
+    lines = [
+        np.linspace(0, count * long, count + 1) for count, long in ((along, parameters.aspect), (across, 1), (up, 1))
+    ]
     length, width, height = (float(line[-1]) for line in lines)
-    found = tip(KINDS[given.element], lines, [laminate(given.poisson_ratio, young=YOUNG)])
-    exact = beam(length, width, np.array([height]), np.array([YOUNG]), given.poisson_ratio)
-    return {"deflection_error": abs(found / exact - 1.0)}
+    deflection = tip(KINDS[parameters.element], lines, [laminate(parameters.poisson_ratio, young=YOUNG)])
+    exact = beam(length, width, np.array([height]), np.array([YOUNG]), parameters.poisson_ratio)
+    return {"deflection_error": abs(deflection / exact - 1.0)}
 
 
 def tip(
@@ -38,16 +40,16 @@ def tip(
     layers: Callable[[np.ndarray], np.ndarray] | None = None,
     move: Callable[[np.ndarray], np.ndarray] = lambda points: points,
 ) -> float:
-    """Mean deflection of the end x = L under a unit load that is spread over it.
+    """Return the mean deflection of the end x = L under a distributed unit load.
 
-    The root x = 0 keeps its plane but may contract in it, as a beam's does.
+    The root x = 0 keeps its plane but may contract in it, as in beam theory.
 
     Args:
-        kind: Of element.
-        lines: Of the grid; there are nodes half way up.
-        materials: Of the layers.
-        layers: Layer of elements by the height of their centre, (ne,) -> (ne,).
-        move: Of the points.
+        kind: Kind of element.
+        lines: Grid lines; there are nodes at half height.
+        materials: Materials of the layers.
+        layers: Function from heights of element centres to layers, (ne,) -> (ne,).
+        move: Map of the points.
     """
     points, cells = box(kind, *lines, move=move)
     length, width, height = (line[-1] for line in lines)
@@ -67,7 +69,7 @@ def tip(
 
 
 def beam(length: float, width: float, heights: np.ndarray, young: np.ndarray, poisson: float = 0.0) -> float:
-    """Timoshenko's tip deflection of a layered beam under a unit load, shear energy of the exact shear stress."""
+    """Return Timoshenko's tip deflection of a layered beam under a unit load with the exact shear stress energy."""
     z = np.concatenate([[0.0], np.cumsum(heights)])
     axis = (young @ np.diff(z**2)) / (2 * young @ heights)
     rigidity = width * young @ np.diff((z - axis) ** 3) / 3
@@ -78,15 +80,15 @@ def beam(length: float, width: float, heights: np.ndarray, young: np.ndarray, po
     return float(length**3 / (3 * rigidity) + length * flexibility)
 
 
-def hinge(given: Hinge) -> dict[str, float]:
+def hinge(parameters: Hinge) -> dict[str, float]:
     """Return the error of the moment of a beam that is bent far beyond yield."""
-    return {"moment_error": bent_moment(given.element, given.layers) - 1.0}
+    return {"moment_error": bent_moment(parameters.element, parameters.layers) - 1.0}
 
 
 def bent_moment(name: str, layers: int) -> float:
-    """Bend a beam to six times its yield curvature; return its moment over that of beam theory.
+    """Bend a beam to six times its yield curvature; return its moment over beam theory.
 
-    The end planes keep their plane and turn slowly; everything else finds its rest, damped.
+    The end sections stay plane and rotate slowly; all other nodes come to rest by damping.
     """
     length = 3.0
     law = JohnsonCook(A=50e6, B=0.0, n=1.0)
@@ -109,13 +111,13 @@ def bent_moment(name: str, layers: int) -> float:
     return abs(float(force[end, 0] @ z[end])) / exact
 
 
-COUNTS = {4: (9, 13, 18), 8: (6, 9, 13), 10: (3, 5, 7)}  # of boxes each way, by the nodes of an element
+COUNTS = {4: (9, 13, 18), 8: (6, 9, 13), 10: (3, 5, 7)}  # boxes in each direction by nodes per element
 POISSON = 0.3
 
 
-def order(given: Order) -> dict[str, float]:
+def order(parameters: Order) -> dict[str, float]:
     """Return the orders in h of displacements and strains in the L2 norm."""
-    of_displacement, of_strain = orders_in_h(given.element, given.poisson_ratio)
+    of_displacement, of_strain = orders_in_h(parameters.element, parameters.poisson_ratio)
     return {"displacement_order": of_displacement, "strain_order": of_strain}
 
 
@@ -129,23 +131,25 @@ def orders_in_h(name: str, poisson: float = POISSON) -> tuple[float, float]:
 
 
 def errors_of(name: str, material: Isotropic, count: int) -> tuple[float, float]:
-    """Return the errors of displacements and strains in the L2 norm, the displacement of all faces given."""
+    """Return the L2 errors of displacements and strains with prescribed displacements on all faces."""
     kind, poisson = KINDS[name], material.poisson_ratio
     points, cells = box(kind, *[np.linspace(0, 1, count + 1)] * 3, move=wavy)
     elements = elements_of(kind, points, cells, [material])
     held = np.zeros(points.shape, dtype=bool)
     held[boundary_facets(cells)] = True
     exact = exact_displacement(points, poisson)
-    found = solve(elements, exact, held)
+    displacement = solve(elements, exact, held)
     geometry = element_geometry(points, cells)
-    strain = mean_strain(geometry.gradient, found[cells])
+    strain = mean_strain(geometry.gradient, displacement[cells])
     centres = points[cells[:, : 8 if kind.nodes == 8 else 4]].mean(axis=1)
     of_strains = geometry.volume @ (strain - exact_strain(centres, poisson)) ** 2
-    return float(np.sqrt(mass_of(elements) @ np.sum((found - exact) ** 2, axis=1))), float(np.sqrt(of_strains.sum()))
+    return float(np.sqrt(mass_of(elements) @ np.sum((displacement - exact) ** 2, axis=1))), float(
+        np.sqrt(of_strains.sum())
+    )
 
 
 def exact_displacement(points: np.ndarray, poisson: float) -> np.ndarray:
-    """Papkovich and Neuber with one harmonic potential psi e_x, mu = 1: u = (grad(x psi) - 4 (1 - nu) psi e_x) / 2."""
+    """Return u = (grad(x psi) - 4 (1 - nu) psi e_x) / 2, Papkovich-Neuber with one harmonic potential, mu = 1."""
     a, b = 1.3, 0.8
     x, y, z = points.T
     psi = np.sin(a * x) * np.sin(b * y + 0.4) * np.exp(np.hypot(a, b) * z)
@@ -166,7 +170,7 @@ def exact_strain(points: np.ndarray, poisson: float) -> np.ndarray:
 
 
 def wavy(points: np.ndarray) -> np.ndarray:
-    """Return points of a cube moved so that no element is a box, its faces flat."""
+    """Move the points of a cube so that no element is a box but the faces stay plane."""
     waves = np.sin(np.pi * points)
     return points + waves.prod(axis=1)[:, None] * (
         [0.08, -0.08, 0.06] + 0.05 * np.sin(2 * np.pi * points[:, [1, 2, 0]])

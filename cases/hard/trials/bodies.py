@@ -1,4 +1,4 @@
-"""Bodies of one rank from meshes in memory, through the program's own chain, and metals for them."""
+"""Bodies on one rank from meshes in memory by the program's own chain, and metals for them."""
 
 import numpy as np
 from mpi4py import MPI
@@ -33,7 +33,7 @@ def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:
 
 
 def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> tuple[Body, float]:
-    """Return a body of all parts, and its smallest element critical step [s]; ``materials`` go before ``board``."""
+    """Return a body of all parts and its smallest critical element step [s]; ``materials`` override ``board``."""
     pieces, tables = dns_pieces(mesh, materials or ELASTIC.model_copy(update={"board": board}))
     return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
 
@@ -59,7 +59,7 @@ def force_of(term: NonlinearElements, displacement: np.ndarray) -> np.ndarray:
 def nonlinear_body(
     mesh: MeshData, material: Material, response: ForceOptions, formulation: str = "one_point"
 ) -> tuple[Body, float]:
-    """Return a body of one material, and its smallest element critical step [s]."""
+    """Return a body of one material and its smallest critical element step [s]."""
     item = prepare(mesh, "dns")["dns"]
     materials = dict.fromkeys(item.tables.part_names, material)
     pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)

@@ -1,4 +1,4 @@
-"""Every kind of element on structured boxes, as distorted as wanted, and linear problems on them; SciPy only."""
+"""Elements of every kind on distorted structured boxes, and linear problems on them; SciPy only."""
 
 from collections.abc import Callable, Sequence
 
@@ -33,7 +33,7 @@ def with_middles(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def box(kind: ElementKind, *lines: Line, move: Callable = lambda x: x) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and cells of a box between the lines of a grid, vertices moved before middles are placed."""
+    """Return points and cells of a box between grid lines; vertices are moved before mid-edge nodes are added."""
     points, cells = grid(*lines)
     points = move(points)
     if kind.nodes == 8:
@@ -49,7 +49,7 @@ def elements_of(
     materials: Sequence[Material],
     number: np.ndarray | int = 0,
 ) -> Elements:
-    """Return elements of materials, (ne,) ``number`` among them."""
+    """Return elements with materials indexed by ``number``, shape (ne,)."""
     number = np.broadcast_to(np.asarray(number, np.int32), len(cells))
     density = np.array([material.density for material in materials])[number]
     elasticity = np.array([elasticity_matrix(material) for material in materials])
@@ -71,10 +71,10 @@ def mass_of(elements: Elements) -> np.ndarray:
     return lumped_mass(elements, element_geometry(elements.points, elements.cells).nodal_volume)
 
 
-def solve(elements: Elements, given: np.ndarray, held: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
-    """Return the displacement (n, 3) where components ``held (n, 3)`` take the values ``given (n, 3)``."""
+def solve(elements: Elements, prescribed: np.ndarray, held: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+    """Return the displacement (n, 3) with components ``held`` (n, 3) equal to ``prescribed`` (n, 3)."""
     stiffness, free = stiffness_matrix(elements), ~held.ravel()
-    displacement = np.where(held, given, 0.0).ravel()
+    displacement = np.where(held, prescribed, 0.0).ravel()
     right = (0.0 if load is None else load.ravel()) - stiffness @ displacement
     displacement[free] = splu(stiffness[free][:, free].tocsc()).solve(right[free])
     return displacement.reshape(-1, 3)
@@ -89,21 +89,21 @@ def frequencies(elements: Elements, held: np.ndarray, count: int) -> np.ndarray:
     return np.sqrt(np.sort(squared)) / (2 * np.pi)
 
 
-YOUNG, DENSITY = 10e9, 2000.0  # of bodies of trials [Pa], [kg/m^3]
-LARGEST = 1.0  # movement over the edge of a box: far more than any element bears
+YOUNG, DENSITY = 10e9, 2000.0  # Young's modulus and density of the bodies [Pa], [kg/m^3]
+LARGEST = 1.0  # largest node movement over the edge of a box: inverts any element
 
 
 def distorted(
     name: str, lines: tuple[Line, Line, Line], quality: float, seed: int, faces: bool = True
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (n, 3) and cells of a box between the lines of a grid, of a least scaled Jacobian.
+    """Return points (n, 3) and cells of a box between grid lines with a given least scaled Jacobian.
 
     Args:
         name: Kind of element.
-        lines: Along x, y and z.
-        quality: Wanted; where even the grid has less, it stays as it is.
-        seed: Of the random directions.
-        faces: Whether nodes on the faces of the box move, too.
+        lines: Grid lines along x, y and z.
+        quality: Target of the least scaled Jacobian; a grid below it stays unchanged.
+        seed: Seed of the random directions.
+        faces: Whether nodes on the faces of the box move as well.
     """
     edges = np.array([np.diff(line).min() for line in lines])
     points, _ = grid(*lines)
@@ -125,7 +125,7 @@ def distorted(
 
 
 def laminate(poisson: float, orthotropy: float = 1.0, young: float = YOUNG) -> Material:
-    """Return a material with a modulus [Pa] in x and y, the modulus in z smaller by ``orthotropy``."""
+    """Return a material with in-plane modulus ``young`` [Pa] and a z modulus smaller by ``orthotropy``."""
     if orthotropy == 1.0:
         return Isotropic(density=DENSITY, young_modulus=young, poisson_ratio=poisson)
     across, shear = young / orthotropy, 0.5 / (1.0 + poisson)
@@ -140,9 +140,9 @@ def laminate(poisson: float, orthotropy: float = 1.0, young: float = YOUNG) -> M
     )
 
 
-def body_of(given: Elastic, material: Material) -> Elements:
+def body_of(parameters: Elastic, material: Material) -> Elements:
     """Return the elements of a trial, boxes 1 mm high."""
-    flat = np.linspace(0.0, 1e-3 * given.aspect * given.cells, given.cells + 1)
-    lines = (flat, flat, np.linspace(0.0, 1e-3 * given.cells, given.cells + 1))
-    points, cells = distorted(given.element, lines, given.quality, given.seed)
-    return elements_of(KINDS[given.element], points, cells, [material])
+    flat = np.linspace(0.0, 1e-3 * parameters.aspect * parameters.cells, parameters.cells + 1)
+    lines = (flat, flat, np.linspace(0.0, 1e-3 * parameters.cells, parameters.cells + 1))
+    points, cells = distorted(parameters.element, lines, parameters.quality, parameters.seed)
+    return elements_of(KINDS[parameters.element], points, cells, [material])

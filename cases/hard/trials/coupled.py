@@ -1,4 +1,4 @@
-"""Two coupled models on one rank: any scheme, by the program's own operators, division and checks."""
+"""Two coupled models on one rank with any scheme, by the program's own operators, division and checks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -34,7 +34,7 @@ from reflowshock.materials.roles import ELASTIC, Materials, role_of_part
 
 Divide = Callable[[Whole, Survey, Rules], Division]
 DEFAULTS, HELD = ELASTIC, Coupling(scheme="held_velocity", levels=1)
-DURATION = 1e-2  # [s] so long that a whole number of windows shortens none
+DURATION = 1e-2  # [s] long enough for any number of windows
 
 
 def surveyed(
@@ -43,31 +43,31 @@ def surveyed(
     fraction: float = 0.9,
     coupling: Coupling = HELD,
 ) -> tuple[Whole, Survey, Rules]:
-    """Return a mesh, its survey, and the rules of its division, in which boards are coarse."""
+    """Return a mesh, its survey, and division rules with coarse boards."""
     whole = joined(mesh)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
     rules = Rules(coupling, coarse, fraction, 0.0, DURATION, 1, pushed=False)
     return whole, survey(whole.mesh, materials, Treatment()), rules
 
 
-def checked(whole: Whole, found: Survey, rules: Rules) -> Division:
-    """Divide as the program does, its checks included."""
-    division = divide(whole, found, rules)
-    check_division(whole, found, division, rules)
+def checked(whole: Whole, survey_of_mesh: Survey, rules: Rules) -> Division:
+    """Divide as the program does, with its checks."""
+    division = divide(whole, survey_of_mesh, rules)
+    check_division(whole, survey_of_mesh, division, rules)
     return division
 
 
-MANY = 1e5  # elements that each of a mesh stands for where costs are weighed, so that levels are worth while
+MANY = 1e5  # weight of each element in cost estimates, so that step levels pay off
 
 
 class Models(NamedTuple):
-    """Pieces and tables of each model, as divided."""
+    """Pieces and tables of each divided model."""
 
     parts: dict[Role, tuple[Pieces, Tables]]
     division: Division
 
     def bodies(self) -> dict[Role, Body]:
-        """Return both models on this rank, new each time: terms may have a path."""
+        """Return new bodies of both models on this rank, since terms may have a path."""
         step = self.division.meso_step
         return {
             role: make_body(MPI.COMM_SELF, *part, np.ones(len(part[0].steps)), ForceOptions(step=step))
@@ -78,9 +78,9 @@ class Models(NamedTuple):
 def models_of(
     mesh: MeshData, materials: Materials, coupling: Coupling, fraction: float, division: Divide = checked
 ) -> Models:
-    """Divide a mesh, as the program does or otherwise."""
-    whole, found, rules = surveyed(mesh, materials, fraction, coupling)
-    divided = division(whole, replace(found, cost=MANY * found.cost), rules)
+    """Divide a mesh by the program's rules or another function."""
+    whole, survey_of_mesh, rules = surveyed(mesh, materials, fraction, coupling)
+    divided = division(whole, replace(survey_of_mesh, cost=MANY * survey_of_mesh.cost), rules)
     inputs = model_inputs(whole, divided)
     return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, divided)
 
@@ -91,20 +91,20 @@ def pieces_of(item: ModelInput, materials: Materials) -> tuple[Pieces, Tables]:
 
 
 class Turn(Participant, Protocol):
-    """A participant that moves by central differences."""
+    """Participant that moves by central differences."""
 
     @property
     def motion(self) -> ExplicitMotion:
-        """Return its state."""
+        """Motion of the participant."""
 
 
 class Coupled:
-    """Macro and meso model on one rank, taking turns; its window as a matrix."""
+    """Macro and meso model on one rank, advanced in turns, with the window as a matrix."""
 
     def __init__(
         self, bodies: Mapping[Role, Body], plan: WindowPlan, scheme: Scheme, loads: Sequence[Load] = ()
     ) -> None:
-        """Make both participants of a scheme, as a rank that carries both models does."""
+        """Create both participants of a scheme, as on a rank with both models."""
         self.plan, self._scheme = plan, scheme
         channels = InterfaceChannels.open(
             MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
@@ -116,17 +116,17 @@ class Coupled:
         self.parts = (self.macro, self.meso)
         self._linked = isinstance(scheme, GravouilCombescure)
         self._free = [part.motion.mobility > 0.0 for part in self.parts]
-        self._impedance = float(bodies["macro"].mass.mean()) / plan.window  # a unit of the link's impulse
+        self._impedance = float(bodies["macro"].mass.mean()) / plan.window  # scale of the link's impulse
 
     def run(self) -> None:
-        """Take a window."""
+        """Advance by one window."""
         for part in self.parts:
             part.begin_window()
         for part in self.parts:
             part.finish_window()
 
     def swing(self, speed: np.ndarray) -> None:
-        """Start with a velocity (3,) [m/s] that changes its sign once across both models, and is smooth."""
+        """Start with a smooth velocity (3,) [m/s] that changes its sign once across both models."""
         low, high = (getattr(self.macro.motion.body.local.points[:, 0], end)() for end in ("min", "max"))
         for part in self.parts:
             motion = part.motion
@@ -138,18 +138,19 @@ class Coupled:
         return dict(zip(ENERGIES, self.sums().tolist(), strict=False))
 
     def drift(self, windows: int, samples: int, look: Callable[[], None] = lambda: None) -> tuple[float, float]:
-        """Run; return how far kinetic plus internal energy drifts, and the most that the interface holds, of the first.
+        """Run; return the drift of kinetic plus internal energy and the largest interface energy over the initial one.
 
-        The energy swings with what the interface holds; its drift is that of its mean, from the first tenth of the run
-        to the last. ``look`` is called at each sample.
+        The energy oscillates with the interface energy; the drift compares its means over the first and last tenth of
+        the run.
+        ``look`` is called at each sample.
         """
-        first, found = self.held(), []
+        first, energies = self.held(), []
         for _ in range(samples):
             for _ in range(windows // samples):
                 self.run()
-            found.append((self.held(), abs(self.energies()["interface"])))
+            energies.append((self.held(), abs(self.energies()["interface"])))
             look()
-        energy, interface = np.array(found).T / first
+        energy, interface = np.array(energies).T / first
         tenth = samples // 10
         return abs(float(energy[-tenth:].mean() - energy[:tenth].mean())), float(interface.max())
 
@@ -178,12 +179,12 @@ class Coupled:
         return 2 * sum(int(free.sum()) for free in self._free) + interface
 
     def apply(self, state: np.ndarray) -> np.ndarray:
-        """Return the state one window later: displacements, velocities times DT, link over a unit."""
+        """Return the state after one window: displacements, velocities times DT, scaled link."""
         counts = [int(free.sum()) for free in self._free]
         values = np.split(state, np.cumsum(counts + counts))
-        for part, free, place, speed in zip(self.parts, self._free, values[:2], values[2:4], strict=True):
+        for part, free, displacement, speed in zip(self.parts, self._free, values[:2], values[2:4], strict=True):
             part.motion.displacement[:], part.motion.velocity[:] = 0.0, 0.0
-            part.motion.displacement[free] = place
+            part.motion.displacement[free] = displacement
             part.motion.velocity[free] = speed / self.plan.window
         self._complete(values[4].reshape(-1, 3) * self._impedance / self.plan.window)
         self.run()
@@ -197,11 +198,11 @@ class Coupled:
         return np.concatenate(moved)
 
     def complete(self) -> None:
-        """Let all follow from displacements and velocities that were given to both models, with no link."""
+        """Update all dependent quantities after displacements and velocities were set, without a link."""
         self._complete(np.zeros((len(self.meso.motion.body.interface), 3)))
 
     def _complete(self, link: np.ndarray) -> None:
-        """Let all that follows from displacements and link follow: slaves, the held interface, forces."""
+        """Update slaves, the held interface and forces from displacements and link."""
         macro, meso = self.macro.motion, self.meso.motion
         pushed = isinstance(self._scheme, Impulse)
         if pushed:
@@ -222,7 +223,7 @@ class Coupled:
             self._channels.forces.send(meso.force)
             work = self.macro.interface_work
             self.macro.take_force()
-            self.macro.interface_work = work  # of a window that was not taken
+            self.macro.interface_work = work  # discard the work of the trial window
             return
         macro.force += self.macro.foreign_force()
 
@@ -231,5 +232,5 @@ class Coupled:
         return np.column_stack([self.apply(unit) for unit in np.eye(self.size)])
 
     def spectral_radius(self) -> float:
-        """Return the largest magnitude of an eigenvalue of the amplification matrix: more than 1 grows."""
+        """Return the largest magnitude of an eigenvalue of the amplification matrix; above 1 the window grows."""
         return float(np.abs(np.linalg.eigvals(self.matrix())).max())

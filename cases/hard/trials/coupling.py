@@ -1,4 +1,4 @@
-"""Trials of two coupled models: their parameters, in SI values, and what they measure."""
+"""Parameters, in SI values, and measures of the trials of two coupled models."""
 
 from typing import Annotated, Literal
 
@@ -14,11 +14,11 @@ SchemeOfTrial = Literal[
 
 
 class PairTrial(Parameters):
-    """A board and a finer block tied to it off its grid, coupled by a scheme.
+    """Board and a finer block tied to it off its grid, coupled by a scheme.
 
-    ``substeps`` is m; ``impedance`` and ``mesh_ratio`` are of block over board and of their elements; ``orthotropy`` is
-    the board's modulus in plane over that across (0: FR4's). The top layer of the block is thinner by ``thinnest``.
-    The scheme ``as_printed`` is the paper's.
+    ``substeps`` is m; ``impedance`` and ``mesh_ratio`` are block over board (impedances, element sizes); ``orthotropy``
+    is the board's in-plane modulus over the modulus across (0: FR4). The top layer of the block is thinner by
+    ``thinnest``. The scheme ``as_printed`` is the scheme as printed in the paper.
     """
 
     scheme: SchemeOfTrial = "held_velocity"
@@ -35,20 +35,20 @@ class PairTrial(Parameters):
 
 
 class PairRun(PairTrial):
-    """A pair that swings for some windows; ``free`` ones are held nowhere."""
+    """Pair that oscillates for some windows; ``free`` pairs have no supports."""
 
     free: bool = False
     windows: int = Field(10_000, ge=400, le=1_000_000)
 
 
 class PairTransfer(PairTrial):
-    """A pair whose block is a little off the board's face."""
+    """Pair whose block is slightly off the board's face."""
 
     offset: Annotated[float, Quantity("nm")] = Field(0.0, ge=-1e-6, le=1e-6)
 
 
 class Yielding(Parameters):
-    """A pair whose block is of solder that yields."""
+    """Pair with a block of yielding solder."""
 
     scheme: Literal["held_velocity", "impulse", "gravouil_combescure"] = "held_velocity"
     mesh_ratio: float = Field(2.0, ge=1, le=8)
@@ -57,7 +57,7 @@ class Yielding(Parameters):
 
 
 class Reflection(Parameters):
-    """A pulse, some elements long, that runs along a bar of board into a finer bar tied to its end."""
+    """Pulse of some elements' length that runs along a bar of board into a finer bar tied to its end."""
 
     scheme: Literal["held_velocity", "impulse", "gravouil_combescure", "local_steps"] = "held_velocity"
     substeps: int = Field(4, ge=1, le=20)
@@ -67,10 +67,10 @@ class Reflection(Parameters):
 
 
 class Layout(Parameters):
-    """A board with joints that is hard to divide.
+    """Board with joints that are hard to divide.
 
-    ``copper_interface``: the interface goes through copper and board; ``overhang``: a plate thinner than its elements
-    are long hangs over a joint; ``corner``: joint in a corner of the board; ``two_regions``: joints far apart.
+    ``copper_interface``: the interface crosses copper and board; ``overhang``: a plate thinner than the length of its
+    elements hangs over a joint; ``corner``: joint in a corner of the board; ``two_regions``: distant joints.
     """
 
     layout: Literal["copper_interface", "overhang", "corner", "two_regions"] = "corner"

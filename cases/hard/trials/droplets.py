@@ -1,4 +1,4 @@
-"""Trials of delta-SPH: droplets, tanks and printed parts, judged by energy, momentum, volume, walls, exact shapes."""
+"""Trials of delta-SPH: droplets, tanks and printed parts, checked by energy, momentum, volume and exact shapes."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from reflowshock.particles.sph.fluid_state import Fields
     from reflowshock.particles.sph.simulation import Simulation
 
-# Steps after which energy, momentum and the like are looked at.
+# Steps between samples of energy, momentum and other measures.
 LOOK = 10
-# In spacings: particles that are farther outside their surface are lost.
+# Distance outside the surface, in spacings, beyond which a particle counts as lost.
 OUTSIDE = 1.0
-# Of the time: "at rest" are means over the last share, the beginning is forgotten after the first.
+# Shares of the duration: end of the initial phase, and begin of the means "at rest".
 LATE, EARLY = 0.9, 0.1
 
 
 class Unrest(Parameters):
-    """Disorder of the particles at the start.
+    """Random disorder of the particles at the start.
 
-    ``displaced`` is how far each is moved along each axis at most, over the spacing; ``density`` by how much that of
-    each differs at most, over that at rest. Both are drawn evenly from a seed.
+    ``displaced`` is the largest displacement along each axis over the spacing; ``density`` the largest relative change
+    of density. Both are uniform from a seed.
     """
 
     displaced: float = Field(0.0, ge=0, le=0.3)
@@ -38,19 +38,19 @@ class Unrest(Parameters):
     seed: int = Field(1, ge=0)
 
     def disturb(self, fields: "Fields", fluids: int, spacing: float) -> None:
-        """Displace the particles of a liquid, a spacing apart [m], in two or three dimensions; change densities."""
+        """Displace the particles of a liquid, a spacing [m] apart, and change their densities."""
         random = np.random.default_rng(self.seed)
-        for place in fields[:3]:
-            if np.ptp(place) > 0.0:
-                place[:fluids] += self.displaced * spacing * random.uniform(-1.0, 1.0, fluids)
+        for coordinate in fields[:3]:
+            if np.ptp(coordinate) > 0.0:
+                coordinate[:fluids] += self.displaced * spacing * random.uniform(-1.0, 1.0, fluids)
         fields.density[:fluids] *= 1.0 + self.density * random.uniform(-1.0, 1.0, fluids)
 
 
 class DropletTrial(Parameters):
-    """A droplet, or two equal ones, for the duration of the scene.
+    """One droplet or two equal ones for the duration of the scene.
 
-    The second one lands beside the first, or they fly against each other along x, each with a speed, their paths so
-    many diameters apart.
+    The second droplet lands next to the first, or they collide along x with a speed each and paths an offset apart
+    [diameters].
     """
 
     droplet: Droplet
@@ -61,9 +61,9 @@ class DropletTrial(Parameters):
 
 
 class TankTrial(Parameters):
-    """A column of liquid in a tank, in a plane; at rest at its wall, or thrown at the other one from the middle.
+    """Plane column of liquid in a tank, at rest at one wall or thrown at the other from the middle.
 
-    With ``undiffused`` it is computed a second time, without diffusion of density, to compare their noise.
+    With ``undiffused`` it runs again without density diffusion to compare the noise.
     """
 
     dam_break: DamBreak
@@ -79,14 +79,14 @@ class TankTrial(Parameters):
 
 
 class PrintTrial(Parameters):
-    """Drops that are printed."""
+    """Printed drops."""
 
     printing: Printing
 
 
 @dataclass(slots=True)
 class Watch:
-    """What is looked at while a liquid moves; called in every step."""
+    """Sampler of a moving liquid, called in every step."""
 
     simulation: "Simulation"
     rows: list[tuple[float, ...]] = field(default_factory=list)
@@ -95,35 +95,36 @@ class Watch:
         self._look()
 
     def __call__(self, fraction: float) -> None:
-        """Look, where it is time."""
+        """Take a sample when one is due."""
         if self.simulation.steps % LOOK == 0 or fraction >= 1.0:
             self._look()
 
     def _look(self) -> None:
-        one = self.simulation
-        fields, liquid = one.fields, slice(one.fluids)
-        mass, law = fields.mass[liquid], one.law
+        simulation = self.simulation
+        fields, liquid = simulation.fields, slice(simulation.fluids)
+        mass, law = fields.mass[liquid], simulation.law
         weight = -law.gravity_z * float(mass @ fields.z[liquid])
-        tension = one.surface.energy if one.surface else 0.0
+        tension = simulation.surface.energy if simulation.surface else 0.0
         momentum = [float(mass @ speed[liquid]) for speed in fields[3:6]]
-        centre = [float(mass @ place[liquid]) / float(mass.sum()) for place in fields[:3]]
+        centre = [float(mass @ coordinate[liquid]) / float(mass.sum()) for coordinate in fields[:3]]
         self.rows.append(
             (
-                one.time, one.kinetic_energy + tension + weight + one.elastic_energy, one.fastest,
+                simulation.time, simulation.kinetic_energy + tension + weight + simulation.elastic_energy,
+                simulation.fastest,
                 float(np.hypot(momentum[0], momentum[1])) if law.mirror else float(np.linalg.norm(momentum)),
                 float(np.abs(fields.density[liquid] / law.rest_density - 1.0).max()),
-                float(one.pressures.mean()), *centre,
+                float(simulation.pressures.mean()), *centre,
             )
         )  # fmt: skip
 
     def measured(self) -> dict[str, float]:
-        """Measures that all liquids have."""
+        """Return the measures of all liquids."""
         time, energy, fastest, momentum, squeezed, pressure, *centre = np.array(self.rows).T
         law, mass = self.simulation.law, float(self.simulation.fields.mass[: self.simulation.fluids].sum())
         later = np.maximum.accumulate(energy[::-1])[::-1]
         early, late = (time >= share * time[-1] for share in (EARLY, LATE))
         middle = early & (time <= 2.0 * EARLY * time[-1])
-        aside = np.hypot(*(place - place[early][0] for place in centre[:2]))
+        aside = np.hypot(*(coordinate - coordinate[early][0] for coordinate in centre[:2]))
         return {
             "steps": self.simulation.steps,
             "energy_over_start": energy.max() / energy[0] - 1.0,
@@ -139,7 +140,7 @@ class Watch:
 
 
 def droplet(parameters: DropletTrial) -> dict[str, float]:
-    """Let one droplet or two move."""
+    """Run one droplet or two."""
     from reflowshock.particles.sph_flows.droplet import follow
 
     scene, simulation = parameters.droplet, droplets(parameters)
@@ -153,73 +154,73 @@ def droplet(parameters: DropletTrial) -> dict[str, float]:
         "surface_volume": (surface.volume + surface.spray) / (count * scene.volume) - 1.0,
         "outside": _outside(simulation),
         "below_wall": float((simulation.fields.z < 0.0).sum()) if scene.has_wall else 0.0,
-        "mergers": sum(one.after < one.before for one in surface.meetings),
+        "mergers": sum(merger.after < merger.before for merger in surface.topology_changes),
     }  # fmt: skip
 
 
 def droplets(parameters: DropletTrial) -> "Simulation":
-    """Set up one droplet or two, and their disorder."""
+    """Set up one droplet or two with their disorder."""
     from reflowshock.particles.sph import flow
     from reflowshock.particles.sph.simulation import Simulation
-    from reflowshock.particles.sph.surface_care import EDGE
     from reflowshock.particles.sph_flows.droplet import droplet as alone
+    from reflowshock.particles.surface.remeshing import EDGE
 
     scene = parameters.droplet
-    one = alone(scene)
-    fields, surface = one.fields, one.surface
+    simulation = alone(scene)
+    fields, surface = simulation.fields, simulation.surface
     assert surface is not None
     if parameters.pair != "none":
         points, corners, triangles = np.array(fields[:3]), surface.points.copy(), surface.triangles.copy()
-        gap = 0.5 * EDGE * one.law.spacing
+        gap = 0.5 * EDGE * simulation.law.spacing
         aside = np.array([0.5 * (np.ptp(corners[:, 0])) + gap, 0.5 * parameters.offset * scene.diameter, 0.0])
         both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), one.law)
+        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), simulation.law)
         fields.u[:] = parameters.approach * np.repeat([1.0, -1.0], points.shape[1])
         fields.w[:] = -scene.impact_speed
-        surface.points = corners - aside
+        surface.mesh.points = corners - aside
         surface.add(corners + aside, triangles)
-    parameters.unrest.disturb(fields, len(fields.x), one.law.spacing)
-    return Simulation(fields, len(fields.x), one.law, surface, flow.device_of(scene))
+    parameters.unrest.disturb(fields, len(fields.x), simulation.law.spacing)
+    return Simulation(fields, len(fields.x), simulation.law, surface, flow.device_of(scene))
 
 
 def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[str, Any]) -> dict[str, float]:
-    """Errors of the shape that all liquid together would have at rest, and what an impact spread to."""
+    """Return errors of the rest shape of the whole liquid, and the spread of an impact."""
     scene, late = parameters.droplet, history["time"] >= LATE * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}
     size = 1.0 if parameters.pair == "none" else 2.0 ** (1.0 / 3.0)
-    found = {
+    measures = {
         "capillary_number": metrics["capillary_number"][0],
         "parts": history["parts"][-1],
         "spread_max": history["spread"].max(),
     }
     if not scene.has_wall:
         pressure = mean["mean_pressure"] / scene.laplace_pressure * size - 1.0
-        return found | {"pressure_error": pressure, "roundness": mean["roundness"]}
+        return measures | {"pressure_error": pressure, "roundness": mean["roundness"]}
     base, height = cap(scene.angle)
     errors = {"base_error": mean["base"] / (size * base) - 1.0, "height_error": mean["height"] / (size * height) - 1.0}
-    return found | errors
+    return measures | errors
 
 
 def _outside(simulation: "Simulation") -> float:
-    """Share of the particles that are farther outside their surface than `OUTSIDE`."""
-    from reflowshock.particles.surface.cloud_level_set import mirrored
+    """Return the share of particles more than ``OUTSIDE`` outside their surface."""
+    from reflowshock.particles.surface.cloud_level_set import with_mirror_image
     from reflowshock.particles.surface.level_set import depths
 
     surface = simulation.surface
     assert surface is not None
     closed = surface.points, surface.triangles
-    closed = mirrored(*closed) if simulation.law.mirror else closed
-    inside = depths(np.stack(simulation.fields[:3], axis=1), closed)
+    closed = with_mirror_image(*closed) if simulation.law.mirror else closed
+    inside = depths(np.stack(simulation.fields[:3], axis=1), *closed)
     return float((inside < -OUTSIDE * simulation.law.spacing).mean())
 
 
 def tank(parameters: TankTrial) -> dict[str, float]:
-    """Let a column in a tank flow, or rest; noise is that of the pressure about that at rest, over rho g H."""
-    found, noise = _tank(parameters)
+    """Run a column in a tank; noise is the deviation from hydrostatic pressure over rho g H."""
+    measures, noise = _tank(parameters)
     if parameters.undiffused:
         rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
-        found["noise_gain"] = _tank(rough)[1] / noise
-    return found
+        measures["noise_gain"] = _tank(rough)[1] / noise
+    return measures
 
 
 def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
@@ -228,12 +229,12 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
     from reflowshock.particles.sph_flows.dam_break import dam, particles_lost
 
     scene = parameters.dam_break
-    one = dam(scene)
+    filled = dam(scene)
     if parameters.thrown:
-        one.fields.u[: one.fluids] = parameters.thrown
-        one.fields.x[: one.fluids] += 0.5 * (scene.tank_length - scene.width)
-    parameters.unrest.disturb(one.fields, one.fluids, one.law.spacing)
-    simulation = Simulation(one.fields, one.fluids, one.law, device=flow.device_of(scene))
+        filled.fields.u[: filled.fluids] = parameters.thrown
+        filled.fields.x[: filled.fluids] += 0.5 * (scene.tank_length - scene.width)
+    parameters.unrest.disturb(filled.fields, filled.fluids, filled.law.spacing)
+    simulation = Simulation(filled.fields, filled.fluids, filled.law, device=flow.device_of(scene))
     watch, unit = Watch(simulation), scene.density * scene.gravity * scene.height
 
     def errors(now: "Simulation") -> tuple[float, float, float]:
@@ -243,17 +244,17 @@ def _tank(parameters: TankTrial) -> tuple[dict[str, float], float]:
     history = flow.run_flow(simulation, scene.until, errors, watch).history(("time", "mean", "noise"))
     late = history["time"] >= LATE * history["time"][-1]
     noise = float(history["noise"][late].mean())
-    found = {
+    measures = {
         "noise": noise,
         "pressure_error": history["mean"][late].mean(),
         "particles_lost": particles_lost(scene, simulation),
         "speed_at_end": np.array(watch.rows)[-1, 2] / scene.fastest,
     }
-    return watch.measured() | found, noise
+    return watch.measured() | measures, noise
 
 
 def printed(parameters: PrintTrial) -> dict[str, float]:
-    """Print a part; the largest speed is over that of sound, lengths over the diameter of a drop or the spacing."""
+    """Print a part; return speeds over the speed of sound and lengths over the drop diameter or the spacing."""
     from scipy.spatial import cKDTree
 
     from reflowshock.particles.printing.printing import solve_printing

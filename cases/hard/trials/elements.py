@@ -1,4 +1,4 @@
-"""Trials of elements and of one model that moves: their parameters, in SI values, and what they measure."""
+"""Parameters, in SI values, and measures of the trials of elements and of one moving model."""
 
 from typing import Annotated, Literal
 
@@ -15,9 +15,9 @@ Seed = Annotated[int, Field(ge=0)]
 
 
 class Elastic(Parameters):
-    """An elastic body of distorted elements.
+    """Elastic body of distorted elements.
 
-    ``orthotropy`` is the modulus in x and y over that in z. Nodes are moved at random until the least scaled Jacobian
+    ``orthotropy`` is the modulus in x and y over the modulus in z. Nodes move at random until the least scaled Jacobian
     is ``quality``; boxes are ``aspect`` times as long in x and y as in z.
     """
 
@@ -31,19 +31,19 @@ class Elastic(Parameters):
 
 
 class Patch(Elastic):
-    """A body whose nodes all move with one affine field; finite kinematics also strain it much."""
+    """Body with an affine displacement field, with large strains for finite kinematics."""
 
     kinematics: Kinematics = "small"
 
 
 class Turns(Elastic):
-    """A body that is turned, rigid, in quarter turns."""
+    """Rigid body rotation in quarter turns."""
 
     turns: int = Field(100, ge=1, le=1000)
 
 
 class Bending(Parameters):
-    """A beam of ``cells`` boxes along, across and up, of an aspect each, under a force at its end."""
+    """Beam of ``cells`` boxes along, across and up, with an aspect ratio, under a tip force."""
 
     element: Element = "incompatible_modes"
     poisson_ratio: float = Field(0.0, ge=0, lt=0.5)
@@ -52,21 +52,21 @@ class Bending(Parameters):
 
 
 class Order(Parameters):
-    """A cube of ever smaller elements, none of them a box."""
+    """Cube on a sequence of refined meshes without any box."""
 
     element: Element = "incompatible_modes"
     poisson_ratio: float = Field(0.3, ge=0, lt=0.5)
 
 
 class Hinge(Parameters):
-    """A beam of layers of elements that is bent to six times the curvature at which it yields."""
+    """Layered beam bent to six times its yield curvature."""
 
     element: Hexahedron = "one_point"
     layers: int = Field(2, ge=1, le=4)
 
 
 class Tension(Elastic):
-    """A body of a metal with linear hardening that is pulled to a plastic strain, and turned if that may be large."""
+    """Metal body with linear hardening under plastic tension, with rotation for finite kinematics."""
 
     kinematics: Kinematics = "small"
     plastic_strain: float = Field(0.02, gt=0, le=1)
@@ -74,18 +74,18 @@ class Tension(Elastic):
 
 
 class Compression(Elastic):
-    """An elastic body in a channel that is pressed to a fraction of its length, or pulled."""
+    """Confined elastic body under compression or tension."""
 
     stretch: float = Field(0.5, ge=0.05, le=10)
     steps: int = Field(200, ge=10, le=5000)
 
 
 class Flight(Elastic):
-    """A free body with energy in all its modes, that flies for some steps.
+    """Free body with energy in all modes for some steps.
 
-    Its upper half is ``contrast`` times softer, a ``foil`` of copper may lie between, with its mass scaled to the step
-    of the others. The step is a fraction of the critical one of elements or of the assembled body. Damping alpha M +
-    beta K is given as alpha dt and beta over the undamped step.
+    Its upper half is softer by ``contrast``, with an optional ``foil`` of copper between the halves, mass-scaled to the
+    step of the others. The step is a fraction of the critical step of elements or of the assembled body. Damping alpha
+    M + beta K is given as alpha dt and beta over the undamped step.
     """
 
     kinematics: Kinematics = "small"
@@ -100,7 +100,7 @@ class Flight(Elastic):
 
 
 class Impact(Parameters):
-    """A rod of solder that strikes a rigid wall; its sections lean by ``skew``."""
+    """Rod of solder that strikes a rigid wall, with sections inclined by ``skew``."""
 
     element: Hexahedron = "one_point"
     kinematics: Kinematics = "finite"
@@ -111,7 +111,7 @@ class Impact(Parameters):
 
 
 class Tied(Parameters):
-    """Two blocks of one footprint under tension, tied by faces with ``ratio`` times as many elements each way."""
+    """Two blocks of one footprint under tension, tied by faces with a ratio of ``ratio`` elements in each direction."""
 
     element: Hexahedron = "incompatible_modes"
     coarse: int = Field(2, ge=1, le=6)
@@ -122,7 +122,7 @@ class Tied(Parameters):
 
 
 class PulseTrial(Parameters):
-    """A free block under a pulse of acceleration whose duration is counted in steps."""
+    """Free block under an acceleration pulse with a duration in steps."""
 
     pulse: Literal["half_sine", "haversine", "constant", "triangle"] = "half_sine"
     steps: float = Field(20.0, gt=0, le=1000)

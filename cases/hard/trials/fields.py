@@ -1,4 +1,4 @@
-"""Trials of elements with one field of strain: patch tests, turns, tension, compression, and a pull across a tie."""
+"""Element trials with uniform strain: patch tests, rotations, tension, compression, and tension across a tie."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -23,11 +23,11 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
 
 AXIS = np.array([0.48, -0.6, 0.64])
-LARGE = 0.3  # largest component of a displacement gradient of finite strain
+LARGE = 0.3  # largest component of a finite displacement gradient
 
 
 class Followed(NamedTuple):
-    """The end of a path: stress (3, 3) in the frame that turns along, its scatter, the force on inner nodes.
+    """State at the end of a path: co-rotated stress (3, 3), its scatter, and the force on inner nodes.
 
     Scatter and force are relative.
     """
@@ -37,14 +37,14 @@ class Followed(NamedTuple):
     force: float
 
 
-def patch(given: Patch) -> dict[str, float]:
-    """Return what an affine field leaves on inner nodes, how its stress scatters, and what elements resist by."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    elements = body_of(given, material)
-    gradient = np.random.default_rng(given.seed).uniform(-1.0, 1.0, (3, 3)) * LARGE
-    if given.kinematics == "finite":
-        found = follow(nonlinear(elements, material, finite=True), lambda s: np.eye(3) + s * gradient, 1)
-        force_error, stress_error = found.force, found.scatter
+def patch(parameters: Patch) -> dict[str, float]:
+    """Return the force on inner nodes and the stress scatter of an affine field, and the element stiffness extremes."""
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    elements = body_of(parameters, material)
+    gradient = np.random.default_rng(parameters.seed).uniform(-1.0, 1.0, (3, 3)) * LARGE
+    if parameters.kinematics == "finite":
+        errors = follow(nonlinear(elements, material, finite=True), lambda s: np.eye(3) + s * gradient, 1)
+        force_error, stress_error = errors.force, errors.scatter
     else:
         force_error, stress_error = affine(elements, gradient)
     softest, rigid = resisted(elements)
@@ -52,7 +52,7 @@ def patch(given: Patch) -> dict[str, float]:
 
 
 def affine(elements: Elements, gradient: np.ndarray) -> tuple[float, float]:
-    """Return the force on inner nodes, over the largest, and the error of the stress, of linear elements."""
+    """Return the relative force on inner nodes and the stress error of linear elements in an affine field."""
     displacement = elements.points @ gradient.T
     force = np.zeros_like(displacement)
     for term in linear_terms(elements):
@@ -67,9 +67,9 @@ def affine(elements: Elements, gradient: np.ndarray) -> tuple[float, float]:
 
 
 def resisted(elements: Elements) -> tuple[float, float]:
-    """Return the softest strain of any element and its stiffest rigid motion, over its stiffest strain.
+    """Return the softest strain mode and the stiffest rigid mode of any element over its stiffest strain mode.
 
-    Nodes are scaled to a cube: a flat element is soft in bending because it is flat.
+    Nodes are scaled to a cube, since a flat element is soft in bending by its shape alone.
     """
     corners = elements.points[elements.cells]
     values = np.linalg.eigvalsh(elements.kind.stiffness(corners, elements.elasticity, elements.material))
@@ -77,31 +77,31 @@ def resisted(elements: Elements) -> tuple[float, float]:
 
 
 def inner_nodes(elements: Elements) -> np.ndarray:
-    """Return the nodes (k,) on no face of the body."""
+    """Return the nodes (k,) inside the body."""
     return np.setdiff1d(np.arange(len(elements.points)), boundary_facets(elements.cells))
 
 
-def turns(given: Turns) -> dict[str, float]:
-    """Return force and stress, over the modulus, that turning alone has made: none, exactly."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    term = nonlinear(body_of(given, material), material, finite=True)
+def turns(parameters: Turns) -> dict[str, float]:
+    """Return force and stress over the modulus after rotations alone; both are zero in theory."""
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    term = nonlinear(body_of(parameters, material), material, finite=True)
     points, worst = term.elements.points, 0.0
     area = float(np.ptp(points, axis=0).max()) ** 2
     modulus = float(term.elements.elasticity.max())
-    for turn in np.linspace(0.0, given.turns, 4 * given.turns + 1)[1:]:
+    for turn in np.linspace(0.0, parameters.turns, 4 * parameters.turns + 1)[1:]:
         matrix = Rotation.from_rotvec(2 * np.pi * turn * AXIS).as_matrix()
         worst = np.maximum(worst, np.abs(force_of(term, points @ matrix.T - points)).max())
     stress = term.means(np.arange(len(term.numbers))).stress
     return {"force_error": float(worst) / (modulus * area), "stress_error": float(np.abs(stress).max()) / modulus}
 
 
-def tension(given: Tension) -> dict[str, float]:
-    """Return the error of the stress at the end of a uniaxial path of a metal, where its law gives it exactly.
+def tension(parameters: Tension) -> dict[str, float]:
+    """Return the stress error at the end of a uniaxial path of a metal with an exact solution.
 
-    Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; of finite kinematics these are logarithmic, and the
-    body turns by 1.4 rad on the way.
+    Axial strain s / E + p, lateral -nu s / E - p / 2, s = A + B p; logarithmic for finite kinematics with a rotation of
+    1.4 rad on the path.
     """
-    metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, given.plastic_strain
+    metal, law, plastic = LINEAR_HARDENING, LINEAR_HARDENING.plasticity, parameters.plastic_strain
     assert law is not None
     stress = law.A + law.B * plastic
     elastic = stress / metal.young_modulus
@@ -109,35 +109,37 @@ def tension(given: Tension) -> dict[str, float]:
     turn = Rotation.from_rotvec([0.3, 1.1, -0.7])
 
     def path(s: float) -> np.ndarray:
-        if given.kinematics == "small":
+        if parameters.kinematics == "small":
             return np.eye(3) + s * np.diag(strain)
         return (turn**s).as_matrix() @ np.diag(np.exp(s * strain))
 
-    found = follow(nonlinear(body_of(given, metal), metal, given.kinematics == "finite"), path, given.steps)
-    return judged(found, np.diag([stress, 0.0, 0.0]))
+    history = follow(
+        nonlinear(body_of(parameters, metal), metal, parameters.kinematics == "finite"), path, parameters.steps
+    )
+    return judged(history, np.diag([stress, 0.0, 0.0]))
 
 
-def compression(given: Compression) -> dict[str, float]:
-    """Return the error of the stress of a confined body, C ln U exactly."""
-    material = laminate(given.poisson_ratio, given.orthotropy)
-    term = nonlinear(body_of(given, material), material, finite=True)
-    found = follow(term, lambda s: np.diag([1.0, 1.0, given.stretch**s]), given.steps)
-    return judged(found, symmetric((np.log(given.stretch) * term.elements.elasticity[0, :, 2])[None])[0])
+def compression(parameters: Compression) -> dict[str, float]:
+    """Return the stress error of a confined body against C ln U."""
+    material = laminate(parameters.poisson_ratio, parameters.orthotropy)
+    term = nonlinear(body_of(parameters, material), material, finite=True)
+    history = follow(term, lambda s: np.diag([1.0, 1.0, parameters.stretch**s]), parameters.steps)
+    return judged(history, symmetric((np.log(parameters.stretch) * term.elements.elasticity[0, :, 2])[None])[0])
 
 
-def judged(found: Followed, exact: np.ndarray) -> dict[str, float]:
-    """Compare the end of a path with its exact stress."""
+def judged(history: Followed, exact: np.ndarray) -> dict[str, float]:
+    """Return the errors at the end of a path against its exact stress."""
     return {
-        "stress_error": float(np.abs(found.stress - exact).max() / np.abs(exact).max()),
-        "stress_scatter": found.scatter,
-        "force_error": found.force,
+        "stress_error": float(np.abs(history.stress - exact).max() / np.abs(exact).max()),
+        "stress_scatter": history.scatter,
+        "force_error": history.force,
     }
 
 
 def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: int) -> Followed:
-    """Deform all by F(s), s from 0 to 1.
+    """Deform the body by F(s), s from 0 to 1.
 
-    Round-off of U is multiplied by the modulus, which forces and stresses are over where that is more.
+    Forces and stresses are relative to the modulus if that is larger, since it multiplies the round-off of U.
     """
     elements = term.elements
     points = elements.points
@@ -148,23 +150,23 @@ def follow(term: NonlinearElements, path: Callable[[float], np.ndarray], steps: 
     return Followed(symmetric(means[:1])[0], float(np.abs(means - means[0]).max() / np.abs(means).max()), float(left))
 
 
-SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # of a block [m], and its layers of elements
-PULL = 1e-3  # displacement of the upper face over the height of both blocks
+SIDE, HEIGHT, LAYERS = 3e-3, 2e-3, 3  # side, height [m] and layers of a block
+PULL = 1e-3  # displacement of the upper face over the total height
 
 
-def tied(given: Tied) -> dict[str, float]:
-    """Return how far stresses are from the one that is the same everywhere, at worst and in the mean, and the force.
+def tied(parameters: Tied) -> dict[str, float]:
+    """Return the largest and mean stress error, and the force error, of two tied blocks under tension.
 
-    Without lateral contraction two blocks that are pulled have one stress, whatever their moduli. Nodes that follow a
-    face at points give its forces back so that their sum and moment are kept, but not those of each node: stresses next
-    to the tie are wrong by what `stress_error` says, and the pull by far less.
+    Without lateral contraction the stress is uniform whatever the moduli. Slave nodes return their forces to the master
+    face with exact sum and moment, but not for each node: stresses near the tie have the error ``stress_error``, the
+    total force has a far smaller one.
     """
-    body = body_of_blocks(given)
+    body = body_of_blocks(parameters)
     displacement, top = pulled(body)
     elements = body.elements
     moduli = elements.elasticity[elements.material]
     stress = element_stress(body.geometry.gradient, moduli, displacement[elements.cells])[:, 2]
-    exact = PULL * 2 * HEIGHT / (HEIGHT / YOUNG + HEIGHT * given.contrast / YOUNG)
+    exact = PULL * 2 * HEIGHT / (HEIGHT / YOUNG + HEIGHT * parameters.contrast / YOUNG)
     force = stiffness_matrix(elements) @ displacement.ravel()
     volume = body.geometry.volume
     return {
@@ -174,33 +176,36 @@ def tied(given: Tied) -> dict[str, float]:
     }
 
 
-def body_of_blocks(given: Tied) -> Body:
-    """Return both blocks as one body: the program's own tie, which it checks."""
-    item = prepare(append(blocks(given)), "dns")["dns"]
-    soft = laminate(0.0, young=YOUNG / given.contrast)
+def body_of_blocks(parameters: Tied) -> Body:
+    """Return both blocks as one body with the program's own tie and its checks."""
+    item = prepare(append(blocks(parameters)), "dns")["dns"]
+    soft = laminate(0.0, young=YOUNG / parameters.contrast)
     pieces = make_pieces(
         distribute(MPI.COMM_SELF, item.mesh),
         item.tables,
         Materials(board=laminate(0.0), substrate=soft),
-        given.element,
+        parameters.element,
     )
     return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
 
 
-def blocks(given: Tied) -> list[MeshData]:
-    """Return the lower, coarse block and the upper one, whose nodes follow the lower one's face."""
+def blocks(parameters: Tied) -> list[MeshData]:
+    """Return the lower, coarse block and the upper, tied one."""
     made = []
-    for name, count, low in (("board", given.coarse, 0.0), ("substrate", round(given.coarse * given.ratio), HEIGHT)):
+    for name, count, low in (
+        ("board", parameters.coarse, 0.0),
+        ("substrate", round(parameters.coarse * parameters.ratio), HEIGHT),
+    ):
         flat = np.linspace(0.0, SIDE, count + 1)
         lines = (flat, flat, np.linspace(low, low + HEIGHT, LAYERS + 1))
-        points, cells = distorted(given.element, lines, given.quality, given.seed, faces=False)
+        points, cells = distorted(parameters.element, lines, parameters.quality, parameters.seed, faces=False)
         role = "master@tie" if low == 0.0 else "slave@tie"
         made.append(mesh_of(points, cells, name, {role: on(2, HEIGHT)}))
     return made
 
 
 def pulled(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacement (n, 3) of a body whose upper face is pulled, and the nodes (k,) of that face.
+    """Return the displacement (n, 3) of a body under tension, and the nodes (k,) of the pulled face.
 
     Nodes at x = 0, y = 0 and z = 0 keep that coordinate.
     """
@@ -208,11 +213,11 @@ def pulled(body: Body) -> tuple[np.ndarray, np.ndarray]:
     count, tie = len(points), np.kron(body.tie.matrix(len(points)).toarray(), np.eye(3))
     stiffness = tie.T @ (stiffness_matrix(body.elements) @ tie)
     top = np.flatnonzero(points[:, 2] > 2 * HEIGHT - 1e-9)
-    given, known = np.zeros((count, 3)), np.abs(points) < 1e-9
-    given[top, 2], known[top, 2] = PULL * 2 * HEIGHT, True
-    known[body.tie.slave] = True
-    free = ~known.ravel()
-    displacement = given.ravel()
+    prescribed, is_prescribed = np.zeros((count, 3)), np.abs(points) < 1e-9
+    prescribed[top, 2], is_prescribed[top, 2] = PULL * 2 * HEIGHT, True
+    is_prescribed[body.tie.slave] = True
+    free = ~is_prescribed.ravel()
+    displacement = prescribed.ravel()
     displacement[free] = np.linalg.solve(stiffness[np.ix_(free, free)], -(stiffness @ displacement)[free])
     result = displacement.reshape(-1, 3)
     body.tie.spread(result)

@@ -1,4 +1,4 @@
-"""Small meshes in memory: structured boxes with named facets, and joints that match nothing."""
+"""Small meshes in memory: structured boxes with named facets, and non-matching joints."""
 
 from collections.abc import Callable, Sequence
 

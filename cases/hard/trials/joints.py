@@ -1,4 +1,4 @@
-"""Joints of known shape are meshed in their place and measured; triangulations as from elsewhere, faulty or not."""
+"""Joint meshes of known shape at their pad sites, and external triangulations with or without faults."""
 
 import tempfile
 from collections.abc import Sequence
@@ -20,12 +20,12 @@ from reflowshock.meshing.joint.solder_mesh import mesh_bridge, mesh_joint
 from reflowshock.meshing.surface.closed_surface import ClosedSurface, enclosed_volume, pad_planes
 from reflowshock.meshing.surface.user_surface import load_surface
 
-PAIR = 1.0 * MM  # distance of two joints that are one body
+PAIR = 1.0 * MM  # distance of two merged joints
 
 
 @dataclass(frozen=True, slots=True)
 class Underside:
-    """A package's underside that is one plane."""
+    """Plane underside of a package."""
 
     planes: PadPlanes
     x: float
@@ -39,9 +39,9 @@ class Underside:
 
 @dataclass(frozen=True, slots=True)
 class Meshed:
-    """A mesh, the surface that it fills in its own frame, and the plane or curved underside that its head must reach.
+    """Mesh, its source surface, and the plane or curved underside that its head must reach.
 
-    The copper [m] is between head and underside.
+    The copper [m] lies between head and underside.
     """
 
     mesh: JointMesh
@@ -51,7 +51,7 @@ class Meshed:
 
 
 def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
-    """The site of a joint, or the two of a pair that is 1 mm apart."""
+    """Return the site of a joint, or of a pair 1 mm apart."""
     planes = pad_planes(surface)
     lower = surface.points[np.unique(surface.triangles[surface.boundary == 1])]
     wetted = float(np.linalg.norm(lower[:, :2], axis=1).max())
@@ -74,15 +74,15 @@ def sites_of(surface: ClosedSurface, pair: bool) -> tuple[PadSite, ...]:
 
 
 def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNumerics | None = None) -> Meshed:
-    """Mesh a joint, or two that are one body, under a plane that is where its head is.
+    """Mesh a joint, or two merged ones, under a plane at the height of the head.
 
     Args:
-        surface: of the body.
-        sites: one or two.
-        numerics: how finely; None for the package's own.
+        surface: Surface of the body.
+        sites: One or two sites.
+        numerics: Mesh settings; None for the settings of the package.
 
     Raises:
-        JointMeshError: no mesh meets its bars.
+        JointMeshError: If no mesh meets its quality limits.
     """
     first = sites[0]
     whole = package() if numerics is None else package(joint_numerics=numerics.model_dump())
@@ -96,17 +96,17 @@ def mesh_at(surface: ClosedSurface, sites: Sequence[PadSite], numerics: JointNum
 def mesh_warped(
     corner: float, bulge: float, discs: tuple[float, float], offset: float, numerics: JointNumerics | None = None
 ) -> Meshed:
-    """Mesh the corner joint of a small package that is warped, in a shape as high as the package is over its head.
+    """Mesh the corner joint of a warped small package, in a shape as high as the gap at its head.
 
     Args:
-        corner: lift of the package over that joint [m].
-        bulge: of the barrel [m].
-        discs: radii of the wetted discs on board and package [m].
-        offset: of the package's disc along x [m].
-        numerics: how finely; None for the package's own.
+        corner: Lift of the package over that joint [m].
+        bulge: Bulge of the barrel [m].
+        discs: Radii of the wetted discs on board and package [m].
+        offset: Offset of the package's disc along x [m].
+        numerics: Mesh settings; None for the settings of the package.
 
     Raises:
-        JointMeshError: no mesh meets its bars.
+        JointMeshError: If no mesh meets its quality limits.
     """
     warpage, lower, upper = Warpage(corner=corner), *discs
     whole = package() if numerics is None else package(joint_numerics=numerics.model_dump())
@@ -127,9 +127,10 @@ def mesh_warped(
 
 
 def measured(meshed: Meshed) -> dict[str, float]:
-    """Measure a mesh: errors against the surface that it fills, smallest scaled Jacobian, hexahedra of solder.
+    """Return errors against the source surface, smallest scaled Jacobian, and number of solder hexahedra.
 
-    Volume, Jacobian and head are measured anew; standoff, contact areas and deviation are what the mesher found.
+    Volume, Jacobian and head are measured independently; standoff, contact areas and deviation are reported by the
+    mesher.
     """
     made = meshed.mesh
     quality = joint_quality(made)
@@ -147,51 +148,51 @@ def measured(meshed: Meshed) -> dict[str, float]:
 
 
 def head_error(meshed: Meshed) -> float:
-    """Largest distance [m] of the solder's upper face from the package's copper."""
+    """Return the largest distance [m] of the solder's upper face from the package's copper."""
     made = meshed.mesh
     heads = [quads for name, quads in made.facets.items() if name.startswith("pad_package@")]
     points = made.points[np.unique(np.concatenate([quads.ravel() for quads in heads]))]
-    place = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
-    return float(np.abs(points[:, 2] - place).max())
+    heights = meshed.side.height(points[:, 0], points[:, 1]) - meshed.copper
+    return float(np.abs(points[:, 2] - heights).max())
 
 
 Triangulation = tuple[np.ndarray, np.ndarray]
 
 
 def no_fault(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """Leave it as it is."""
+    """Return the surface unchanged."""
     return points, triangles
 
 
 def hole(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """A triangle is missing."""
+    """Remove a triangle."""
     return points, np.delete(triangles, 700, axis=0)
 
 
 def flipped(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """A triangle faces inwards."""
+    """Turn one triangle inwards."""
     triangles = triangles.copy()
     triangles[700] = triangles[700, ::-1]
     return points, triangles
 
 
 def inside_out(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """All triangles face inwards."""
+    """Turn all triangles inwards."""
     return points, triangles[:, ::-1]
 
 
 def doubled(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """All triangles are there twice."""
+    """Duplicate all triangles."""
     return points, np.vstack([triangles, triangles])
 
 
 def two_shells(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """A second surface inside the first faces outwards."""
+    """Add an outward surface inside the first."""
     return np.vstack([points, 0.99 * points]), np.vstack([triangles, triangles + len(points)])
 
 
 def crossing(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """A dent on one side reaches through the other."""
+    """Push a dent on one side through the other side."""
     points = points.copy()
     near = np.exp(-(((points - [0.28 * MM, 0.0, 0.5 * np.ptp(points[:, 2])]) / (0.06 * MM)) ** 2).sum(axis=1))
     points[:, 0] -= 0.7 * MM * near
@@ -199,13 +200,13 @@ def crossing(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
 
 
 def void_outside(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """A void lies beside the body."""
+    """Add a void outside the body."""
     more, shell = sphere((1.0 * MM, 0.0, 0.1 * MM), 0.05 * MM)
     return np.vstack([points, more]), np.vstack([triangles, shell[:, ::-1] + len(points)])
 
 
 def round_top(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """The upper end is not flat."""
+    """Round the upper end."""
     points = points.copy()
     height = np.ptp(points[:, 2])
     points[:, 2] -= 0.2 * (points[:, 0] ** 2 + points[:, 1] ** 2) / (0.3 * MM) * (points[:, 2] / height)
@@ -213,7 +214,7 @@ def round_top(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
 
 
 def far_too_high(points: np.ndarray, triangles: np.ndarray) -> Triangulation:
-    """The body does not fit its gap."""
+    """Scale the body beyond its gap."""
     return points * [1.0, 1.0, 1.3], triangles
 
 
@@ -238,24 +239,24 @@ NAME = "A4"
 
 
 def site() -> PadSite:
-    """Where it goes: the corner joint of a small, flat package."""
-    return {place.name: place for place in pad_table(package(), board(), Warpage())}[NAME]
+    """Return the corner joint of a small, flat package."""
+    return {pad_site.name: pad_site for pad_site in pad_table(package(), board(), Warpage())}[NAME]
 
 
 def load_given(fault: str, bulge: float, noise: float, turn: float) -> tuple[ClosedSurface, ClosedSurface]:
-    """Write a barrel and read it.
+    """Write a barrel with a fault to a file and read it.
 
     Args:
-        fault: name of one of `FAULTS`.
-        bulge: of the barrel [m].
-        noise: standard deviation of what is added to its vertices [m].
-        turn: about the x axis [rad].
+        fault: Name in ``FAULTS``.
+        bulge: Bulge of the barrel [m].
+        noise: Standard deviation of the vertex noise [m].
+        turn: Rotation about the x axis [rad].
 
     Returns:
-        What was read, and the barrel.
+        Surface from the file, and the exact barrel.
 
     Raises:
-        SurfaceError: it is refused.
+        SurfaceError: If the surface is refused.
     """
     exact = barrel(site().gap, bulge)
     points, triangles = FAULTS[fault](exact.points, exact.triangles.astype(np.int64))
@@ -269,6 +270,6 @@ def load_given(fault: str, bulge: float, noise: float, turn: float) -> tuple[Clo
 
 
 def mesh_given(surface: ClosedSurface) -> Meshed:
-    """Mesh what was read; JointMeshError where no mesh meets its bars."""
+    """Mesh a surface from a file; raise JointMeshError if no mesh meets its quality limits."""
     whole, side = package(), side_of(Warpage(), package())
     return Meshed(mesh_joint(surface, site(), whole, side), surface, side, whole.copper.thickness)

@@ -1,4 +1,4 @@
-"""Trial of boards with joints that are hard to divide: what the program chooses must be stable and exact."""
+"""Trial of boards with joints that are hard to divide; the program's choices must be stable and exact."""
 
 import numpy as np
 
@@ -12,23 +12,23 @@ from reflowshock.fem.mesh.mesh import MeshData, append
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.materials.roles import ELASTIC
 
-SIZE, LAYER = 0.5e-3, 0.25e-3  # of an element of board [m]
+SIZE, LAYER = 0.5e-3, 0.25e-3  # size and thickness of a board element [m]
 
 
-def layout(given: Layout) -> dict[str, float]:
-    """Return the growth of a window, and what tie and interface do to fields, forces and masses.
+def layout(parameters: Layout) -> dict[str, float]:
+    """Return the growth of a window and the transfer errors of tie and interface.
 
     Raises:
-        CouplingError: The layout cannot be divided in this way.
+        CouplingError: If the layout cannot be divided in this way.
     """
-    models = models_of(LAYOUTS[given.layout](), ELASTIC, Coupling(scheme=given.scheme), FRACTION)
+    models = models_of(LAYOUTS[parameters.layout](), ELASTIC, Coupling(scheme=parameters.scheme), FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))
-    found = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
-    return found | through(models)
+    measures = {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
+    return measures | through(models)
 
 
 def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = LAYER) -> MeshData:
-    """A block of board, held at its far side, under a plate of copper of some thickness that shares its nodes."""
+    """Return a board block held at its far side under a copper plate with shared nodes."""
     ticks, heights = np.arange(cells + 1) * SIZE, layer * np.arange(-layers, 1.0)
     top = copper if copper else 0.0
     points, hexahedra = grid(ticks, ticks, np.append(heights, copper) if copper else heights)
@@ -38,14 +38,14 @@ def board(cells: int = 4, layers: int = 4, copper: float = 0.0, layer: float = L
 
 
 def joint(x: float, y: float, z: float = 0.0, held_above: bool = False) -> MeshData:
-    """A joint whose upper end is free, or tied to what is above it."""
+    """Return a joint with its upper end free or tied."""
     mesh = joint_mesh("A1", x, y, layers=2)
     facets = {name: quads for name, quads in mesh.facets.items() if held_above or not name.startswith("head@")}
     return MeshData(mesh.points + [0.0, 0.0, z], mesh.cells, mesh.part, mesh.part_names, facets)
 
 
 def overhang() -> MeshData:
-    """A joint under a plate of 0.05 mm that hangs over it by more than a millimetre."""
+    """Return a joint under a plate of 0.05 mm that overhangs it by more than a millimetre."""
     low = joint_mesh("A1", 0.0, 0.0, layers=2).points[:, 2].max()
     ticks = np.arange(4) * SIZE
     plate = mesh_of(*grid(ticks, ticks, [low, low + 0.05e-3]), "substrate", {"package_side": on(2, low)})
@@ -53,17 +53,17 @@ def overhang() -> MeshData:
 
 
 def copper_interface() -> MeshData:
-    """A joint on thick copper on board of thin layers: both are at the interface of local steps."""
+    """Return a joint on thick copper and thin board layers, both at the interface of local steps."""
     return append([board(4, 2, copper=0.5e-3, layer=0.15e-3), joint(0.7e-3, 0.7e-3, z=0.5e-3)])
 
 
 def corner() -> MeshData:
-    """A joint in a corner of the board, whose meso model touches two faces and an edge."""
+    """Return a joint in a corner of the board, whose meso model touches two faces and an edge."""
     return append([board(), joint(0.25e-3, 0.25e-3)])
 
 
 def two_regions() -> MeshData:
-    """Two joints in opposite corners of a board: the meso model is in two parts."""
+    """Return two joints in opposite corners of a board, with a meso model in two parts."""
     apart = joint(3.25e-3, 3.25e-3)
     names = tuple(name.replace("A1", "B2") for name in apart.part_names)
     facets = {name.replace("A1", "B2"): quads for name, quads in apart.facets.items()}

@@ -1,4 +1,4 @@
-"""A small package on a small board, to be varied."""
+"""Small package on a small board with variable fields."""
 
 from reflowshock.meshing.board.package_side import PackageSide
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
@@ -8,7 +8,7 @@ PLATE = {"thickness": 0.02 * MM, "layout": "plate"}
 
 
 def package(**changes) -> Package:
-    """A 4 x 4 array at 1 mm under a package of 5 mm with a die of 3 mm; fields as keywords."""
+    """Return a 4 x 4 array at 1 mm under a 5 mm package with a 3 mm die; fields as keywords."""
     values = {
         "rows": 4,
         "columns": 4,
@@ -23,7 +23,7 @@ def package(**changes) -> Package:
 
 
 def board(**changes) -> Board:
-    """A board of 40 x 30 x 1 mm, quarter symmetry, holes of 2 mm 3 mm from its edges; fields as keywords."""
+    """Return a board of 40 x 30 x 1 mm, quarter symmetry, 2 mm holes 3 mm from its edges; fields as keywords."""
     values = {
         "length": 40.0 * MM,
         "width": 30.0 * MM,
@@ -34,7 +34,7 @@ def board(**changes) -> Board:
 
 
 def aside(**changes) -> Board:
-    """The whole board with its package aside, and five holes, of which four are no rectangle; fields as keywords."""
+    """Return the whole board with an off-centre package and five holes, not in a rectangle; fields as keywords."""
     places = ((-8.0, -7.0), (14.0, -7.0), (-8.0, 10.0), (14.0, 10.0), (9.0, -7.0))
     holes = {"diameter": 2.0 * MM, "at": [(x * MM, y * MM) for x, y in places]}
     values = {"length": 30.0 * MM, "width": 24.0 * MM, "centre": (3.0 * MM, 1.5 * MM), "holes": holes}
@@ -42,5 +42,5 @@ def aside(**changes) -> Board:
 
 
 def side_of(warpage: Warpage, the_package: Package) -> PackageSide:
-    """The whole underside of a package with a prescribed warpage."""
+    """Return the underside of a package with a prescribed warpage."""
     return PackageSide.prescribed(the_package, board(symmetry="full"), warpage)

@@ -1,4 +1,4 @@
-"""Pairs of a coarse board and a finer block on it, for which any scheme's window can be tried."""
+"""Pairs of a coarse board and a finer block for stability trials of any scheme."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,25 +22,25 @@ from reflowshock.materials.library import FR4
 from reflowshock.materials.parameters import Isotropic, Orthotropic
 from reflowshock.materials.roles import Materials
 
-SIZE, THICKNESS = 0.5e-3, 0.25e-3  # of a board element [m]
-FRACTION = 0.9  # of the critical step of elements, the program's default
+SIZE, THICKNESS = 0.5e-3, 0.25e-3  # size and thickness of a board element [m]
+FRACTION = 0.9  # step over the critical element step, the program's default
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A board of FR4 and a block tied to its top off the grid, in a corner.
+    """FR4 board and a block tied to its top off the grid, in a corner.
 
     Attributes:
-        substeps: m that the steps of both call for.
-        impedance: sqrt(density E) of the block over that of the board across.
-        ratio: Board elements over elements of the block, in size.
-        shape: Of board and block.
-        free: Whether nothing holds them.
-        layers: Of the board.
-        columns: Elements of the board in plane, each way.
+        substeps: Ratio m of the steps of both models.
+        impedance: sqrt(density E) of the block over the board (across).
+        ratio: Element size of the board over the block.
+        shape: Shape of board and block.
+        free: Whether the pair has no supports.
+        layers: Layers of the board.
+        columns: In-plane elements of the board in each direction.
         height: Layers of the block.
-        thinnest: Thickness of the block's top layer over that of the others.
-        board: Its material.
+        thinnest: Thickness of the block's top layer over the other layers.
+        board: Material of the board.
     """
 
     substeps: int = 4
@@ -55,7 +55,7 @@ class Pair:
     board: Orthotropic = FR4
 
     def mesh(self) -> MeshData:
-        """Return board and block, which share no node."""
+        """Return board and block without common nodes."""
         ticks = np.arange(self.columns + 1) * SIZE
         board = mesh_of(
             *grid(ticks, ticks, -THICKNESS * np.arange(self.layers, -1.0, -1.0)),
@@ -71,10 +71,10 @@ class Pair:
         return shaped(append([board, block]), self.shape)
 
     def materials(self) -> Materials:
-        """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
+        """Return materials with the block's impedance and a critical step slightly above 1/m of the board's."""
         trial = Materials(board=self.board, solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.35))
-        _, found, _ = surveyed(self.mesh(), trial)
-        board, block = (found.step[found.role == role].min() for role in ("board", "solder"))
+        _, survey_of_mesh, _ = surveyed(self.mesh(), trial)
+        board, block = (survey_of_mesh.step[survey_of_mesh.role == role].min() for role in ("board", "solder"))
         slowness = 1e-3 * board / block / (self.substeps - 0.02)
         product = self.impedance * (self.board.density * self.board.young_modulus_out_of_plane) ** 0.5
         return Materials(
@@ -83,16 +83,16 @@ class Pair:
         )
 
     def divided(self, coupling: Coupling, fraction: float = FRACTION) -> Models:
-        """Return both models as the program divides them."""
+        """Return both models divided by the program."""
         return models_of(self.mesh(), self.materials(), coupling, fraction)
 
     def coupled(self, coupling: Coupling, fraction: float = FRACTION, loads: Sequence[Load] = ()) -> Coupled:
-        """Return both models at the steps that the program chooses."""
+        """Return both models at the program's own steps."""
         models = self.divided(coupling, fraction)
         return Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme), loads)
 
     def printed(self, fraction: float = FRACTION) -> Coupled:
-        """Return both models as the paper prints it, at the steps that it takes: those of its two models."""
+        """Return both models coupled as printed in the paper, at the steps of the two models."""
         models = self.divided(Coupling(scheme="gravouil_combescure"), fraction)
         return Coupled(models.bodies(), models.division.plan, Printed())
 
@@ -108,12 +108,12 @@ SCHEMES = {
 
 
 def board_cells(mesh: MeshData) -> NDArray[np.bool_]:
-    """Return which cells (ne,) are the board's."""
+    """Return the mask of board cells (ne,)."""
     return mesh.in_parts("board".__eq__)
 
 
 def shaped(mesh: MeshData, shape: str) -> MeshData:
-    """Return a pair of another shape: inner nodes moved at random, or the interface a paraboloid of 5 mm radius."""
+    """Return a distorted pair (random inner nodes) or one with a paraboloid interface of 5 mm radius."""
     points = mesh.points.copy()
     if shape == "distorted":
         low, high = points.min(axis=0), points.max(axis=0)
@@ -129,15 +129,15 @@ def shaped(mesh: MeshData, shape: str) -> MeshData:
 
 
 class Printed(HeldVelocity):
-    """The paper's scheme as printed: the block alone is meso, only its internal force goes to the board, no mass."""
+    """Scheme as printed in the paper: the block alone is meso; only its internal force acts on the board, no mass."""
 
     def macro(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> HeldVelocityMacro:
-        """Return the macro model's participant, which gets the interface mass and leaves it out."""
+        """Return the participant of the macro model, which receives and ignores the interface mass."""
         return PrintedMacro(body, loads, plan, channels)
 
 
 class PrintedMacro(HeldVelocityMacro):
-    """A board that answers for no mass of the block at its interface."""
+    """Board without the block's mass at its interface."""
 
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest; a ``Meso`` must have sent the interface mass."""

@@ -1,4 +1,4 @@
-"""Trials of the reflow: drops, joints, pairs of drops and swings, judged by volume, energy, forces and exact shapes."""
+"""Reflow trials: drops, joints, drop pairs and oscillations, checked by volume, energy, forces and exact shapes."""
 
 from typing import TYPE_CHECKING, Literal
 
@@ -45,9 +45,9 @@ ERRORS_OF_JOINT = {
 
 
 class MoltenScene(Parameters):
-    """Solder alone; a Bond number rho g V^(2/3) / gamma takes the place of gravity's acceleration.
+    """Solder scene; a Bond number rho g V^(2/3) / gamma replaces the acceleration of gravity.
 
-    It must come to rest, unless ``rest`` is false: its process ends before.
+    The solder must come to rest unless ``rest`` is false, where its process ends earlier.
     """
 
     gravity: Switch = "auto"
@@ -56,7 +56,7 @@ class MoltenScene(Parameters):
     rest: bool = True
 
     def molten(self, scene: Drop | Joint | Drops) -> Solder:
-        """The solder as the solvers take it."""
+        """Return the solder in the form of the solvers."""
         from reflowshock.particles.parameters.scene_checks import with_scheme
 
         solder = self.solder.resolve(scene, self.gravity)
@@ -66,10 +66,10 @@ class MoltenScene(Parameters):
         return with_scheme(scene, solder, self.solder.numerics.scheme)[0]
 
     def measured(self, shape: "JointShape") -> dict[str, Measured]:
-        """All that a shape tells, with the energy of its history.
+        """Return all measures of a shape and of its energy history.
 
         Raises:
-            ArithmeticError: it is not at rest, though it must be.
+            ArithmeticError: If it is not at rest although it must be.
         """
         if self.rest and shape.verdict != "open" and not shape.metrics["at_rest"][0]:
             raise ArithmeticError(f"not at rest after {shape.metrics['steps'][0]:.0f} steps")
@@ -78,32 +78,32 @@ class MoltenScene(Parameters):
 
 
 class DropTrial(MoltenScene):
-    """A drop on a wall or pad, or free."""
+    """Drop on a wall or pad, or free."""
 
     drop: Drop
 
 
 class RestTrial(DropTrial):
-    """A drop, and for how many steps it is left alone at rest."""
+    """Drop at rest, followed for some steps."""
 
     steps: int = Field(gt=0)
 
 
 class JointTrial(MoltenScene):
-    """A joint between two pads, and what must become of it."""
+    """Joint between two pads with its expected verdict."""
 
     joint: Joint
     verdict: Literal["ok", "overflow", "open", "dewetted"] | None = None
 
 
 class PairTrial(MoltenScene):
-    """Two drops, and what must become of them."""
+    """Two drops with their expected verdict."""
 
     drops: Drops
 
 
 class SwingTrial(Parameters):
-    """A free drop that swings."""
+    """Free oscillating drop."""
 
     oscillation: Oscillation
     solder: Liquid = Liquid()
@@ -120,10 +120,10 @@ def drop(parameters: DropTrial) -> dict[str, Measured]:
 
 
 def rest(parameters: RestTrial) -> dict[str, Measured]:
-    """Bring a drop to rest, and go on as long: what moves then, creeps.
+    """Bring a drop to rest and continue for ``steps`` steps; any motion is creep.
 
-    Speed is the largest of a vertex along its normal in the last half, over gamma / mu; the centre moves along the
-    wall, over V^(1/3); changes of height, width and energy are over those at rest.
+    The speed is the largest normal vertex speed in the second half over gamma / mu; the centre moves along the wall
+    over V^(1/3); changes of height, width and energy are relative to the values at rest.
     """
     from reflowshock.particles.parameters.scene_checks import drop_problems
     from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
@@ -134,25 +134,25 @@ def rest(parameters: RestTrial) -> dict[str, Measured]:
     flow, run = flow_to_rest(parameters.drop, solder)
     if not run.at_rest:
         raise ArithmeticError(f"not at rest after {flow.steps} steps")
-    before, place, energy = flow.profile(), _centre(flow), run.records[-1].energy
+    before, start_centre, energy = flow.profile(), _centre(flow), run.records[-1].energy
     records = [flow.step() for _ in range(parameters.steps)]
     after, late = flow.profile(), records[len(records) // 2 :]
     imbalance = body_metrics(solder, None, flow, run)["energy_imbalance"]
-    found = {
+    measures = {
         "volume_drift": flow.body.cloud.parts * flow.body.volume()[0] / solder.volume - 1.0,
         "height_drift": after.drop_height(1) / before.drop_height(1) - 1.0,
         "width_drift": after.max_width / before.max_width - 1.0,
-        "place_drift": float(np.linalg.norm(_centre(flow) - place)) / solder.volume ** (1.0 / 3.0),
+        "place_drift": float(np.linalg.norm(_centre(flow) - start_centre)) / solder.volume ** (1.0 / 3.0),
         "energy_drift": records[-1].energy / energy - 1.0,
         "energy_imbalance": imbalance[0],
         "late_capillary_number": max(record.speed for record in late) * solder.viscosity / solder.surface_tension,
         "particles_lost": particles_lost(flow.body),
     }
-    return {name: Measured(float(value)) for name, value in found.items()}
+    return {name: Measured(float(value)) for name, value in measures.items()}
 
 
 def _centre(flow: "LiquidFlow") -> np.ndarray:
-    """Centre of volume of a drop along its wall `(2,)` [m]."""
+    """Return the centre of volume of a drop along its wall [m], shape (2,)."""
     from reflowshock.particles.core.surface_measure import centre_of_volume
 
     body = flow.body
@@ -173,7 +173,7 @@ def joint(parameters: JointTrial) -> dict[str, Measured]:
 
 
 def pair(parameters: PairTrial) -> dict[str, Measured]:
-    """Let two drops flow until they, or the one that they became, are at rest; their place is over V^(1/3)."""
+    """Let two drops or their merged drop come to rest; positions are over V^(1/3)."""
     from reflowshock.particles.core.surface_measure import centre_of_volume
     from reflowshock.particles.parameters.scene_checks import pair_problems
     from reflowshock.particles.scenes.drop_pair import pair_to_rest
@@ -181,34 +181,36 @@ def pair(parameters: PairTrial) -> dict[str, Measured]:
     solder = parameters.molten(parameters.drops)
     _refuse(pair_problems(parameters.drops, solder))
     shape = pair_to_rest(parameters.drops, solder).shape
-    wanted = "merged" if parameters.drops.merge else "apart"
-    if shape.verdict != wanted:
-        raise ArithmeticError(f"the drops are {shape.verdict}, must be {wanted}")
+    expected_verdict = "merged" if parameters.drops.merge else "apart"
+    if shape.verdict != expected_verdict:
+        raise ArithmeticError(f"the drops are {shape.verdict}, must be {expected_verdict}")
     aside = np.linalg.norm(centre_of_volume(shape.surface_points, shape.triangles)[:2])
     return parameters.measured(shape) | {"place_error": Measured(float(aside) / solder.volume ** (1.0 / 3.0))}
 
 
 def swing(parameters: SwingTrial) -> dict[str, Measured]:
-    """Let a free drop swing; its momentum is over that of its mass at the greatest speed of the swing."""
+    """Let a free drop oscillate; its momentum is over mass times the largest speed."""
     from reflowshock.particles.parameters.scene_checks import oscillation_problems
     from reflowshock.particles.scenes.free_drop import solve_free_drop
 
     scene = parameters.oscillation
     solder = scene.resolve(parameters.solder)
     _refuse(oscillation_problems(scene, solder))
-    found = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period)
-    energy, mass = found.history["energy"], solder.density * solder.volume
-    fastest = np.sqrt(2.0 * found.history["kinetic_energy"].max() / mass)
-    own = {
-        "swings_error": Measured(_swings(found.history["amplitude"]) / scene.periods - 1.0),
-        "momentum": Measured(float(found.history["momentum"].max() / (mass * fastest))),
+    solution = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period)
+    energy, mass = solution.history["energy"], solder.density * solder.volume
+    fastest = np.sqrt(2.0 * solution.history["kinetic_energy"].max() / mass)
+    measures = {
+        "swings_error": Measured(_swings(solution.history["amplitude"]) / scene.periods - 1.0),
+        "momentum": Measured(float(solution.history["momentum"].max() / (mass * fastest))),
         **_energy(energy),
     }
-    return {name: Measured(*found.metrics[name]) for name in MEASURES_OF_SWING if name in found.metrics} | own
+    return {
+        name: Measured(*solution.metrics[name]) for name in MEASURES_OF_SWING if name in solution.metrics
+    } | measures
 
 
 def _swings(amplitude: np.ndarray) -> float:
-    """How often it swung to and fro, by changes of sign: a fit with a second harmonic does not see an octave."""
+    """Return the number of oscillations by sign changes, since a fit with a second harmonic misses an octave."""
     return 0.5 * float(np.count_nonzero(np.diff(np.sign(amplitude[1:]))) + 1)
 
 
@@ -218,7 +220,7 @@ def _refuse(problems: list) -> None:
 
 
 def _energy(energy: np.ndarray) -> dict[str, Measured]:
-    """Largest rise of the energy in a step, and above the start, over the energy at the start."""
+    """Return the largest energy rise in a step and above the start, over the energy at the start."""
     scale = abs(float(energy[0]))
     rise = float(np.diff(energy).max(initial=0.0))
     over = float(energy.max() - energy[0])

@@ -1,4 +1,4 @@
-"""Trials of the remesh: bodies of known shape and triangulations from elsewhere become hexahedra, or are refused."""
+"""Remeshing trials: bodies of known shape and external triangulations are meshed by hexahedra or refused."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,7 +22,7 @@ Length = Annotated[float, Quantity("mm")]
 
 
 class Barrel(Parameters):
-    """A parabolic barrel (bulge > 0) or hourglass (bulge < 0) between discs of two radii, with a void or without."""
+    """Parabolic barrel (bulge > 0) or hourglass (bulge < 0) between discs of two radii, with or without a void."""
 
     kind: Literal["barrel"]
     gap: Length = Field(3.0e-4, gt=0)
@@ -40,7 +40,7 @@ class Barrel(Parameters):
 
 
 class Overflow(Parameters):
-    """Solder on the mask: an arc that meets both plates at an angle, its discs wider than the pads."""
+    """Solder on the mask: an arc that meets both plates at an angle, with discs wider than the pads."""
 
     kind: Literal["overflow"]
     gap: Length = Field(3.0e-4, gt=0)
@@ -55,7 +55,7 @@ class Overflow(Parameters):
 
 
 class Lobed(Parameters):
-    """A cylinder with lobes at half height, as deep as a share of its radius."""
+    """Cylinder with lobes at half height, with a depth relative to its radius."""
 
     kind: Literal["lobed"]
     gap: Length = Field(3.0e-4, gt=0)
@@ -71,7 +71,7 @@ class Lobed(Parameters):
 
 
 class Hooked(Parameters):
-    """A joint with an arm that reaches out and bends round a bay."""
+    """Joint with an arm that bends round a bay."""
 
     kind: Literal["hooked"]
     gap: Length = Field(3.0e-4, gt=0)
@@ -101,7 +101,7 @@ class Bridged(Parameters):
 
 
 class BodyTrial(Parameters):
-    """A body whose upper pad may be shifted along x and turned about y, and how finely it is meshed."""
+    """Body with an upper pad shifted along x and tilted about y, and its mesh settings."""
 
     shape: Barrel | Overflow | Lobed | Hooked | Bridged = Field(discriminator="kind")
     offset: Length = 0.0
@@ -110,7 +110,7 @@ class BodyTrial(Parameters):
 
 
 class WarpedTrial(Parameters):
-    """The corner joint of a small package that lifts by ``corner`` there; its head lies on the paraboloid."""
+    """Corner joint of a small package lifted by ``corner``; its head lies on the paraboloid."""
 
     corner: Length
     bulge: Length = 0.0
@@ -121,7 +121,7 @@ class WarpedTrial(Parameters):
 
 
 class GivenTrial(Parameters):
-    """A triangulation from elsewhere, with a fault or without, noise on its vertices, turned about x."""
+    """External triangulation with or without a fault, with vertex noise and a rotation about x."""
 
     fault: Fault = "no_fault"
     bulge: Length = 4.0e-5

@@ -1,4 +1,4 @@
-"""Joint surfaces of which everything is known: revolved, lobed, bridged, hooked, with voids."""
+"""Joint surfaces with exactly known measures: revolved, lobed, bridged, hooked, with voids."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,10 +15,10 @@ def revolve(profile: np.ndarray, gap: float, around: int = 48, offset: float = 0
     """Triangulate a body of revolution.
 
     Args:
-        profile: (k,) radii [m] at equal steps of height from 0 to gap.
-        gap: height [m].
-        around: vertices a circle.
-        offset: shift of the upper end along x [m], linear in height.
+        profile: Radii [m] at equal steps of height from 0 to gap, shape (k,).
+        gap: Height [m].
+        around: Vertices per circle.
+        offset: Shift of the upper end along x [m], linear in height.
 
     Returns:
         Points, free triangles, lower ring, upper ring.
@@ -40,14 +40,14 @@ def revolve(profile: np.ndarray, gap: float, around: int = 48, offset: float = 0
 def barrel(
     gap: float, bulge: float, lower: float = 0.24e-3, upper: float = 0.24e-3, offset: float = 0.0
 ) -> ClosedSurface:
-    """A parabolic barrel (bulge > 0) or hourglass (bulge < 0) between discs of two radii [m]."""
+    """Return a parabolic barrel (bulge > 0) or hourglass (bulge < 0) between discs of two radii [m]."""
     share = np.linspace(0.0, 1.0, 25)
     profile = lower + (upper - lower) * share + 4.0 * bulge * share * (1.0 - share)
     return close_surface(*revolve(profile, gap, offset=offset))
 
 
 def truncated_sphere(radius: float, half_gap: float, around: int, levels: int):
-    """Sphere between two planes at equal distance from its centre, as ``revolve``, and its exact measures."""
+    """Return a sphere between two planes at equal distance from its centre, as ``revolve``, and its exact measures."""
     heights = np.linspace(-half_gap, half_gap, levels)
     contact = np.sqrt(radius**2 - half_gap**2)
     exact = {
@@ -62,13 +62,13 @@ def truncated_sphere(radius: float, half_gap: float, around: int, levels: int):
 
 
 def laid_between(surface: ClosedSurface, offset: tuple[float, float], slope: tuple[float, float]) -> ClosedSurface:
-    """A straight joint between a pad at z = 0 and one that is shifted [m] and slopes along x and y."""
+    """Return a straight joint between a pad at z = 0 and a shifted [m] and sloped pad."""
     planes = PadPlanes(float(surface.points[:, 2].max()), np.array(offset), np.array(slope))
     return replace(surface, points=planes.restore(surface.points))
 
 
 def overflow(gap: float, angle: float, reach: float, around: int = 48, levels: int = 25) -> ClosedSurface:
-    """Solder on the mask: an arc that meets both plates at an angle above 90 degrees, its discs of a radius `reach`."""
+    """Return solder on the mask: an arc that meets both plates above 90 degrees, with discs of radius ``reach``."""
     radius = 0.5 * gap / np.cos(np.pi - angle)
     neck = max(0.0, reach - radius * np.sin(angle))
     height = np.linspace(-0.5 * gap, 0.5 * gap, levels)
@@ -76,7 +76,7 @@ def overflow(gap: float, angle: float, reach: float, around: int = 48, levels: i
 
 
 def lobed(gap: float, radius: float, lobes: int, depth: float, levels: int = 25) -> ClosedSurface:
-    """A cylinder of a radius [m] with lobes at half height, as deep as a share of the radius: star-shaped."""
+    """Return a star-shaped cylinder of a radius [m] with lobes at half height."""
     points, triangles, lower, upper = revolve(np.full(levels, radius), gap, 96)
     angle = np.arctan2(points[:, 1], points[:, 0])
     wave = np.cos(lobes * angle) * np.sin(np.pi * points[:, 2] / gap)
@@ -88,7 +88,7 @@ Field = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 def sphere(centre: Sequence[float], radius: float, rings: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """Points and outward triangles of a sphere with ``rings`` circles of latitude."""
+    """Return points and outward triangles of a sphere with ``rings`` circles of latitude."""
     latitude = np.pi * (np.arange(rings) + 1.0) / (rings + 1.0)
     longitude = np.pi * np.arange(2 * rings) / rings
     circles = np.stack(
@@ -112,7 +112,7 @@ def sphere(centre: Sequence[float], radius: float, rings: int = 8) -> tuple[np.n
 
 
 def with_void(surface: ClosedSurface, centre: Sequence[float], radius: float) -> ClosedSurface:
-    """A body with a spherical void inside."""
+    """Return a body with a spherical void inside."""
     points, triangles = sphere(centre, radius)
     return ClosedSurface(
         np.vstack([surface.points, points]),
@@ -122,12 +122,12 @@ def with_void(surface: ClosedSurface, centre: Sequence[float], radius: float) ->
 
 
 def of_level_set(inside: Field, gap: float, box: tuple[float, float], across: int = 16) -> ClosedSurface:
-    """Triangulate where a function is positive between z = 0 and the gap, |x| and |y| within a box [m]."""
+    """Triangulate the positive region of a function between z = 0 and the gap, |x| and |y| within a box [m]."""
     step = gap / across
     counts = [int(np.ceil(half / step)) for half in box]
     axes = [step * np.arange(-count, count + 1) for count in counts] + [np.linspace(0.0, gap, across + 1)]
     values = inside(*np.meshgrid(*axes, indexing="ij"))
-    values[np.abs(values) < 0.02 * step] = 0.02 * step  # no vertex so near a node that triangles degenerate
+    values[np.abs(values) < 0.02 * step] = 0.02 * step  # avoids degenerate triangles near grid nodes
     points, triangles, *_ = marching_cubes(values, 0.0, gradient_direction="ascent")
     points = step * (points - [*counts, 0])
     points[:, 2] = np.where(points[:, 2] > (1.0 - 1e-9) * gap, gap, points[:, 2])
@@ -136,7 +136,7 @@ def of_level_set(inside: Field, gap: float, box: tuple[float, float], across: in
 
 
 def bridged_pair(gap: float, distance: float, radius: float, bridge: float) -> ClosedSurface:
-    """Two truncated spheres, joined by a cylinder of a radius between them [m]; their axes are on x."""
+    """Return two truncated spheres on the x axis, joined by a cylinder of a radius [m]."""
 
     def inside(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         height = z - 0.5 * gap
@@ -149,7 +149,7 @@ def bridged_pair(gap: float, distance: float, radius: float, bridge: float) -> C
 
 
 def hooked(gap: float, reach: float) -> ClosedSurface:
-    """A joint of about 0.73 gaps' radius with an arm that reaches out [m] and bends round a bay: not star-shaped."""
+    """Return a joint of about 0.73 gaps' radius with an arm that reaches out [m] round a bay: not star-shaped."""
     unit = gap / 0.3
 
     def inside(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

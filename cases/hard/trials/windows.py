@@ -1,4 +1,4 @@
-"""Trials of two coupled models: growth of a window, what many keep, what goes through, restarts, reflected pulses."""
+"""Trials of two coupled models: window growth, long runs, interface transfer, restarts, reflected pulses."""
 
 from dataclasses import replace
 
@@ -21,19 +21,19 @@ from reflowshock.materials.parameters import Isotropic
 from reflowshock.materials.roles import Materials
 
 PUSH = np.array([0.3, 0.1, 1.0])  # [m/s]
-SAMPLES = 200  # of a run
+SAMPLES = 200  # samples of a run
 HALF = 20  # windows before a restart, and after
 
 
-def window(given: PairTrial) -> dict[str, float]:
-    """Return by how much a window can grow, the spectral radius of its amplification matrix minus 1, and m."""
-    coupled = coupled_pair(given)
+def window(parameters: PairTrial) -> dict[str, float]:
+    """Return the growth of a window, the spectral radius of its amplification matrix minus 1, and m."""
+    coupled = coupled_pair(parameters)
     return {"growth": coupled.spectral_radius() - 1.0, "substeps": float(coupled.plan.substeps)}
 
 
-def run(given: PairRun) -> dict[str, float]:
-    """Return what changes at most in many windows after a push: energy, momentum, and what the interface holds."""
-    coupled = coupled_pair(given, given.free)
+def run(parameters: PairRun) -> dict[str, float]:
+    """Return the largest changes of energy and momentum over many windows after a push, and the interface energy."""
+    coupled = coupled_pair(parameters, parameters.free)
     coupled.swing(PUSH)
     start, first = coupled.momentum(), all_energy(coupled)
     changes: list[tuple[float, float]] = []
@@ -41,31 +41,31 @@ def run(given: PairRun) -> dict[str, float]:
     def look() -> None:
         changes.append((abs(all_energy(coupled) - first) / first, momentum_change(coupled, start)))
 
-    drift, interface = coupled.drift(given.windows, SAMPLES, look)
+    drift, interface = coupled.drift(parameters.windows, SAMPLES, look)
     energy, momentum = np.max(changes, axis=0)
     return {
         "energy_drift": drift,
         "interface_energy": interface,
         "energy_error": float(energy),
-        "momentum_error": float(momentum) if given.free else 0.0,
+        "momentum_error": float(momentum) if parameters.free else 0.0,
     }
 
 
 def all_energy(coupled: Coupled) -> float:
-    """Return the energy of both models and of what lies between."""
+    """Return the energy of both models and of the interface."""
     energies = coupled.energies()
     return sum(energies[name] for name in ("kinetic", "internal", "interface"))
 
 
 def momentum_change(coupled: Coupled, start: np.ndarray) -> float:
-    """Return the largest change of linear and angular momentum over that of all nodes at the speed of the push."""
+    """Return the largest momentum change over the total nodal momentum at the push speed."""
     mass = sum(part.motion.counted_mass.sum() for part in coupled.parts)
     scale = mass * np.linalg.norm(PUSH) * np.array([1.0] * 3 + [3 * SIZE] * 3)
     return float(np.abs((coupled.momentum() - start) / scale).max())
 
 
 def momentum_error(coupling: Coupling, fraction: float) -> float:
-    """Return the largest change of momentum of a free pair while it swings."""
+    """Return the largest momentum change of an oscillating free pair."""
     coupled = Pair(4, 3.0, 2, free=True).coupled(coupling, fraction)
     coupled.swing(PUSH)
     start, largest = coupled.momentum(), 0.0
@@ -75,35 +75,35 @@ def momentum_error(coupling: Coupling, fraction: float) -> float:
     return float(largest)
 
 
-def transfer(given: PairTransfer) -> dict[str, float]:
-    """Return what tie and interface do to rigid motions, linear fields, forces and masses: nothing, exactly."""
-    pair = pair_of(given)
+def transfer(parameters: PairTransfer) -> dict[str, float]:
+    """Return the errors of tie and interface for rigid motions, linear fields, forces and masses; zero in theory."""
+    pair = pair_of(parameters)
     mesh = pair.mesh()
     block = mesh.cells[~mesh.in_parts("board".__eq__)]
-    mesh.points[np.unique(block)] += given.offset
-    return through(models_of(mesh, pair.materials(), SCHEMES[given.scheme], given.step_fraction))
+    mesh.points[np.unique(block)] += parameters.offset
+    return through(models_of(mesh, pair.materials(), SCHEMES[parameters.scheme], parameters.step_fraction))
 
 
 def through(models: Models) -> dict[str, float]:
-    """Try fields, forces and masses through tie and interface of two models."""
+    """Return the transfer errors of fields, forces and masses through tie and interface."""
     bodies = models.bodies()
     channels = InterfaceChannels.open(
         MPI.COMM_SELF, bodies["macro"].interface, bodies["meso"].interface, receiver_waits=False
     )
-    found = self_check(MPI.COMM_SELF, bodies, channels)
-    masses = found.macro_mass + found.interface_mass + found.meso_mass
+    errors = self_check(MPI.COMM_SELF, bodies, channels)
+    masses = errors.macro_mass + errors.interface_mass + errors.meso_mass
     return {
-        "rigid_error": found.rigid,
-        "linear_error": found.linear,
-        "tie_error": found.tie,
-        "interface_error": found.interface,
-        "mass_error": masses / found.volume_mass - 1.0,
+        "rigid_error": errors.rigid,
+        "linear_error": errors.linear,
+        "tie_error": errors.tie,
+        "interface_error": errors.interface,
+        "mass_error": masses / errors.volume_mass - 1.0,
     }
 
 
-def restart(given: PairTrial) -> dict[str, float]:
-    """Return the difference between a run and one that continues from the middle of it: no bit."""
-    first, second = coupled_pair(given), coupled_pair(given)
+def restart(parameters: PairTrial) -> dict[str, float]:
+    """Return the difference between a run and its continuation from the middle; zero to the bit."""
+    first, second = coupled_pair(parameters), coupled_pair(parameters)
     first.swing(PUSH)
     for _ in range(HALF):
         first.run()
@@ -116,15 +116,15 @@ def restart(given: PairTrial) -> dict[str, float]:
     return {"difference": float(np.abs(both[1] - both[0]).max() / np.abs(both[0]).max())}
 
 
-def yielding(given: Yielding) -> dict[str, float]:
-    """Return the error of the energy around solder that yields, and what plastic flow and interface have of it."""
-    pair = Pair(ratio=given.mesh_ratio)
-    models = models_of(pair.mesh(), Materials(solder=SAC405), SCHEMES[given.scheme], FRACTION)
-    coupled = Coupled(models.bodies(), models.division.plan, scheme_of(given.scheme))
+def yielding(parameters: Yielding) -> dict[str, float]:
+    """Return the energy error around yielding solder, and the shares of plastic and interface energy."""
+    pair = Pair(ratio=parameters.mesh_ratio)
+    models = models_of(pair.mesh(), Materials(solder=SAC405), SCHEMES[parameters.scheme], FRACTION)
+    coupled = Coupled(models.bodies(), models.division.plan, scheme_of(parameters.scheme))
     for part in coupled.parts:
-        part.motion.launch(np.array([0.0, 0.0, given.speed]))
+        part.motion.launch(np.array([0.0, 0.0, parameters.speed]))
     first = coupled.energies()["kinetic"]
-    for _ in range(given.windows):
+    for _ in range(parameters.windows):
         coupled.run()
     last = coupled.energies()
     held = sum(last[name] for name in ("kinetic", "internal", "plastic", "hourglass", "interface"))
@@ -135,53 +135,55 @@ def yielding(given: Yielding) -> dict[str, float]:
     }
 
 
-def coupled_pair(given: PairTrial, free: bool = False) -> Coupled:
+def coupled_pair(parameters: PairTrial, free: bool = False) -> Coupled:
     """Return both models of a trial, coupled."""
-    pair = pair_of(given, free)
-    if given.scheme == "as_printed":
-        return pair.printed(given.step_fraction)
-    return pair.coupled(SCHEMES[given.scheme], given.step_fraction)
+    pair = pair_of(parameters, free)
+    if parameters.scheme == "as_printed":
+        return pair.printed(parameters.step_fraction)
+    return pair.coupled(SCHEMES[parameters.scheme], parameters.step_fraction)
 
 
-def pair_of(given: PairTrial, free: bool = False) -> Pair:
+def pair_of(parameters: PairTrial, free: bool = False) -> Pair:
     """Return the pair of a trial."""
     board = FR4
-    if given.orthotropy:
-        board = board.model_copy(update={"young_modulus_out_of_plane": FR4.young_modulus_in_plane / given.orthotropy})
+    if parameters.orthotropy:
+        board = board.model_copy(
+            update={"young_modulus_out_of_plane": FR4.young_modulus_in_plane / parameters.orthotropy}
+        )
     names = ("substeps", "impedance", "shape", "layers", "columns", "height", "thinnest")
-    same = {name: getattr(given, name) for name in names}
-    return replace(Pair(**same), ratio=given.mesh_ratio, free=free, board=board)
+    same = {name: getattr(parameters, name) for name in names}
+    return replace(Pair(**same), ratio=parameters.mesh_ratio, free=free, board=board)
 
 
-LENGTH = 0.25e-3  # of an element of the board along the bar [m]
-WIDTH = 0.5e-3  # of the bar [m]
-ROOM = 1.2  # of the bar of board, over the pulse
-HEIGHT = 1e-6  # of the pulse [m]; nothing depends on it
-STIFFNESS = float(elasticity_matrix(FR4)[2, 2])  # of plane waves along z [Pa]
+LENGTH = 0.25e-3  # length of a board element along the bar [m]
+WIDTH = 0.5e-3  # width of the bar [m]
+ROOM = 1.2  # length of the board bar over the pulse
+HEIGHT = 1e-6  # height of the pulse [m]; without influence on the measures
+STIFFNESS = float(elasticity_matrix(FR4)[2, 2])  # modulus of plane waves along z [Pa]
 IMPEDANCE, SPEED = (FR4.density * STIFFNESS) ** 0.5, (STIFFNESS / FR4.density) ** 0.5
 
 
-def reflection(given: Reflection) -> dict[str, float]:
-    """Return the error of the reflected pulse, and of the energy, over the incident ones.
+def reflection(parameters: Reflection) -> dict[str, float]:
+    """Return the errors of the reflected pulse and of the energy, relative to the incident ones.
 
-    Plane waves in a bar whose sides are held: of a displacement f(z - c t), (Z1 - Z2) / (Z1 + Z2) f comes back.
+    Plane waves in a laterally held bar: a displacement f(z - c t) is reflected as (Z1 - Z2) / (Z1 + Z2) f.
     """
-    materials = materials_of(given)
-    models = models_of(mesh_of_bars(given), materials, SCHEMES[given.scheme], FRACTION)
+    materials = materials_of(parameters)
+    models = models_of(mesh_of_bars(parameters), materials, SCHEMES[parameters.scheme], FRACTION)
     coupled = Coupled(models.bodies(), models.division.plan, scheme_of(models.division.scheme))
-    begin(coupled, given)
+    begin(coupled, parameters)
     energy = coupled.energies()
-    windows = round(ROOM * given.elements * LENGTH / SPEED / coupled.plan.window)
+    windows = round(ROOM * parameters.elements * LENGTH / SPEED / coupled.plan.window)
     for _ in range(windows):
         coupled.run()
     macro = coupled.macro.motion
-    place = macro.body.local.points[:, 2]
-    back = pulse_at(-place - SPEED * macro.time, given)
+    heights = macro.body.local.points[:, 2]
+    back = pulse_at(-heights - SPEED * macro.time, parameters)
     solder = materials.solder
-    own = (solder.density * float(elasticity_matrix(solder)[2, 2])) ** 0.5
-    ratio = (IMPEDANCE - own) / (IMPEDANCE + own)
+    block_impedance = (solder.density * float(elasticity_matrix(solder)[2, 2])) ** 0.5
+    ratio = (IMPEDANCE - block_impedance) / (IMPEDANCE + block_impedance)
     last = coupled.energies()
-    total = [sum(found[name] for name in ("kinetic", "internal", "interface")) for found in (energy, last)]
+    total = [sum(energies[name] for name in ("kinetic", "internal", "interface")) for energies in (energy, last)]
     return {
         "reflection_error": float(np.abs(macro.displacement[:, 2] - ratio * back).max()) / HEIGHT,
         "reflected": ratio,
@@ -191,33 +193,33 @@ def reflection(given: Reflection) -> dict[str, float]:
     }
 
 
-def pulse_at(ahead: np.ndarray, given: Reflection) -> np.ndarray:
-    """Return the displacement [m] of a pulse some way [m] ahead of where its middle began."""
-    long = given.elements * LENGTH
+def pulse_at(ahead: np.ndarray, parameters: Reflection) -> np.ndarray:
+    """Return the displacement [m] of a pulse at a distance [m] ahead of its initial centre."""
+    long = parameters.elements * LENGTH
     phase = (ahead + 0.5 * ROOM * long) / long
     return np.where(np.abs(phase) < 0.5, HEIGHT * np.cos(np.pi * phase) ** 4, 0.0)
 
 
-def begin(coupled: Coupled, given: Reflection) -> None:
-    """Let the pulse run towards the block, its middle half the bar below the interface."""
+def begin(coupled: Coupled, parameters: Reflection) -> None:
+    """Start the pulse towards the block, centred half the bar below the interface."""
     for part in coupled.parts:
         motion = part.motion
-        place = motion.body.local.points[:, 2]
+        heights = motion.body.local.points[:, 2]
         moves = motion.mobility[:, 2] > 0.0
-        before = pulse_at(place + SPEED * motion.step, given)
-        motion.displacement[moves, 2] = pulse_at(place, given)[moves]
-        motion.velocity[moves, 2] = (pulse_at(place, given) - before)[moves] / motion.step
+        before = pulse_at(heights + SPEED * motion.step, parameters)
+        motion.displacement[moves, 2] = pulse_at(heights, parameters)[moves]
+        motion.velocity[moves, 2] = (pulse_at(heights, parameters) - before)[moves] / motion.step
     coupled.complete()
 
 
-def mesh_of_bars(given: Reflection) -> MeshData:
-    """Return both bars, whose sides keep their planes; the block's is as long as its waves come."""
-    layers = round(ROOM * given.elements) + given.elements
-    cell = LENGTH / given.mesh_ratio
-    beyond = round(ROOM * given.elements * given.substeps * 1.1) + 4
+def mesh_of_bars(parameters: Reflection) -> MeshData:
+    """Return both laterally held bars; the block's bar is long enough for its waves."""
+    layers = round(ROOM * parameters.elements) + parameters.elements
+    cell = LENGTH / parameters.mesh_ratio
+    beyond = round(ROOM * parameters.elements * parameters.substeps * 1.1) + 4
     heights = (np.arange(-layers, 1) * LENGTH, np.arange(beyond + 1) * cell)
     bars = []
-    for z, count, part in zip(heights, (1, given.mesh_ratio), ("board", "solder@A1"), strict=True):
+    for z, count, part in zip(heights, (1, parameters.mesh_ratio), ("board", "solder@A1"), strict=True):
         flat = np.linspace(0.0, WIDTH, count + 1)
         ends = {"board_side": on(2, 0.0)} if part == "board" else {"foot@A1": on(2, 0.0), "pad_board@A1": on(2, 0.0)}
         ends |= {} if part == "board" else {"pad_package@A1": on(2, z[-1])}
@@ -231,11 +233,11 @@ def either(axis: int):
     return lambda centres: (np.abs(centres[:, axis]) < 1e-9) | (np.abs(centres[:, axis] - WIDTH) < 1e-9)
 
 
-def materials_of(given: Reflection) -> Materials:
-    """Return materials with the impedance of the block whose critical step is a little above 1/m of the board's."""
+def materials_of(parameters: Reflection) -> Materials:
+    """Return materials with the block's impedance and a critical step slightly above 1/m of the board's."""
     trial = Materials(solder=Isotropic(density=1e3, young_modulus=1e9, poisson_ratio=0.0))
-    _, found, _ = surveyed(mesh_of_bars(given), trial)
-    board, block = (found.step[found.role == role].min() for role in ("board", "solder"))
-    slowness = 1e-3 * board / block / (given.substeps - 0.02)
-    product = given.impedance * IMPEDANCE
+    _, survey_of_mesh, _ = surveyed(mesh_of_bars(parameters), trial)
+    board, block = (survey_of_mesh.step[survey_of_mesh.role == role].min() for role in ("board", "solder"))
+    slowness = 1e-3 * board / block / (parameters.substeps - 0.02)
+    product = parameters.impedance * IMPEDANCE
     return Materials(solder=Isotropic(density=product * slowness, young_modulus=product / slowness, poisson_ratio=0.0))

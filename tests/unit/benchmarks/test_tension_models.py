@@ -77,7 +77,7 @@ def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
     law, volume = simulation.law, fields.mass / fields.density
     pairs = cKDTree(points).query_pairs(SUPPORT * law.length, output_type="ndarray")
     apart = points[pairs[:, 0]] - points[pairs[:, 1]]
-    steep = [slope(law.kernel, False, one) for one in np.linalg.norm(apart, axis=1) / law.length]
+    steep = [slope(law.kernel, False, ratio) for ratio in np.linalg.norm(apart, axis=1) / law.length]
     rise, lack = law.norm / law.length**2 * np.array(steep)[:, None] * apart, np.zeros((3, simulation.fluids))
     np.add.at(lack.T, pairs[:, 0], volume[pairs[:, 1], None] * rise)
     np.add.at(lack.T, pairs[:, 1], -volume[pairs[:, 0], None] * rise)
@@ -97,8 +97,8 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     assert radius.max() / radius.min() < 1.01  # its stairs are a third of a spacing high
     assert 0.5 - law.spacing**2 / 0.5 < radius.mean() < 0.5
     row = np.arange(len(points))
-    level, *found = level_at((radius.mean(), 0.0, 0.0), row, fields, 4.0 * law.spacing)
-    rise, (across, along) = found[0], found[4:6]
+    level, *derivatives = level_at((radius.mean(), 0.0, 0.0), row, fields, 4.0 * law.spacing)
+    rise, (across, along) = derivatives[0], derivatives[4:6]
     assert level == pytest.approx(0.5, abs=0.01)
     assert -(across + along) / abs(rise) == pytest.approx(2.0 / radius.mean(), rel=0.03)
 

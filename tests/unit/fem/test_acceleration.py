@@ -1,4 +1,4 @@
-"""Accelerations from histories, and the filter: its frequency response, SAE J211's own recursion, what it refuses."""
+"""Accelerations from histories and their filter: frequency response, SAE J211 recursion and invalid settings."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ TIME = np.arange(4000) * STEP
 
 
 def j211(values: np.ndarray, step: float, channel_class: float) -> np.ndarray:
-    """The recursion as SAE J211-1 writes it, run both ways over a record that is zero beyond its ends."""
+    """Apply the SAE J211-1 recursion in both directions to a record with zeros beyond its ends."""
     analogue = np.tan(np.pi * channel_class * 2.0775 * step)
     scale = 1.0 + np.sqrt(2.0) * analogue + analogue**2
     a0, b1, b2 = (
@@ -46,9 +46,9 @@ def j211(values: np.ndarray, step: float, channel_class: float) -> np.ndarray:
 def test_channel_frequency_classes_are_those_of_sae_j211(channel_class):
     pulse = np.exp(-(((TIME - 0.02) / 2e-4) ** 2)) * np.cos(8e3 * TIME)
     expected = j211(pulse, STEP, channel_class)
-    found = low_passed(pulse, STEP, LowPass(channel_class=channel_class))
-    inner = slice(500, 3500)  # at the ends they assume different things beyond them
-    assert np.abs(found - expected)[inner].max() <= 1e-6 * np.abs(expected).max()
+    filtered = low_passed(pulse, STEP, LowPass(channel_class=channel_class))
+    inner = slice(500, 3500)  # they treat the ends differently
+    assert np.abs(filtered - expected)[inner].max() <= 1e-6 * np.abs(expected).max()
 
 
 FILTERS = [
@@ -58,17 +58,17 @@ FILTERS = [
 ]
 
 
-@pytest.mark.parametrize("low_pass", FILTERS, ids=lambda one: one.label)
+@pytest.mark.parametrize("low_pass", FILTERS, ids=lambda item: item.label)
 @pytest.mark.parametrize("ratio", [0.25, 1.0, 2.0])
 def test_frequency_response(low_pass, ratio):
-    """Of both passes 1 / (1 + (s f / fc)^2n), s^2n = sqrt(2) - 1: -3 dB at the corner, and no phase."""
+    """Both passes give 1 / (1 + (s f / fc)^2n), s^2n = sqrt(2) - 1: -3 dB at the corner without phase shift."""
     order, _ = low_pass.passes
     frequency = ratio * low_pass.frequency
-    found = low_passed(np.sin(2 * np.pi * frequency * TIME), 1e-5, low_pass)[1500:2500]
+    response = low_passed(np.sin(2 * np.pi * frequency * TIME), 1e-5, low_pass)[1500:2500]
     expected = (
         1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * ratio ** (2 * order)) * np.sin(2 * np.pi * frequency * TIME[1500:2500])
     )
-    assert np.abs(found - expected).max() < 0.02  # of the bilinear transform
+    assert np.abs(response - expected).max() < 0.02  # of the bilinear transform
 
 
 def test_corners_are_told():
@@ -77,14 +77,14 @@ def test_corners_are_told():
 
 
 def test_acceleration_of_a_swing_and_its_two_peaks():
-    """x = t^2 sin(w t): differences give it to (w dt)^2 / 12, the filter far above leaves it."""
+    """For x = t^2 sin(w t) differences have the error (w dt)^2 / 12, and a filter far above w has no effect."""
     rate = 2 * np.pi * 50.0
     displacement = 1e-3 * np.sin(rate * TIME) * np.exp(-rate * 0.05 * TIME)
-    found = acceleration(TIME, displacement, LowPass())
+    values = acceleration(TIME, displacement, LowPass())
     exact = 1e-3 * np.imag((1j - 0.05) ** 2 * rate**2 * np.exp((1j - 0.05) * rate * TIME))[1:-1]
-    assert np.abs(found.raw - exact).max() < 1e-4 * np.abs(exact).max()
+    assert np.abs(values.raw - exact).max() < 1e-4 * np.abs(exact).max()
     inner = slice(200, -200)
-    assert np.abs(found.filtered - exact)[inner].max() < 1e-3 * np.abs(exact).max()
+    assert np.abs(values.filtered - exact)[inner].max() < 1e-3 * np.abs(exact).max()
 
 
 def test_second_peak_has_the_other_sign_and_comes_later():
@@ -101,7 +101,7 @@ def test_second_peak_has_the_other_sign_and_comes_later():
 
 
 def test_watch_point_at_rest_on_the_table_feels_the_table():
-    """A point that does not move in the table's frame has the table's acceleration, along the point's own direction."""
+    """A point at rest in the table frame has the acceleration of the table, along the direction of the point."""
     peak, duration = 1000.0, 0.01
     tables = structure_tables_of(
         loads={"drop": {"kind": "input_g", "peak": peak, "duration": duration, "direction": [0.0, 0.0, -2.0]}},
@@ -109,9 +109,9 @@ def test_watch_point_at_rest_on_the_table_feels_the_table():
     )
     problem = StructureProblem(**{name: tables[name] for name in StructureProblem.model_fields if name in tables})
     rest = {f"displacement@{name}": np.zeros((len(TIME), 3)) for name in problem.watch}
-    found = watch_accelerations({"time": TIME} | rest, problem, {"drop": HalfSine(peak, duration)})
-    assert found["foot"].raw.max() == pytest.approx(peak, rel=1e-5)
-    assert found["aslant"].raw.min() == pytest.approx(-0.8 * peak, rel=1e-5)
+    accelerations = watch_accelerations({"time": TIME} | rest, problem, {"drop": HalfSine(peak, duration)})
+    assert accelerations["foot"].raw.max() == pytest.approx(peak, rel=1e-5)
+    assert accelerations["aslant"].raw.min() == pytest.approx(-0.8 * peak, rel=1e-5)
     assert watch_accelerations({"time": TIME[::100]}, problem, {}) == {}
 
 
@@ -122,11 +122,11 @@ def test_package_and_board_at_rest_on_the_table_feel_the_table():
         "aslant": WatchPoint(at=(0.0, 0.0, 0.0), direction=(3.0, 0.0, 4.0)),
     }
     arrays = {"time": TIME, "die_centre": rest + [1e-12, 0.0, 0.0]} | {f"displacement@{name}": rest for name in watch}
-    found = drop_accelerations(arrays, HalfSine(5000.0, 0.01), LowPass(), watch)
+    accelerations = drop_accelerations(arrays, HalfSine(5000.0, 0.01), LowPass(), watch)
     for name in ("package", "foot"):
-        assert found[name].raw.max() == pytest.approx(5000.0, rel=1e-5)
-        assert found[name].filtered.max() == pytest.approx(5000.0, rel=2e-3)
-    assert found["aslant"].raw.min() == pytest.approx(-0.8 * 5000.0, rel=1e-5)
+        assert accelerations[name].raw.max() == pytest.approx(5000.0, rel=1e-5)
+        assert accelerations[name].filtered.max() == pytest.approx(5000.0, rel=2e-3)
+    assert accelerations["aslant"].raw.min() == pytest.approx(-0.8 * 5000.0, rel=1e-5)
     assert list(drop_accelerations(arrays | {"die_centre": rest}, HalfSine(1.0, 1.0), LowPass(), watch)) == list(watch)
     assert drop_accelerations({"time": TIME[::100]}, HalfSine(1.0, 1.0), LowPass(), {}) == {}
 
@@ -138,19 +138,19 @@ def test_too_few_samples():
 
 
 @pytest.mark.parametrize(
-    ("given", "key", "message"),
+    ("parameters", "key", "message"),
     [
         ({"kind": "butterworth"}, "dynamics.filter.corner", "is missing"),
         ({"corner": 500.0}, "dynamics.filter.corner", "kind = butterworth"),
         ({"channel_class": 10_000}, "dynamics.numerics.history_samples", "CFC 10000, -3 dB at 1.667e"),
     ],
 )
-def test_filter_that_does_not_fit(given, key, message):
-    [problem] = filter_problems("dynamics", LowPass(**given), 1e-2, 600)
+def test_filter_that_does_not_fit(parameters, key, message):
+    [problem] = filter_problems("dynamics", LowPass(**parameters), 1e-2, 600)
     assert problem.key == key and message in str(problem)
 
 
-@pytest.mark.parametrize("given", [{"channel_class": 0.0}, {"kind": "bessel"}, {"order": 9}, {"corner": -1.0}])
-def test_filter_out_of_range(given):
+@pytest.mark.parametrize("parameters", [{"channel_class": 0.0}, {"kind": "bessel"}, {"order": 9}, {"corner": -1.0}])
+def test_filter_out_of_range(parameters):
     with pytest.raises(ValidationError):
-        LowPass(**given)
+        LowPass(**parameters)

@@ -1,4 +1,4 @@
-"""Rows of boxes: the vectorised force against the plain sum over elements, on meshes that break rows."""
+"""Rows of boxes: vectorised force against the sum over elements, on meshes with interrupted rows."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def elements_of(points: np.ndarray, cells: np.ndarray, formulation: str = "incom
 
 
 def force_twin(elements: Elements, displacement: np.ndarray) -> np.ndarray:
-    """Return - K u, one element after the other."""
+    """Return -K u element by element."""
     force = np.zeros_like(displacement)
     for nodes, stiffness in zip(elements.cells, element_stiffness(elements), strict=True):
         force[nodes] -= (stiffness @ displacement[nodes].ravel()).reshape(8, 3)
@@ -32,7 +32,7 @@ def assert_same_force(elements: Elements) -> CongruentElements:
     displacement = np.random.default_rng(1).uniform(-1, 1, elements.points.shape)
     term = CongruentElements.build(elements)
     exact = force_twin(elements, displacement)
-    for _ in range(2):  # nothing is left over from a call
+    for _ in range(2):  # no state remains from a call
         force = np.zeros_like(displacement)
         term.add(displacement, force)
         assert np.abs(force - exact).max() < 1e-13 * np.abs(exact).max()
@@ -43,9 +43,9 @@ def assert_same_force(elements: Elements) -> CongruentElements:
 @pytest.mark.parametrize("formulation", ["incompatible_modes", "one_point"])
 def test_grids_with_two_materials_and_holes(counts, formulation):
     points, cells = grid(*(np.cumsum([0.0, *np.linspace(1, 3, count)]) * 1e-3 for count in counts))
-    kept = np.random.default_rng(0).uniform(size=len(cells)) < 0.8
-    kept[0] = True
-    assert_same_force(elements_of(points, cells[kept], formulation))
+    is_solid = np.random.default_rng(0).uniform(size=len(cells)) < 0.8
+    is_solid[0] = True
+    assert_same_force(elements_of(points, cells[is_solid], formulation))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -69,7 +69,7 @@ def test_numbering_does_not_matter():
 
 
 def test_boxes_whose_edges_do_not_match_have_lines_of_their_own():
-    """A node with two next nodes: a box of length 1 above one of length 2, which share the nodes of one edge."""
+    """A box of length 1 lies above a box of length 2, so one node has two successors."""
     points, cells = grid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0])
     below = [[0.0, -1, 0], [2, -1, 0], [2, 0, 0], [0, -1, 1], [2, -1, 1], [2, 0, 1]]
     both = np.vstack([cells, [8, 9, 0, 10, 11, 12, 4, 13]]).astype(np.int32)
@@ -91,6 +91,6 @@ def test_what_is_past_the_end_of_a_line_does_not_matter():
 
 def test_positions_of_a_line_follow_each_other():
     points, cells = grid(np.arange(5.0), np.arange(3.0), np.arange(2.0))
-    found = BoxRows.find(points, cells, np.zeros(len(cells), np.int32))
-    assert len(found.nodes) == len(points)
-    assert found.rows.tolist() == [[0, 5, 15, 20, 4, 0], [5, 10, 20, 25, 4, 0]]
+    rows = BoxRows.find(points, cells, np.zeros(len(cells), np.int32))
+    assert len(rows.nodes) == len(points)
+    assert rows.rows.tolist() == [[0, 5, 15, 20, 4, 0], [5, 10, 20, 25, 4, 0]]

@@ -1,4 +1,4 @@
-"""Meshes of any one shape of cells: files, faces, facets, quality, DOLFINx."""
+"""Meshes of each cell shape: files, faces, facets, quality, DOLFINx."""
 
 import gmsh
 import numpy as np

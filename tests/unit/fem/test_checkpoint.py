@@ -1,4 +1,4 @@
-"""Files of a shock's checkpoints that are broken or forged: told, not executed, and an older generation is taken."""
+"""Broken or forged checkpoint files of a shock are reported, never executed, and replaced by an older generation."""
 
 import json
 import re
@@ -20,7 +20,7 @@ NUMERICS = {"history_samples": 20, "field_samples": 3, "checkpoint_seconds": 1e-
 
 
 class Killed(Exception):
-    """What stands for a kill."""
+    """Exception in place of a kill."""
 
 
 def state(window: int) -> dict:
@@ -36,7 +36,7 @@ def checkpoints(folder) -> Checkpoints:
 
 
 def written(folder) -> Checkpoints:
-    """Write two generations, each with a file of fields of its own."""
+    """Write two generations, each with its own file of fields."""
     files = checkpoints(folder)
     files.read(state(0))
     for window in (3, 5):
@@ -57,11 +57,11 @@ def warnings(said: str) -> list[str]:
 def test_a_state_comes_back_as_it_was(tmp_path):
     written(tmp_path)
     files = checkpoints(tmp_path)
-    found = files.read(state(0))
+    restored = files.read(state(0))
     assert files.continued == 5
-    assert found["history"]["balance"] == {"limit": 0.01}
-    assert (found["macro"]["displacement"] == 5.0).all()
-    assert found["macro"]["work"] == 0.5
+    assert restored["history"]["balance"] == {"limit": 0.01}
+    assert (restored["macro"]["displacement"] == 5.0).all()
+    assert restored["macro"]["work"] == 0.5
     assert files.stored("macro-3", {"macro": {"time": Same(None)}}) == {"macro": {"time": 3}}
 
 
@@ -72,8 +72,8 @@ def test_the_older_generation_is_taken_where_a_file_is_broken_or_forged(tmp_path
     written(folder)
     damage_files(folder, pattern, damage, marker)
     files = checkpoints(folder)
-    found = files.read(state(0))
-    assert (found["macro"]["displacement"] == 3.0).all()
+    restored = files.read(state(0))
+    assert (restored["macro"]["displacement"] == 3.0).all()
     assert files.continued == 3
     (warning,) = warnings(capsys.readouterr().out)
     assert re.search("state-0000-1|macro-5-0000", warning)
@@ -88,7 +88,7 @@ def test_files_of_other_inputs_are_no_reason_for_a_warning(tmp_path, capsys):
 
 @pytest.mark.parametrize("damage", [DAMAGES["pickle"], DAMAGES["pickled array"], DAMAGES["truncated"]])
 def test_a_shock_beside_forged_checkpoints_starts_anew(tmp_path, capsys, monkeypatch, damage):
-    """All files of its folder are forged, so that no generation is left."""
+    """All files of the folder are forged, so no generation is valid."""
     marker = tmp_path / "marker"
     request = structure_input(tmp_path, dynamics={"duration": 2e-5, "numerics": NUMERICS})
     request = request.model_copy(update={"checkpoints": tmp_path / "checkpoints"})

@@ -43,38 +43,38 @@ def test_facets_that_no_cell_has_any_more_go_in_one_search(whole, monkeypatch):
     monkeypatch.setattr(column, "cells_of_facets", search)
     left = replace(whole.mesh, cells=whole.mesh.cells[stay], part=whole.mesh.part[stay])
     mesh = replace(left, facets=left.facets | empty)
-    found = column.without_stale_facets(mesh).facets
+    remaining = column.drop_stale_facets(mesh).facets
     assert searched == [sum(len(some) for some in mesh.facets.values())]
-    assert list(found) == list(mesh.facets)
+    assert list(remaining) == list(mesh.facets)
     one_by_one = {name: some[cells_of_facets(mesh.cells, some) >= 0] for name, some in mesh.facets.items()}
-    assert all(np.array_equal(found[name], one_by_one[name]) for name in found)
-    assert 0 < sum(len(some) for some in found.values()) < searched[0]
+    assert all(np.array_equal(remaining[name], one_by_one[name]) for name in remaining)
+    assert 0 < sum(len(some) for some in remaining.values()) < searched[0]
 
 
 def test_a_constant_strain_passes_the_ties_of_a_column(whole):
-    """Where lines of boxes are lines of the column, no force is left on a node inside."""
-    one = Problem(whole, False, dict.fromkeys(("board", "substrate", "copper", "solder"), FR4))
-    place = whole.mesh.points @ GRADIENT.T
-    force = (one.tie.T @ one.hencky.linearised(place)[0].ravel()).reshape(-1, 3)
+    """On matching mesh lines the force at inner nodes is zero."""
+    problem = Problem(whole, False, dict.fromkeys(("board", "substrate", "copper", "solder"), FR4))
+    displacement = whole.mesh.points @ GRADIENT.T
+    force = (problem.tie.T @ problem.hencky.linearised(displacement)[0].ravel()).reshape(-1, 3)
     points = whole.mesh.points
     lateral = np.abs(points[:, :2]).max(axis=1) > 1.5 * MM - 1e-9
     tied = np.zeros(len(points), bool)
     tied[whole.tie.master] = True
     around = tied & ~lateral & (np.abs(points[:, 2] + 0.5 * MM) < 0.4 * MM)
     assert around.sum() > 20
-    scale = np.abs(one.hencky.linearised(place)[0][around]).max()
+    scale = np.abs(problem.hencky.linearised(displacement)[0][around]).max()
     assert np.abs(force[around]).max() < 1e-10 * scale
 
 
 def test_boxes_that_leave_no_room_for_a_column_are_refused():
     mesh = Mesh(0.3 * MM, IMPRINTED.joint, IMPRINTED.imprint)
-    told = "board_column@A1 fills 1e-09 m^3, the boxes in its place 1.44e-09 m^3: the lines of board and package"
-    with pytest.raises(MeshError, match=re.escape(told)):
+    message = "board_column@A1 fills 1e-09 m^3, the boxes in its place 1.44e-09 m^3: the lines of board and package"
+    with pytest.raises(MeshError, match=re.escape(message)):
         patch(mesh)
 
 
 def neighbours(first=-2.5, upper=None, **lower):
-    """Two joints side by side between boxes of board and of a bowed substrate, from y = first [mm] on."""
+    """Return two adjacent joints between boxes of board and warped substrate, starting at y = first [mm]."""
     joint, side = standing("B4", **lower)
     joints = [data_of(upper or standing("A4")[0]), data_of(joint)]
     lines = np.linspace(-2.5, 2.5, 21) * MM
@@ -94,7 +94,7 @@ def test_neighbouring_columns_share_their_face():
         assert len(np.intersect1d(*nodes)) == shared
     inside = np.abs(whole.mesh.points[whole.tie.slave, 1] - 1.0 * MM) < 1e-9
     x = whole.mesh.points[whole.tie.slave[inside], 0] / MM
-    assert np.abs(x - 1.5).min() > 0.4  # of the common face only its ends are tied
+    assert np.abs(x - 1.5).min() > 0.4  # only the ends of the common face are tied
     assert whole.moved < 1e-9
 
 
@@ -112,13 +112,13 @@ def test_a_joint_with_a_void_shares_the_face_of_its_neighbour_and_stands_on_its_
 
 def test_neighbours_with_other_rims_are_refused():
     finer = {"core": 5, "rings": 2, "layers": 10, "copper_layers": 2}
-    told = r"the columns of A4 and B4 touch with \d+ faces that do not fit together, near \(0\.001\d+, 0\.001, "
-    with pytest.raises(MeshError, match=told):
+    message = r"the columns of A4 and B4 touch with \d+ faces that do not match, near \(0\.001\d+, 0\.001, "
+    with pytest.raises(MeshError, match=message):
         joined(neighbours(joint_numerics=finer))
 
 
 def test_faces_on_a_plane_of_symmetry_are_held_there():
-    """The lower column reaches down to y = 0, where a quarter model ends."""
+    """The lower column ends at y = 0, the symmetry plane of a quarter model."""
     mesh = neighbours(first=0.0)
     facets = boundary_facets(mesh.cells[mesh.in_parts(lambda name: "@" not in name)])
     mesh.facets["symmetry_y"] = facets[(mesh.points[facets, 1] < 1e-12).all(axis=1)]
@@ -130,16 +130,16 @@ def test_faces_on_a_plane_of_symmetry_are_held_there():
 
 
 def test_masses_of_a_column_are_scaled_to_the_step_of_the_boxes_or_as_far_as_wanted(whole):
-    """Below the wanted step all of the column is heavier, to just that step; nothing else is."""
-    mesh, given = whole.mesh, ("column", "solder", "copper")
-    plain, full = (survey(mesh, ELASTIC, Treatment(mass_scaled=scaled)) for scaled in ((), given))
+    """Column elements below the target step are scaled exactly to it; all others are unchanged."""
+    mesh, scaled_parts = whole.mesh, ("column", "solder", "copper")
+    plain, full = (survey(mesh, ELASTIC, Treatment(mass_scaled=scaled)) for scaled in ((), scaled_parts))
     boxes = mesh.in_parts(lambda name: "@" not in name)
     assert np.array_equal(full.factor[boxes], np.ones(boxes.sum()))
     assert full.step.min() == pytest.approx(plain.plain_step[boxes].min(), rel=1e-12)
-    wanted = 0.5 * (plain.plain_step.min() + plain.plain_step[boxes].min())
-    some = survey(mesh, ELASTIC, Treatment(mass_scaled=given, scaled_step=wanted))
-    assert some.step.min() == pytest.approx(wanted, rel=1e-12)
-    assert np.array_equal(some.factor > 1.0, ~boxes & (plain.plain_step < wanted))
+    target_step = 0.5 * (plain.plain_step.min() + plain.plain_step[boxes].min())
+    some = survey(mesh, ELASTIC, Treatment(mass_scaled=scaled_parts, scaled_step=target_step))
+    assert some.step.min() == pytest.approx(target_step, rel=1e-12)
+    assert np.array_equal(some.factor > 1.0, ~boxes & (plain.plain_step < target_step))
     assert 0.0 < some.added_mass.sum() < full.added_mass.sum()
 
 

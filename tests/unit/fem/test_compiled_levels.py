@@ -22,7 +22,7 @@ def barrel() -> MeshData:
 
 
 def one_by_one(level: SubsteppedElements) -> SubsteppedElements:
-    """Return a level that takes its substeps, and those of its inner levels, one by one."""
+    """Return a level that executes its substeps and the substeps of its inner levels one by one."""
     terms = [one_by_one(term) if isinstance(term, SubsteppedElements) else term for term in level.terms]
     return replace(level, terms=terms, compiled=())
 

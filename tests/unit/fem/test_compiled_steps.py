@@ -1,4 +1,4 @@
-"""All steps of a window in one compiled call: those one by one, but for the order of sums."""
+"""All steps of a window in one compiled call equal single steps, except for the order of sums."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ SETTINGS = {
 
 
 def body_of(formulation: str, response: ForceOptions, pace: int = 1):
-    """Return a joint that yields, tied to a board; some of its elements are no boxes, the lowest have a pace."""
+    """Return a plastic joint tied to a board, with some distorted elements and a pace for the lowest ones."""
     mesh = joint_on_board(edges=6)
     copper = np.unique(mesh.cells[mesh.in_parts(lambda name: name.startswith("copper"))])
     low = copper[mesh.points[copper, 2] < np.median(mesh.points[copper, 2])]
@@ -42,13 +42,15 @@ def body_of(formulation: str, response: ForceOptions, pace: int = 1):
 
 
 def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interface]:
-    """Return a motion that begins with any velocities, and some nodes that another model moves through its steps."""
+    """Return a motion with random velocities, and nodes that another model moves in its steps."""
     rows = np.arange(12, dtype=np.int32)
     motion = ExplicitMotion(body, loads, STEP, rows, np.zeros(len(body.mass)))
     random = np.random.default_rng(3)
     motion.velocity[:] = random.uniform(-speed, speed, motion.velocity.shape)
-    given, change = motion.velocity[rows], random.uniform(-1.0, 1.0, (STEPS, 3))
-    return motion, Interface(rows, rows[::2].copy(), given, change, random.random((STEPS + 1, 2)), np.zeros((2, 6, 3)))
+    velocity, change = motion.velocity[rows], random.uniform(-1.0, 1.0, (STEPS, 3))
+    return motion, Interface(
+        rows, rows[::2].copy(), velocity, change, random.random((STEPS + 1, 2)), np.zeros((2, 6, 3))
+    )
 
 
 @pytest.mark.parametrize("pace", [1, 3])
@@ -78,8 +80,8 @@ def test_compiled_steps_are_those_one_by_one(name, pace):
             )
         )
     (motion, first), (other, second) = ended
-    for one, two in zip(first, second, strict=True):
-        assert np.abs(one - two).max() <= 1e-13 * np.abs(two).max()
+    for left, right in zip(first, second, strict=True):
+        assert np.abs(left - right).max() <= 1e-13 * np.abs(right).max()
     assert motion.time == other.time
     assert motion.external_work == pytest.approx(other.external_work, rel=1e-12)
     assert motion.internal_energy().plastic > 0.0
@@ -93,14 +95,14 @@ def test_nodes_that_move_most_often_come_first():
     assert ends.tolist() == [np.sum(node == 1), len(node), len(node)]
 
 
-def test_inverted_elements_are_told_alike():
-    told = []
+def test_inverted_elements_raise_the_same_error():
+    errors = []
     for take in (ExplicitMotion.take_steps, ExplicitMotion._take_single_steps):
         motion, interface = moving(body_of(*SETTINGS["turning"][:2]), speed=2e4)
         with pytest.raises(InvertedElementError) as error:
             take(motion, STEPS, interface)
-        told.append((str(error.value), motion.time))
-    assert told[0] == told[1]
+        errors.append((str(error.value), motion.time))
+    assert errors[0] == errors[1]
 
 
 def test_what_acts_between_steps_is_no_matter_of_one_call():

@@ -1,4 +1,4 @@
-"""Hexahedra that turn: against the linear element, against a plain twin of the formula, and as an energy."""
+"""Corotational hexahedra against the linear element, a NumPy twin and the derivative of an energy."""
 
 from dataclasses import replace
 
@@ -28,24 +28,24 @@ FORMULATIONS = ("incompatible_modes", "one_point")
 
 
 def boxes(counts: tuple[int, int, int], formulation: str = "incompatible_modes", share: float = 1.0) -> Elements:
-    """Return boxes of different sizes and two materials, some of them left out."""
+    """Return boxes of different sizes and two materials, with holes."""
     points, cells = grid(*(np.cumsum([0.0, *np.linspace(1, 3, count)]) * 1e-4 for count in counts))
     random = np.random.default_rng(len(cells))
-    kept = random.uniform(size=len(cells)) < share
-    kept[0] = True
-    material = random.integers(0, 2, kept.sum()).astype(np.int32)
-    return Elements(points, cells[kept], material, MATERIALS, np.ones(kept.sum()), element_kind(8, formulation))
+    is_solid = random.uniform(size=len(cells)) < share
+    is_solid[0] = True
+    material = random.integers(0, 2, is_solid.sum()).astype(np.int32)
+    return Elements(points, cells[is_solid], material, MATERIALS, np.ones(is_solid.sum()), element_kind(8, formulation))
 
 
 @pytest.fixture(params=[CorotationalBoxes, CorotationalBlocks, CorotationalHexahedra], ids=["rows", "blocks", "any"])
 def kind(request):
-    """Each kind of term."""
+    """Return each kind of term."""
     return request.param
 
 
 @pytest.fixture
 def hexahedra(kind):
-    """What makes elements that a kind of term is for: boxes, or distorted ones."""
+    """Return the factory of elements for a kind of term: boxes or distorted hexahedra."""
 
     def make(counts: tuple[int, int, int], formulation: str = "incompatible_modes", share: float = 1.0) -> Elements:
         elements = boxes(counts, formulation, share)
@@ -57,7 +57,7 @@ def hexahedra(kind):
 
 @pytest.fixture
 def term_of(kind):
-    """What makes a term of all elements."""
+    """Return the factory of a term for all elements."""
     return lambda elements: kind.build(elements, np.arange(len(elements.cells)))
 
 
@@ -68,12 +68,12 @@ def force_of(term, displacement: np.ndarray) -> np.ndarray:
 
 
 def turned(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Return the displacement of a body that is displaced, then turned."""
+    """Return a displacement followed by a rotation."""
     return (points + displacement) @ TURN.T - points
 
 
 def local_energy(elements: Elements, displacement: np.ndarray) -> float:
-    """Return the sum of d . K d / 2, d the displacement seen from the frame of each element's mean rotation."""
+    """Return the sum of d . K d / 2, with d in the mean-rotation frame of each element."""
     total = 0.0
     gradients = element_geometry(elements.points, elements.cells).gradient
     for nodes, gradient, stiffness in zip(elements.cells, gradients, element_stiffness(elements), strict=True):

@@ -1,4 +1,4 @@
-"""Rayleigh damping: its kernels and its load against plain NumPy; a step makes no arrays."""
+"""Rayleigh damping: kernels and load against NumPy, and steps without array allocation."""
 
 import tracemalloc
 
@@ -19,7 +19,7 @@ COEFFICIENTS = 0.7, 0.05  # c [1/s], dt/2 [s]
 
 
 def random_nodes(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return velocities, mobilities some of which are zero, and two forces, of some nodes."""
+    """Return velocities, mobilities (some zero) and two forces of random nodes."""
     random = np.random.default_rng(count)
     mobility = random.uniform(1, 2, (count, 3)) * (random.uniform(size=(count, 3)) < 0.7)
     return random.uniform(-1, 1, (count, 3)), mobility, random.uniform(-1, 1, (2, count, 3))
@@ -44,7 +44,7 @@ def test_force_on_all_nodes(count):
 
 
 def test_a_node_is_damped_alike_wherever_it_stands():
-    """As ``test_motion_kernels`` asks of the step: copies of a node on several ranks stay equal to the last bit."""
+    """Copies of a node on several ranks stay bitwise equal, as in ``test_motion_kernels``."""
     velocity, mobility, forces = random_nodes(40)
     whole = forces.copy()
     add_damping(velocity, mobility, GRAVITY, COEFFICIENTS, (whole[0], whole[1]))
@@ -57,7 +57,7 @@ def test_a_node_is_damped_alike_wherever_it_stands():
 def moving_bar(
     coefficients: tuple[float, float], owned: slice = slice(None), elements: int = 5
 ) -> tuple[RayleighDamping, ExplicitMotion]:
-    """Return the damping and the motion of a bar that moves at random, with weight; a rank that counts some nodes."""
+    """Return damping and motion of a randomly moving bar with weight, on a rank that owns some nodes."""
     points, cells = grid(np.linspace(0, elements * 1e-3, elements + 1), [0, 1e-3], [0, 1e-3, 2e-3])
     body, critical = dns_body(mesh_of(points, cells, "board", {"symmetry_x": on(0, 0.0)}), STEEL)
     counted = np.zeros_like(body.shared.owned)
@@ -108,7 +108,7 @@ def test_power_of_no_node_is_zero():
 
 @pytest.mark.parametrize("coefficients", [(2e5, 0.0), (2e5, 1e-8)])
 def test_a_step_makes_no_arrays(coefficients):
-    """None of the nodes: kernels have room for one row of boxes, or a strip of nodes, whatever the model."""
+    """Kernels allocate one row of boxes or a strip of nodes, independent of the model size."""
     damping, motion = moving_bar(coefficients, elements=8000)
     damping.add(motion)
     damping.collect(motion)
@@ -116,6 +116,6 @@ def test_a_step_makes_no_arrays(coefficients):
     try:
         damping.add(motion)
         damping.collect(motion)
-        assert tracemalloc.get_traced_memory()[1] < len(motion.force)  # not a byte for each node
+        assert tracemalloc.get_traced_memory()[1] < len(motion.force)  # less than a byte per node
     finally:
         tracemalloc.stop()

@@ -1,4 +1,4 @@
-"""Cells of a small package given to models: by buffer, at ties, by levels; what does not fit is refused."""
+"""Division of a small package into models: buffers, ties, levels and invalid divisions."""
 
 from dataclasses import replace
 
@@ -71,8 +71,8 @@ def test_layers_grow_by_nodes():
 
 
 def test_large_mass_leaves_levels_along_a_path_where_the_meso_model_has_none_of_its_nodes(mesh):
-    whole, found, rules = scene(mesh, YIELDING, scheme="held_velocity")
-    dear = replace(found, cost=found.cost * MANY)
+    whole, division, rules = scene(mesh, YIELDING, scheme="held_velocity")
+    dear = replace(division, cost=division.cost * MANY)
     free = divide(whole, dear, rules)
     assert len(free.ratios) > 1
     inside = np.unique(whole.mesh.cells[free.meso])
@@ -105,8 +105,8 @@ def test_scheme_follows_from_materials_and_room(mesh, materials, coupling, schem
 
 
 def test_strong_stiffness_damping_leaves_held_velocity(mesh):
-    whole, found, rules = scene(mesh)
-    choice = scheme_for(whole, found, replace(rules, stiffness=1e-8))
+    whole, division, rules = scene(mesh)
+    choice = scheme_for(whole, division, replace(rules, stiffness=1e-8))
     assert choice.scheme == "held_velocity"
     assert "damping" in choice.why
 

@@ -1,4 +1,4 @@
-"""Every kind of element: rigid modes, average strain, volume, and what each kind promises."""
+"""Each element type: rigid-body modes, average strain, volume and its specific properties."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ VERTICES = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.
 
 
 def corners_of(kind, distortion=0.15) -> np.ndarray:
-    """Two distorted elements, (2, k, 3); the edges of tetrahedra are straight."""
+    """Return two distorted elements, shape (2, k, 3); the edges of tetrahedra are straight."""
     if kind.nodes == 8:
         return 0.5 * SIDES + RANDOM.uniform(-distortion, distortion, (2, 8, 3))
     vertices = VERTICES + RANDOM.uniform(-distortion, distortion, (2, 4, 3))
@@ -34,7 +34,7 @@ def elements_of(kind, corners) -> Elements:
 
 
 def rigid_fields(corners: np.ndarray) -> np.ndarray:
-    """Translations and rotations of one element, (6, 3k)."""
+    """Return translations and rotations of one element, shape (6, 3k)."""
     moves = [np.broadcast_to(axis, corners.shape) for axis in np.eye(3)]
     return np.array([*moves, *(np.cross(axis, corners) for axis in np.eye(3))]).reshape(6, -1)
 
@@ -42,18 +42,18 @@ def rigid_fields(corners: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_exactly_six_modes_have_no_energy(kind):
     corners = corners_of(kind)
-    for stiffness, place in zip(kind.stiffness(corners, ELASTICITY, MATERIAL), corners, strict=True):
+    for stiffness, vertices in zip(kind.stiffness(corners, ELASTICITY, MATERIAL), corners, strict=True):
         values = np.linalg.eigvalsh(stiffness)
         assert np.abs(values[:6]).max() < 1e-13 * values[-1]
         assert values[6] > 1e-4 * values[-1]
-        assert np.abs(rigid_fields(place) @ stiffness).max() < 1e-13 * values[-1]
+        assert np.abs(rigid_fields(vertices) @ stiffness).max() < 1e-13 * values[-1]
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_mean_gradient_gives_the_average_strain(kind):
     corners, linear = corners_of(kind), RANDOM.uniform(-1, 1, (3, 3))
-    found = np.einsum("eai,ead->eid", corners @ linear.T, kind.geometry(corners).gradient)
-    assert np.allclose(found, linear, atol=1e-13)
+    gradients = np.einsum("eai,ead->eid", corners @ linear.T, kind.geometry(corners).gradient)
+    assert np.allclose(gradients, linear, atol=1e-13)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -88,7 +88,7 @@ def test_quadratic_tetrahedron_equals_an_independent_integration():
 
 
 def stiffness_twin(corners: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
-    """Strains by central differences of the shape functions in space, at the four points of the degree-2 rule."""
+    """Return the stiffness from central differences of the shape functions at the four degree-2 points."""
     vertices = corners[:4]
     to_barycentric = np.linalg.inv(np.vstack([vertices.T, np.ones(4)]))
 

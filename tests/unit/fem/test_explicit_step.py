@@ -1,4 +1,4 @@
-"""A step that the user gives: taken as it is below the critical one, refused above it with both numbers."""
+"""A user-defined step: accepted below the critical step, rejected above it with both values."""
 
 import numpy as np
 import pytest

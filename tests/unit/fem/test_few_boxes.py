@@ -1,4 +1,4 @@
-"""Boxes have a force term of their own where that pays; the force is the same."""
+"""Boxes have a separate force term where it is faster, with equal forces."""
 
 import numpy as np
 import pytest
@@ -17,13 +17,13 @@ KIND: ElementKind = KINDS["incompatible_modes"]
 @pytest.mark.parametrize(("boxes", "terms"), [(FEW - 1, 1), (FEW, 2)])
 def test_few_boxes_among_others_are_assembled(boxes, terms):
     points, cells = grid(np.arange(boxes + 2.0), [0.0, 1.0], [0.0, 1.0])
-    points[points[:, 0] > boxes + 0.5, 1] *= 1.1  # the last one is no box
+    points[points[:, 0] > boxes + 0.5, 1] *= 1.1  # the last one is distorted
     elements = elements_of(KIND, points, cells, [STEEL])
-    found = linear_terms(elements)
-    assert len(found) == terms
+    assembled = linear_terms(elements)
+    assert len(assembled) == terms
     displacement = np.random.default_rng(3).uniform(-1, 1, points.shape)
     force, exact = np.zeros_like(points), np.zeros_like(points)
-    for term in found:
+    for term in assembled:
         term.add(displacement, force)
     AssembledElements.build(elements).add(displacement, exact)
     assert np.abs(force - exact).max() < 1e-12 * np.abs(exact).max()

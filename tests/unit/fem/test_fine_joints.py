@@ -1,4 +1,4 @@
-"""A scene in which some joints are fine and all others coarse."""
+"""A scene with some fine joints and otherwise coarse joints."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tests.support.fem_models import SITES, small_assembly
 
 
 def coarse_joints(names=tuple(SITES)):
-    """Joints of two layers of solder of one element each, which end where the fine ones do, without copper."""
+    """Return coarse joints: two single-element layers of solder with the height of fine joints, without copper."""
     meshes = []
     for name in names:
         mesh = joint_mesh(name, *SITES[name], layers=2, edges=1)

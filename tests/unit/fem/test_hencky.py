@@ -1,4 +1,4 @@
-"""Deformation plasticity of points and elements: a plain twin, tangents by differences, one step of the flow theory."""
+"""Deformation plasticity of points and elements: NumPy twin, tangents by differences, one step of flow theory."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ STRAIN = np.random.default_rng(3).normal(size=6) * 3e-3
 
 
 def twin(strain: np.ndarray, material: Isotropic) -> tuple[np.ndarray, float]:
-    """Return stress and plastic strain: the secant modulus that puts the stress on the hardening curve."""
+    """Return stress and plastic strain from the secant modulus on the hardening curve."""
     tensor, law = symmetric((strain / SHEAR_TWICE)[None])[0], material.plasticity
     deviator = tensor - np.trace(tensor) / 3.0 * np.eye(3)
     shear = material.shear_modulus
@@ -79,7 +79,7 @@ def test_elastic_elements_are_the_linear_ones(formulation):
 
 @pytest.mark.parametrize("formulation, tolerance", [("incompatible_modes", 1e-6), ("one_point", 1e-3)])
 def test_tangent_of_an_element_that_yields(formulation, tolerance):
-    """Exact, but for what a one-point element leaves out: how its hourglass strength changes with its centre."""
+    """The tangent is exact except that one-point elements neglect the change of hourglass strength."""
     elements = HenckyElements.build(one_element(SAC405, formulation), [SAC405], np.zeros((1, 3)))
     response = elements.respond(MOVED)
     assert response.points.plastic_strain.min() > 1e-3
@@ -93,7 +93,7 @@ def test_tangent_of_an_element_that_yields(formulation, tolerance):
 
 
 def test_one_step_of_the_flow_theory_from_rest_is_the_same():
-    """Also in the limits of hourglass forces."""
+    """This includes the limits of hourglass forces."""
     elements = one_element(SAC405, "one_point")
     response = HenckyElements.build(elements, [SAC405], np.zeros((1, 3))).respond(MOVED)
     term = nonlinear(elements, SAC405, finite=False)
@@ -118,9 +118,9 @@ def test_tetrahedra_are_refused():
         HenckyElements.build(elements, [FR4], np.zeros((1, 3)))
 
 
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_residual_that_is_no_number_is_not_small(place):
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_residual_that_is_no_number_is_not_small(index):
     values = np.array([1.0, -2.0, 0.5])
     assert largest_of(values) == 2.0
-    values[place] = np.nan
+    values[index] = np.nan
     assert np.isnan(largest_of(values))

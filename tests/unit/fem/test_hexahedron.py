@@ -1,4 +1,4 @@
-"""The hexahedron against a plain NumPy twin, and against what any element must do."""
+"""The hexahedron against a NumPy twin and general element requirements."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def strain_matrix(gradient: np.ndarray) -> np.ndarray:
 
 
 def stiffness_twin(corners: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
-    """Taylor-modified Wilson element with linear dilatation, in plain NumPy."""
+    """Return the stiffness of the Taylor-modified Wilson element with linear dilatation."""
     jacobians = np.array([corners.T @ derivatives for derivatives in shape_derivatives(GAUSS)])
     weights = np.linalg.det(jacobians)
     gradients = shape_derivatives(GAUSS) @ np.linalg.inv(jacobians)

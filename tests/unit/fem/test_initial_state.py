@@ -1,4 +1,4 @@
-"""A shock that begins with the stress of cooling: at rest nothing moves, where all is linear stresses add."""
+"""A shock with initial stress from cooling: equilibrium at rest and superposition in linear models."""
 
 from dataclasses import replace
 
@@ -57,7 +57,7 @@ def launched(body: Body, step: float) -> ExplicitMotion:
 
 
 def test_stresses_add_where_all_is_linear():
-    """With pretension as a force or without it: the same motion and stress; the energy has a reference."""
+    """With or without pretension as a force, motion and stress are equal; the energy has a reference."""
     result = package(materials=MATERIALS | {"solder": SAC405.elastic})
     step, chosen = 0.5 * result.critical, np.arange(len(result.plain.elements.cells))
     assert isinstance(result.body.terms[-1], Pretension)

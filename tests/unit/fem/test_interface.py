@@ -1,4 +1,4 @@
-"""Pictures of the joints' upper interface, and a DNS that ends before the shock."""
+"""Pictures of the upper joint interface, and a DNS that ends before the shock."""
 
 import json
 from pathlib import Path
@@ -48,8 +48,8 @@ def results(files: Path, name: str, mode: str, numerics: dict | None = None, **c
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
-    with np.load(path) as found:
-        return dict(found)
+    with np.load(path) as archive:
+        return dict(archive)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def two_scale(files) -> Path:
 
 
 def test_pictures_are_the_history_at_their_times(two_scale):
-    """They are means of elements: none is above the history's largest, all together near the layer at the package."""
+    """Pictures show element means: none exceeds the history maximum, and their mean is near the package layer."""
     pictures, history = arrays(two_scale / "interface.npz"), arrays(two_scale / "history.npz")
     assert pictures["times"] == pytest.approx(TIMES)
     for k, name in enumerate(history["joints"]):
@@ -88,11 +88,11 @@ def test_dns_that_ends_early_is_the_beginning_of_the_whole(files, two_scale, sol
     assert second["time"][-1] == pytest.approx(5e-6)  # the next sample
     assert np.array_equal(first["von_mises_board"][: len(second["time"])], second["von_mises_board"])
     assert arrays(part / "interface.npz")["times"] == pytest.approx(TIMES[:1])
-    found = [compare_histories(two_scale / "history.npz", dns / "history.npz") for dns in (whole, part)]
-    assert found[0]["critical_joint"] == found[1]["critical_joint"]
-    assert 0.0 < found[1]["critical_joint_stress_error"] < 1.0
-    assert found[1]["compared_duration"] == pytest.approx(5e-6)
-    assert "compared_duration" not in found[0]
+    comparisons = [compare_histories(two_scale / "history.npz", dns / "history.npz") for dns in (whole, part)]
+    assert comparisons[0]["critical_joint"] == comparisons[1]["critical_joint"]
+    assert 0.0 < comparisons[1]["critical_joint_stress_error"] < 1.0
+    assert comparisons[1]["compared_duration"] == pytest.approx(5e-6)
+    assert "compared_duration" not in comparisons[0]
     result = json.loads((part / "result.json").read_text())
     assert 5e7 < result["metrics"]["peak_memory"]["value"] < 5e9
     model = result["model"]
@@ -102,7 +102,7 @@ def test_dns_that_ends_early_is_the_beginning_of_the_whole(files, two_scale, sol
 
 
 class Killed(Exception):
-    """What stands for a kill."""
+    """Exception in place of a kill."""
 
 
 def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
@@ -113,12 +113,12 @@ def test_broken_run_has_the_same_pictures(files, two_scale, monkeypatch):
             raise Killed
         real(participants, stopwatch)
 
-    kept = {"checkpoints": files / "checkpoints", "numerics": {"checkpoint_seconds": 1e-9}}
+    changes = {"checkpoints": files / "checkpoints", "numerics": {"checkpoint_seconds": 1e-9}}
     with monkeypatch.context() as patch:
         patch.setattr(time_loop, "run_window", run_window)
         with pytest.raises(Killed):
-            results(files, "broken", "two_scale", **kept)
-    broken = arrays(results(files, "broken", "two_scale", **kept) / "interface.npz")
+            results(files, "broken", "two_scale", **changes)
+    broken = arrays(results(files, "broken", "two_scale", **changes) / "interface.npz")
     assert json.loads((files / "broken/result.json").read_text())["continued_from"] > 0
     for name, values in arrays(two_scale / "interface.npz").items():
         assert np.array_equal(values, broken[name]), name

@@ -1,4 +1,4 @@
-"""What small kinematics leave out, in words."""
+"""Messages about the effects that small kinematics neglect."""
 
 from reflowshock.fem.problem.kinematics import finite_rotation
 

@@ -1,4 +1,4 @@
-"""A large mass at mounting holes whose elements take smaller steps than the board: they are the meso model's."""
+"""A large mass at mounting holes with smaller steps than the board: these elements join the meso model."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ SHOCK = {
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> Path:
-    """Write an assembly with few elements at the holes a third as long as all others."""
+    """Write an assembly whose hole elements are a third as long as the others."""
     directory = tmp_path_factory.mktemp("large_mass")
     board, package, *joints = small_assembly(1, size=SIZE)
     near = (np.abs(board.points[:, 0] - BOARD_X + SIZE) < 1e-9) & (board.points[:, 1] > BOARD_Y - 1.1e-3)

@@ -1,4 +1,4 @@
-"""Step levels against dense matrix functions; what follows from the equations exactly."""
+"""Step levels against dense matrix functions and exact properties of the equations."""
 
 import math
 import time
@@ -52,7 +52,7 @@ def test_effective_stiffness_is_symmetric(model):
 
 
 def total_force(model: Levelled, displacement: np.ndarray) -> np.ndarray:
-    """Return the force (n, 3) of all terms, slaves' moved to their masters."""
+    """Return the force of all terms with slave forces moved to masters, shape (n, 3)."""
     moved, force = displacement.copy(), np.zeros_like(displacement)
     model.body.tie.spread(moved)
     for term in model.body.terms:
@@ -72,17 +72,17 @@ def test_rigid_motion_gives_no_force_and_any_motion_no_resultant(model):
 
 
 def test_a_load_on_fine_nodes_bends_them_as_it_bends_the_plain_body(model):
-    """K_eff u = f + carry(f) for K u = f: at rest, levels add nothing to what a load does."""
+    """K_eff u = f + carry(f) for K u = f: at rest, levels do not change the effect of a load."""
     body = model.body
     (levels,) = levels_of(body.terms)
     free = body.free.ravel()
     load = np.sin(np.arange(free.size)).reshape(-1, 3) * body.free
     carried = levels.carry(load, np.zeros(3))
     assert np.abs(carried).max() > 0.1 * np.abs(load).max()
-    place = np.zeros_like(load)
-    place[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
-    residual = (total_force(model, place) + load + carried)[body.free]
-    assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, place)).max()
+    displacement = np.zeros_like(load)
+    displacement[body.free] = np.linalg.solve(dense_stiffness(model.plain)[np.ix_(free, free)], load[body.free])
+    residual = (total_force(model, displacement) + load + carried)[body.free]
+    assert np.abs(residual).max() <= 1e-9 * np.abs(total_force(model, displacement)).max()
     scale = np.abs(carried).sum()
     assert np.abs(net_load(body.local.points, carried)).max() <= 1e-12 * scale
 
@@ -97,7 +97,7 @@ def test_only_supports_bear_a_falling_body(model):
 
 
 def test_what_a_motion_prescribes_does_not_move_in_substeps():
-    """Held in the motion or held in the body: the same force."""
+    """Nodes fixed in the motion or in the body give the same force."""
     mesh, ratios = joint_on_board(), (7, 3)
     model, held = levelled(mesh, ELASTIC, ratios), levelled(mesh, ELASTIC, ratios)
     body = model.body
@@ -131,17 +131,17 @@ def test_energy_is_that_of_the_effective_stiffness(model):
     assert held.strain == pytest.approx(work, rel=1e-12)
 
 
-def test_hourglass_energy_is_told_apart():
+def test_hourglass_energy_is_reported_separately():
     model = levelled(joint_on_board(solder=4), ELASTIC, (5, 3))
     body = replace(model.plain, elements=replace(model.plain.elements, kind=ONE_POINT))
     displacement = 1e-6 * np.sin(np.arange(3 * len(body.mass))).reshape(-1, 3)
     body.tie.spread(displacement)
     elements = body.elements.subset(model.level > 0)
     exact = sum((term.energy(displacement) for term in linear_terms(elements)), Energy())
-    found = SubsteppedElements.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
+    terms = SubsteppedElements.build(MPI.COMM_SELF, body, Levels(model.level, model.ratios, 1e-6 * model.window))
     assert exact.hourglass > 0.01 * exact.strain
-    assert found.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
-    assert found.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)
+    assert terms.energy(displacement).strain == pytest.approx(exact.strain, rel=1e-9)
+    assert terms.energy(displacement).hourglass == pytest.approx(exact.hourglass, rel=1e-9)
 
 
 def test_levels_need_linear_elastic_elements():
@@ -181,7 +181,7 @@ def test_more_levels_are_taken_where_they_pay():
     level, ratios = choose_levels(cells, Tie.none(), dear, 3)
     assert ratios == (3, 8)
     assert np.bincount(level).tolist() == [39, 20, 3]
-    assert choose_levels(cells, Tie.none(), cheap, 3)[1] == (21,)  # calls cost more than elements
+    assert choose_levels(cells, Tie.none(), cheap, 3)[1] == (21,)  # calls are more expensive than elements
 
 
 def test_no_level_where_all_elements_take_the_window():

@@ -1,4 +1,4 @@
-"""Effects say which materials or limits call for them; a law of life has its scatter."""
+"""Decisions on effects name the responsible materials or limits; fatigue laws have scatter."""
 
 from types import SimpleNamespace
 

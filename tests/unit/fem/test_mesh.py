@@ -59,7 +59,7 @@ def test_boundary_and_owners_of_a_block():
 
 
 def apart(mesh: MeshData) -> MeshData:
-    """The same board, but patch and rest share no node."""
+    """Return the board with separate nodes for patch and remainder."""
     return append([select(mesh, name.__eq__)[0] for name in ("board", "board_patch")])
 
 

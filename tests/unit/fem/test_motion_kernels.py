@@ -1,4 +1,4 @@
-"""The update of a step and the sums over shared nodes against plain NumPy."""
+"""Step update and sums over shared nodes against NumPy."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_steps_without_a_new_force_are_those_one_by_one():
 
 
 def test_sums_over_shared_nodes_are_taken_in_the_order_of_ranks():
-    """Rank 1 of three: it receives nodes 4 and 2 from rank 0, 2 and 5 from rank 2."""
+    """Rank 1 of three receives nodes 4 and 2 from rank 0, and 2 and 5 from rank 2."""
     random = np.random.default_rng(0)
     rows, ranks = np.array([4, 2, 2, 5], np.int32), np.array([0, 0, 2, 2])
     values, received = random.uniform(-1, 1, (6, 3)), random.uniform(-1, 1, (4, 3))
@@ -67,7 +67,7 @@ def test_sums_over_shared_nodes_are_taken_in_the_order_of_ranks():
 
 
 def test_a_node_moves_alike_wherever_it_stands():
-    """Copies of a node have other places on other ranks: vectors and what is left of them must round alike."""
+    """Copies of a node have different indices on other ranks: vector loops and their remainders must round equally."""
     random = np.random.default_rng(0)
     state, mobility = random.uniform(-1, 1, (3, 40, 3)), random.uniform(1, 2, (40, 3))
     whole, gravity = state.copy(), np.array([0.3, -2.0, 9.81])

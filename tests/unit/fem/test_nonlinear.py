@@ -25,7 +25,7 @@ both_kinematics = pytest.mark.parametrize("finite", [False, True], ids=["small",
 
 
 def distorted(name: str, material=FR4, line: np.ndarray = LINE):
-    """Return elements of a cube, vertices moved by up to 0.18 of their distance."""
+    """Return elements of a cube with vertices moved by up to 0.18 of their distance."""
 
     def shaken(points: np.ndarray) -> np.ndarray:
         return points + 0.18 * line[1] * np.random.default_rng(5).uniform(-1, 1, points.shape)
@@ -36,7 +36,7 @@ def distorted(name: str, material=FR4, line: np.ndarray = LINE):
 @every_kind
 @both_kinematics
 def test_elastic_step_is_the_linear_force(name, finite):
-    """Exactly in small kinematics; with a displacement of 1e-9 the finite ones differ by that much."""
+    """Small kinematics are exact; with a displacement of 1e-9 finite kinematics differ by 1e-9."""
     elements, scale = distorted(name), 1e-9 if finite else 1.0
     displacement = scale * np.random.default_rng(1).uniform(-1, 1, elements.points.shape)
     (linear,) = linear_terms(elements)
@@ -49,7 +49,7 @@ def test_elastic_step_is_the_linear_force(name, finite):
 
 
 def gradient_twin(elements, finite: bool, step: float, displacements: list[np.ndarray]) -> np.ndarray:
-    """Return the force after the last displacement: one point at a time, hourglass energy differentiated."""
+    """Return the force after the last displacement, point by point, with the derivative of the hourglass energy."""
     corners, force = elements.points[elements.cells], np.zeros_like(elements.points)
     if elements.kind.hourglass:
         geometry = elements.kind.geometry(corners)
@@ -82,7 +82,7 @@ def gradient_twin(elements, finite: bool, step: float, displacements: list[np.nd
 
 
 def amplitudes(values: np.ndarray, gradient: np.ndarray, gamma: np.ndarray, finite: bool) -> np.ndarray:
-    """Return the hourglass amplitudes (12,) in the frame that turns with the element."""
+    """Return the hourglass amplitudes in the corotational frame, shape (12,)."""
     left, _, right = np.linalg.svd(np.eye(3) + values.T @ gradient)
     return (gamma.T @ values @ (left @ right if finite else np.eye(3))).ravel()
 
@@ -92,19 +92,19 @@ def energy_of(amplitude: np.ndarray, resistance: np.ndarray) -> float:
 
 
 def carried(twin: PointTwin, amplitude: np.ndarray, resistance: np.ndarray, volume: float) -> float:
-    """Return the part of the hourglass force that a section carries beside the stress of its centre."""
+    """Return the hourglass force of a section in addition to the stress of its centre."""
     mises = float(von_mises(twin.stress[None])[0])
     strength = max(yield_stress(twin.plastic, 0.0, twin.constants), mises)
     stress = np.sqrt(2 * SOLDER.young_modulus * energy_of(amplitude, resistance) / volume)
     return min(1.0, np.sqrt(0.75) * max(0.05, 1 - (mises / strength) ** 2) * strength / stress)
 
 
-def slope(energy: Callable[[np.ndarray], float], place: np.ndarray) -> np.ndarray:
+def slope(energy: Callable[[np.ndarray], float], displacement: np.ndarray) -> np.ndarray:
     """Return the derivative of an energy by differences of order four."""
-    result, size = np.empty(place.shape), 1e-4
-    for k in range(place.size):
-        move = size * np.eye(place.size)[k].reshape(place.shape)
-        near, far = (energy(place + s * move) - energy(place - s * move) for s in (1, 2))
+    result, size = np.empty(displacement.shape), 1e-4
+    for k in range(displacement.size):
+        move = size * np.eye(displacement.size)[k].reshape(displacement.shape)
+        near, far = (energy(displacement + s * move) - energy(displacement - s * move) for s in (1, 2))
         result.flat[k] = (8 * near - far) / (12 * size)
     return result
 
@@ -191,14 +191,14 @@ def test_material_that_couples_normal_strain_and_shear_is_refused():
 
 @every_kind
 def test_parts_of_one_material_share_blocks(name):
-    """Joints are parts of their own, with few elements each: their lanes are filled all the same."""
+    """Joints are separate parts with few elements each; their lanes are filled nevertheless."""
     elements = distorted(name, SOLDER)
     parts = np.arange(len(elements.cells), dtype=np.int32) % 3
     of_parts = replace(elements, material=parts, elasticity=np.repeat(elements.elasticity, 3, axis=0))
-    one = nonlinear(elements, SOLDER, True)
+    merged = nonlinear(elements, SOLDER, True)
     (many,) = force_terms(of_parts, [SOLDER, SOLDER.model_copy(), SOLDER], "finite")
-    assert len(many.lanes.filled) == len(one.lanes.filled)
+    assert len(many.lanes.filled) == len(merged.lanes.filled)
     displacement = 2e-3 * np.random.default_rng(2).uniform(-1, 1, elements.points.shape)
-    assert np.array_equal(force_of(many, displacement), force_of(one, displacement))
-    assert many.energy(displacement) == one.energy(displacement)
+    assert np.array_equal(force_of(many, displacement), force_of(merged, displacement))
+    assert many.energy(displacement) == merged.energy(displacement)
     assert many.energy(displacement).plastic > 0.0

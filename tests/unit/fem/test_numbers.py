@@ -1,4 +1,4 @@
-"""Materials, steps, comparison, energy balance, watch points: the small arithmetic of a run."""
+"""Arithmetic of a run: materials, steps, comparison, energy balance, watch points."""
 
 from pathlib import Path
 
@@ -109,7 +109,7 @@ def test_implicit_step_follows_the_shortest_pulse():
 
 def test_prediction_of_equal_ranks():
     plan = window_plan(1.0, 0.1, 1.0, 100.0, 10)
-    board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in that many seconds
+    board, joints = 0.1 * UPDATES_PER_SECOND, 0.01 * UPDATES_PER_SECOND  # updates in this time
     ranks = Ranks(total=2, placement="disjoint", macro=1)
     two_scale, dns = predict_seconds(board * BOARD_ADVANTAGE, [(joints, 10)], plan, ranks, at_once=True)
     assert two_scale == pytest.approx(100 * 0.1, rel=0.01)
@@ -169,8 +169,8 @@ def write_history(path: Path, scale: float, joints: tuple[str, ...] = ("A1", "A2
 
 def test_comparison_is_relative_to_the_dns(tmp_path):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
-    found = compare_histories(ours, reference)
-    assert found["critical_joint"] == "A2"
+    comparison = compare_histories(ours, reference)
+    assert comparison["critical_joint"] == "A2"
     for name in (
         "critical_joint_stress",
         "critical_joint_peel",
@@ -178,16 +178,16 @@ def test_comparison_is_relative_to_the_dns(tmp_path):
         "board_displacement",
         "worst_joint_stress",
     ):
-        assert found[f"{name}_error"] == pytest.approx(0.1)
+        assert comparison[f"{name}_error"] == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(("fine", "coarse", "worst"), [(("A2",), 0.0, 0.1), (("A1",), 1.0, 0.1)])
 def test_comparison_says_whether_the_critical_joint_is_fine(tmp_path, fine, coarse, worst):
     ours, reference = write_history(tmp_path / "a.npz", 1.1), write_history(tmp_path / "b.npz", 1.0)
-    found = compare_histories(ours, reference, fine)
-    assert found["critical_joint"] == "A2"
-    assert found["critical_joint_coarse"] == coarse
-    assert found["worst_joint_stress_error"] == pytest.approx(worst)
+    comparison = compare_histories(ours, reference, fine)
+    assert comparison["critical_joint"] == "A2"
+    assert comparison["critical_joint_coarse"] == coarse
+    assert comparison["worst_joint_stress_error"] == pytest.approx(worst)
 
 
 def test_comparison_of_different_joints_is_an_error(tmp_path):

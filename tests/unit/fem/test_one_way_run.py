@@ -1,4 +1,4 @@
-"""A package whose coarse model drives a fine one of a joint, through the program."""
+"""A package whose coarse model drives the fine model of a joint, as a program run."""
 
 import json
 from dataclasses import replace
@@ -31,8 +31,8 @@ def files(tmp_path_factory) -> Path:
     directory = tmp_path_factory.mktemp("one_way")
     write_small_assembly(directory)
     coarse = []
-    for name, place in SITES.items():
-        mesh = joint_mesh(name, *place, layers=2, edges=1)
+    for name, site in SITES.items():
+        mesh = joint_mesh(name, *site, layers=2, edges=1)
         facets = {f"pad_board@{name}": mesh.facets[f"foot@{name}"], f"pad_package@{name}": mesh.facets[f"head@{name}"]}
         facets = mesh.facets | facets
         coarse.append(replace(mesh, part=0 * mesh.part, part_names=(f"solder@{name}",), facets=facets))
@@ -59,17 +59,18 @@ def results(files: Path, name: str, **coupling) -> tuple[dict, dict[str, np.ndar
 
 
 def test_driven_joint_is_stressed_as_a_coupled_one(files):
-    one, driven = results(files, "one_way", direction="one_way", fine_joints=("A3",))
+    one_way, driven = results(files, "one_way", direction="one_way", fine_joints=("A3",))
     two, coupled = results(files, "two_way", scheme="held_velocity", fine_joints=("A3",))
-    assert one["coupling"]["direction"] == "one_way"
-    assert all(check["ok"] for check in (one["health"] | two["health"]).values())
+    assert one_way["coupling"]["direction"] == "one_way"
+    assert all(check["ok"] for check in (one_way["health"] | two["health"]).values())
     assert list(driven["joints"]) == list(coupled["joints"])
     joint = list(driven["joints"]).index("A3")
     for end in ("von_mises_board", "von_mises_package"):
         stress, expected = driven[end][:, joint], coupled[end][:, joint]
         assert np.linalg.norm(stress - expected) < 0.1 * np.linalg.norm(expected), end
-    assert one["model"]["elements"]["macro"] + one["model"]["elements"]["meso"] > sum(two["model"]["elements"].values())
-    assert one["model"]["model_mass"] == pytest.approx(two["model"]["model_mass"], rel=0.02)  # copper is in one only
+    counts = one_way["model"]["elements"]
+    assert counts["macro"] + counts["meso"] > sum(two["model"]["elements"].values())
+    assert one_way["model"]["model_mass"] == pytest.approx(two["model"]["model_mass"], rel=0.02)  # copper in one only
 
 
 def test_all_joints_can_be_driven(files):
@@ -85,8 +86,8 @@ def test_one_way_without_coarse_joints_is_an_error(files):
 
 
 def test_schemes_that_need_an_answer_are_refused_one_way(files):
-    found = problems(request(files, "x", direction="one_way", scheme="gravouil_combescure").shock)
-    assert [problem.key for problem in found] == ["shock.coupling.scheme"]
+    messages = problems(request(files, "x", direction="one_way", scheme="gravouil_combescure").shock)
+    assert [problem.key for problem in messages] == ["shock.coupling.scheme"]
 
 
 def test_pulse_that_is_over_within_a_window_is_an_error_that_names_both(files):

@@ -1,4 +1,4 @@
-"""Partition of cells among ranks: work in proportion to speeds, at every step level, by cuts with few nodes."""
+"""Partition of cells among ranks: work proportional to speed at each step level, with few cut nodes."""
 
 import numpy as np
 import pytest
@@ -21,18 +21,18 @@ def shares(rank: np.ndarray, work: np.ndarray, ranks: int) -> np.ndarray:
 def test_work_is_shared_as_the_speeds(speeds):
     mesh, speeds = plate(), np.array(speeds)
     work = np.random.default_rng(1).uniform(1.0, 4.0, (len(mesh.cells), 1))
-    found = shares(partition(mesh, work, speeds), work, len(speeds))[:, 0]
-    assert found == pytest.approx(speeds / speeds.sum(), abs=5e-3)
+    fractions = shares(partition(mesh, work, speeds), work, len(speeds))[:, 0]
+    assert fractions == pytest.approx(speeds / speeds.sum(), abs=5e-3)
 
 
 def test_every_level_is_shared_by_one_cut():
-    """Fine cells in a corner: half of all cells on each side would leave them all on one rank."""
+    """All fine cells are in a corner: a plain bisection would put them on one rank."""
     mesh = plate()
     centre = mesh.points[mesh.cells].mean(axis=1)
     fine = (centre[:, 0] < 0.75) & (centre[:, 1] < 0.75)
     work = np.column_stack([~fine * 1.0, fine * 8.0])
-    found = shares(partition(mesh, work, np.ones(2)), work, 2)
-    assert np.abs(found - 0.5).max() < 0.1
+    fractions = shares(partition(mesh, work, np.ones(2)), work, 2)
+    assert np.abs(fractions - 0.5).max() < 0.1
 
 
 def test_equal_cells_are_cut_along_a_short_line():

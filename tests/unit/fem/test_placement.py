@@ -1,4 +1,4 @@
-"""Which ranks carry which model, from costs and speeds that the test makes up."""
+"""Placement of models on ranks from prescribed costs and speeds."""
 
 import json
 from dataclasses import replace
@@ -93,7 +93,7 @@ def test_models_that_wait_for_each_other_share_ranks():
 
 
 def test_slow_ranks_get_the_small_model():
-    """One core of half the speed takes a third of the work of a fast one and itself."""
+    """A core of half the speed takes a third of the work shared with a fast core."""
     assert best(2, [1.0, 0.5], cost(0.5e-3, 1e-3)) == disjoint([1], 2)
     assert best(2, [1.0, 0.5], cost(1e-3, 0.5e-3)) == disjoint([0], 2)
     assert best(3, [0.5, 1.0, 1.0], cost(0.5e-3, 2e-3)) == disjoint([0], 3)
@@ -134,7 +134,7 @@ def test_step_cost_from_two_samples():
 
 
 def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) -> ModelWork:
-    """A strip of boxes of FR4, a quarter of them of copper and at a level; nothing is a box at its end."""
+    """Return a strip of FR4 boxes, a quarter of them copper at a level, with distorted elements at its end."""
     points, cells = grid(np.arange(count + 1) * 1e-3, [0, 1e-3], [0, 1e-3])
     points[-1, 0] += 1e-4
     mesh = mesh_of(points, cells, np.where(np.arange(count) < count // 4, "copper", "board"), {})
@@ -188,7 +188,7 @@ def test_measurement_is_kept_for_a_run_that_continues(tmp_path):
 
 
 def test_other_ranks_hear_the_choice(tmp_path):
-    """A rank without a mesh takes part in the measurement only: what it plans is told by rank 0."""
+    """A rank without a mesh only takes part in the measurement and receives the plan from rank 0."""
     loads = {"dns": replace(model(64, 1), steps=3)}
     assert plan_ranks(MPI.COMM_SELF, loads, Ranks(), None).placement == shared(("dns",), 1)
 

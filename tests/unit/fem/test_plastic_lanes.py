@@ -1,4 +1,4 @@
-"""The radial return of sixteen lanes against that of one point, and its logarithm and exponential against libm's."""
+"""Radial return in sixteen lanes against a single point, and its logarithm and exponential against libm."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_logarithm_and_exponential():
 @pytest.mark.parametrize("exponent", [0.1, 0.7, 1.0])
 @pytest.mark.parametrize("step", [1e-10, 1e-6, np.inf])
 def test_lanes_return_as_one_point_does(sensitivity, exponent, step):
-    """From no plastic strain and much, from trials just outside and far outside, beside lanes that stay elastic."""
+    """Lanes mix elastic states with trials near and far outside the yield surface, with and without plastic strain."""
     law = law_of(np.array([[STIFFNESS, YIELD, 300e6, exponent, sensitivity, 1e-3]]), 0, step)
     random = np.random.default_rng(7)
     for excess in (1e-9, 1e-3, 1.0, 100.0):
@@ -39,8 +39,8 @@ def test_lanes_return_as_one_point_does(sensitivity, exponent, step):
         before = stress.copy()
         grown = np.array([plastic_increment(*of, np.array(law[:6]), step) for of in zip(trial, strain, strict=True)])
         assert plastic_flow(w, state, 1, law) == (grown.max() > 0.0)
-        found = state[1, PLASTIC : PLASTIC + LANES] - strain
-        assert np.abs(found - grown).max() <= 1e-9 * grown.max() + 1e-15 * strain.max()
+        increments = state[1, PLASTIC : PLASTIC + LANES] - strain
+        assert np.abs(increments - grown).max() <= 1e-9 * grown.max() + 1e-15 * strain.max()
         assert np.allclose(von_mises(stress.T), trial - STIFFNESS * grown, rtol=1e-9, atol=1e-9 * trial.max())
         assert np.allclose(stress[:3].sum(axis=0), before[:3].sum(axis=0), rtol=1e-9, atol=1e-9 * trial.max())
         assert np.array_equal(stress[:, grown == 0.0], before[:, grown == 0.0])

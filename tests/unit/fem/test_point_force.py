@@ -1,4 +1,4 @@
-"""Forces at points: shares of nodes with the right resultant and moment, planes of symmetry, what cannot be."""
+"""Point forces: nodal shares with exact resultant and moment, planes of symmetry and invalid input."""
 
 import json
 
@@ -24,25 +24,25 @@ POKE = {"kind": "point_force", "at": INSIDE, "direction": [3.0, 0.0, -4.0], "pea
 
 
 def bent(mesh):
-    """Return a mesh whose cells are no boxes."""
+    """Return a mesh of distorted cells."""
     x, y, z = mesh.points.T
     mesh.points[:] = np.column_stack([x + 0.3 * y, y + 20.0 * x * z, z + 5.0 * x * y])
     return mesh
 
 
 def box_file(path, element="hexahedron", symmetry=()):
-    """Write a strip of any element; return the path."""
-    cells = (8, 2 if symmetry else 4)  # of the meshed part
+    """Write a strip of any element type and return the path."""
+    cells = (8, 2 if symmetry else 4)  # on the meshed part
     write_box(Box((LENGTH, WIDTH), cells, (BoxLayer("board", THICKNESS, 2, None),), symmetry, element, None), path)
     return path
 
 
-@pytest.mark.parametrize("place", [INSIDE, (0.0, 0.0, 0.5e-3), (-4.9e-3, 1.1e-3, 0.9e-3)])
-def test_shares_of_bent_hexahedra_have_resultant_and_moment_of_the_force(place):
+@pytest.mark.parametrize("point", [INSIDE, (0.0, 0.0, 0.5e-3), (-4.9e-3, 1.1e-3, 0.9e-3)])
+def test_shares_of_bent_hexahedra_have_resultant_and_moment_of_the_force(point):
     mesh = bent(strip_mesh())
-    nodes, shares = point_shares(mesh, "at", place)
+    nodes, shares = point_shares(mesh, "at", point)
     assert shares.sum() == pytest.approx(1.0, rel=1e-14)
-    assert shares @ mesh.points[nodes] == pytest.approx(np.array(place), abs=1e-15)
+    assert shares @ mesh.points[nodes] == pytest.approx(np.array(point), abs=1e-15)
     assert shares.min() > -1e-6
 
 
@@ -56,11 +56,11 @@ def test_shares_of_tetrahedra(tmp_path, element):
 
 
 @pytest.mark.parametrize("end", [-1.0, 1.0])
-def test_a_node_bears_all_of_a_force_on_it(end):
+def test_node_carries_the_whole_force_at_its_position(end):
     mesh = strip_mesh()
-    place = (0.5 * end * LENGTH, WIDTH / 6, THICKNESS)
-    nodes, shares = point_shares(mesh, "at", place)
-    assert mesh.points[nodes[np.argmax(shares)]] == pytest.approx(np.array(place))
+    point = (0.5 * end * LENGTH, WIDTH / 6, THICKNESS)
+    nodes, shares = point_shares(mesh, "at", point)
+    assert mesh.points[nodes[np.argmax(shares)]] == pytest.approx(np.array(point))
     assert np.sort(shares) == pytest.approx([0.0] * 7 + [1.0], abs=1e-12)
 
 
@@ -86,18 +86,18 @@ def test_load_has_resultant_and_moment_of_the_force(tmp_path):
     assert moment == pytest.approx(np.cross(INSIDE, [6.0, 0.0, -8.0]), rel=1e-12)
 
 
-@pytest.mark.parametrize("given", [{"peak": 2.0, "duration": 1e-4}, {"table": "force.csv"}])
-def test_course_is_a_half_sine_or_a_table(tmp_path, monkeypatch, given):
+@pytest.mark.parametrize("parameters", [{"peak": 2.0, "duration": 1e-4}, {"table": "force.csv"}])
+def test_course_is_a_half_sine_or_a_table(tmp_path, monkeypatch, parameters):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "force.csv").write_text("time [ms], force [kN]\n0,0\n0.05,2e-3\n0.1,0\n")
-    load = PointForce.model_validate({"at": INSIDE, "direction": [0.0, 0.0, 1.0]} | given)
+    load = PointForce.model_validate({"at": INSIDE, "direction": [0.0, 0.0, 1.0]} | parameters)
     pulse = pulse_of(load)
     assert pulse.value(5e-5) == pytest.approx(2.0)
-    assert pulse.integral(1.0) == pytest.approx(2e-4 * (0.5 if "table" in given else 2 / np.pi))
+    assert pulse.integral(1.0) == pytest.approx(2e-4 * (0.5 if "table" in parameters else 2 / np.pi))
 
 
 def tip_of(directory, symmetry, loads):
-    """Run a strip or half of it; return the motion of a point of its end and the external work."""
+    """Run a full or half strip; return the motion of an end point and the external work."""
     directory.mkdir()
     mesh = box_file(directory / "box.msh", symmetry=symmetry)
     tables = structure_tables_of(loads=loads, watch={"tip": {"at": [LENGTH / 2, WIDTH / 4, THICKNESS]}})
@@ -110,7 +110,7 @@ def tip_of(directory, symmetry, loads):
 
 @pytest.mark.parametrize("places", [[0.0], [-2.6e-3, 2.6e-3]], ids=["on the plane", "beside it"])
 def test_half_a_body_moves_as_the_whole(tmp_path, places):
-    """A force on the plane of symmetry is halved, one beside it has its mirror image."""
+    """A force on the plane of symmetry is halved; any other force has a mirror image."""
     pushes = {f"push_{k}": POKE | {"at": [5e-3, y, THICKNESS]} for k, y in enumerate(places)}
     whole, all_work = tip_of(tmp_path / "whole", (), pushes)
     half, work = tip_of(tmp_path / "half", ("y",), dict([pushes.popitem()]))

@@ -1,4 +1,4 @@
-"""Errors that all ranks know: the program's message says where the run could continue."""
+"""Errors agreed by all ranks, and the message with the restart point."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Pulses and their tables: exact integrals, service conditions, every fault of a file named with its line."""
+"""Pulses and their tables: exact integrals, service conditions and file errors with line numbers."""
 
 import numpy as np
 import pytest

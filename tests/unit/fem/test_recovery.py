@@ -1,4 +1,4 @@
-"""Values at nodes from the means of elements."""
+"""Recovery of nodal values from element means."""
 
 import numpy as np
 import pytest
@@ -16,10 +16,10 @@ def around(mesh, node):
     return cells, centres, int((mesh.cells[cells] == node).any(axis=1).sum())
 
 
-@pytest.mark.parametrize("place", [SURFACE, (LENGTH / 2, 4e-3, 0.0), (0.0, 4e-3 / 3, THICKNESS / 2)])
-def test_linear_field_is_recovered_at_surfaces_corners_and_inside(place):
+@pytest.mark.parametrize("target", [SURFACE, (LENGTH / 2, 4e-3, 0.0), (0.0, 4e-3 / 3, THICKNESS / 2)])
+def test_linear_field_is_recovered_at_surfaces_corners_and_inside(target):
     mesh = strip_mesh()
-    node = int(np.argmin(np.linalg.norm(mesh.points - place, axis=1)))
+    node = int(np.argmin(np.linalg.norm(mesh.points - target, axis=1)))
     cells, centres, nearest = around(mesh, node)
     weight = fit(centres, nearest, mesh.points[node])
     field = centres @ [3.0, -2.0, 500.0] + 0.7
@@ -27,9 +27,9 @@ def test_linear_field_is_recovered_at_surfaces_corners_and_inside(place):
     assert len(cells) <= 32
 
 
-@pytest.mark.parametrize("place", [SURFACE, (LENGTH / 2, 4e-3, 0.0)])
-def test_order_at_surfaces_and_corners(place):
-    """A bending strain that varies along the strip: the error of its value falls with the square of the size."""
+@pytest.mark.parametrize("target", [SURFACE, (LENGTH / 2, 4e-3, 0.0)])
+def test_order_at_surfaces_and_corners(target):
+    """For a bending strain that varies along the strip the error decreases with the square of the element size."""
 
     def strain(points):
         return np.sin(150.0 * points[:, 0] + 0.4) * np.cos(200.0 * points[:, 1]) * (points[:, 2] - THICKNESS / 2)
@@ -37,7 +37,7 @@ def test_order_at_surfaces_and_corners(place):
     errors = []
     for refined in (4, 8):
         mesh = strip_mesh((2 * refined, 3 * refined // 2, refined))
-        node = int(np.argmin(np.linalg.norm(mesh.points - place, axis=1)))
+        node = int(np.argmin(np.linalg.norm(mesh.points - target, axis=1)))
         _, centres, nearest = around(mesh, node)
         size = LENGTH / (2 * refined), 8e-3 / (3 * refined // 2), THICKNESS / refined
         gauss = [0.5 * s * np.array([-1, 1]) / np.sqrt(3) for s in size]

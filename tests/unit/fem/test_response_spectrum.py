@@ -1,4 +1,4 @@
-"""The shock response spectrum against exact ones and against the convolution integral."""
+"""The shock response spectrum against exact spectra and the convolution integral."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ def test_half_sine_without_damping():
     length = 1e-2
     pulse = np.sin(np.pi * np.arange(int(length / STEP) + 1) * STEP / length)
     ratio = np.array([0.2, 0.5, 0.8])  # 2 f T
-    found = response_spectrum(pulse, STEP, ratio / (2 * length), quality=1e6)
+    spectrum = response_spectrum(pulse, STEP, ratio / (2 * length), quality=1e6)
     exact = 2.0 * ratio * np.cos(np.pi * ratio / 2) / (1.0 - ratio**2)
-    assert found == pytest.approx(exact, rel=1e-3)
+    assert spectrum == pytest.approx(exact, rel=1e-3)
 
 
 def test_step_overshoots_by_its_damping():
     quality, frequency = 10.0, np.array([100.0])
-    found = response_spectrum(np.ones(4000), STEP, frequency, quality)
+    spectrum = response_spectrum(np.ones(4000), STEP, frequency, quality)
     ratio = 0.5 / quality
     rate = 2 * np.pi * frequency[0]
     time = np.arange(4000) * STEP
@@ -34,7 +34,7 @@ def test_step_overshoots_by_its_damping():
     )
     velocity = -np.exp(-ratio * rate * time) * np.sin(damped * time) / damped
     exact = np.abs(2 * ratio * rate * velocity + rate**2 * displacement).max()
-    assert found[0] == pytest.approx(exact, rel=1e-2)  # the record begins within a step, not at once
+    assert spectrum[0] == pytest.approx(exact, rel=1e-2)  # the record begins within a step
 
 
 def test_record_of_ramps_against_the_convolution_integral():
@@ -64,5 +64,5 @@ def test_stiff_masses_follow_the_base_and_soft_ones_stay():
 
 
 def test_twelve_frequencies_an_octave():
-    found = spectrum_frequencies(100.0, 401.0)
-    assert len(found) == 25 and found[[0, 12, 24]] == pytest.approx([100.0, 200.0, 400.0])
+    frequencies = spectrum_frequencies(100.0, 401.0)
+    assert len(frequencies) == 25 and frequencies[[0, 12, 24]] == pytest.approx([100.0, 200.0, 400.0])

@@ -1,4 +1,4 @@
-"""Structures that are broken off continue to the same bits: every kind of state, whatever solver and law."""
+"""Bitwise restart of interrupted structure runs for each solver, law and kind of state."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ SCENES = {
 
 
 class Killed(Exception):
-    """What stands for a kill."""
+    """Exception in place of a kill."""
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -1,4 +1,4 @@
-"""The scheme that a scene calls for, with its reason."""
+"""The coupling scheme chosen for a scene, with its reason."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Scripted participants in place of either model, and recorded messages in place of one."""
+"""Scripted participants and recorded messages in place of coupled models."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ WINDOWS = 20
 
 @pytest.fixture(scope="module")
 def bodies():
-    """Both models of a pair that nothing holds, and their steps."""
+    """Return both models of a free pair and their steps."""
     models = Pair(free=True).divided(SCHEMES["held_velocity"])
     return models.bodies(), models.division.plan
 
@@ -41,7 +41,7 @@ def stretched(time: float, points: np.ndarray) -> np.ndarray:
 
 
 def driven(bodies, scheme, script, partner):
-    """Return the meso model and the largest internal force in it after some windows of a script."""
+    """Return the meso model and its largest internal force after some scripted windows."""
     made, plan = bodies
     body = made["meso"]
     channels = InterfaceChannels.open(
@@ -75,7 +75,7 @@ def test_scripted_macro_gets_mass_and_force(bodies):
 
 
 def answered(bodies, mass: np.ndarray, script):
-    """Return macro model and scripted meso model after some windows of a drop."""
+    """Return the macro model and the scripted meso model after some windows of a drop."""
     made, plan = bodies
     body = made["macro"]
     channels = InterfaceChannels.open(
@@ -88,7 +88,7 @@ def answered(bodies, mass: np.ndarray, script):
 
 
 def test_macro_model_on_springs_stores_their_energy(bodies):
-    """Springs of k N/m hold the interface: the work across it is k u^2 / 2, exactly, whatever the step."""
+    """With springs of k N/m at the interface, the transferred work is exactly k u^2 / 2 at any step."""
     stiffness, count = 1e4, len(bodies[0]["macro"].interface)
     macro, meso = answered(bodies, np.full(count, 1e-9), lambda time, u, v: -stiffness * u)
     assert np.array_equal(meso.force, macro.interface_force()[macro.motion.body.interface])
@@ -131,7 +131,7 @@ def test_replay_of_one_side_is_the_same_to_the_last_bit(tmp_path, name, scheme):
         assert np.array_equal(again.motion.displacement, parts[role].motion.displacement)
         assert again.interface_work == parts[role].interface_work
         assert replayed.velocities.deviation == replayed.forces.deviation == 0.0
-        with pytest.raises(RecordingError, match="another one is wanted"):
+        with pytest.raises(RecordingError, match="the participant asks for another one"):
             run(again)
     with pytest.raises(RecordingError, match="nodes, this one has 1"):
         replay(tmp_path / "meso.npz", scripted_interface(1))

@@ -1,4 +1,4 @@
-"""A shock is over when half a swing of the board after the joints' peak has brought no higher one."""
+"""A shock has settled when half a board period after the peak of the joints has no higher peak."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def history(end: float, stress, deflection=None) -> dict[str, np.ndarray]:
 
 
 def swinging(time):
-    """Peaks at a quarter and three quarters of the period; the second one is lower."""
+    """Return peaks at a quarter and three quarters of the period, the second one lower."""
     return 1e7 * np.abs(np.sin(2.0 * np.pi * time / PERIOD)) * np.exp(-100.0 * time)
 
 

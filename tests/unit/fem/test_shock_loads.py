@@ -1,4 +1,4 @@
-"""Pulse, gravity and loads of a package's shock, what does not fit together, and loads that act on nothing."""
+"""Pulse, gravity and loads of a package shock: invalid combinations and loads without effect."""
 
 import numpy as np
 import pytest
@@ -31,18 +31,18 @@ def shock(**changes) -> Shock:
 
 def test_half_sine_and_service_condition_b_are_the_same():
     by_name = shock_pulse(shock(peak_acceleration=None, pulse_duration=None, service_condition="B"))
-    given = shock_pulse(shock())
+    explicit = shock_pulse(shock())
     assert by_name.source == "JEDEC service condition B"
     for time in (0.0, 1e-4, 2.5e-4, 6e-4):
-        assert by_name.pulse.value(time) == pytest.approx(given.pulse.value(time), rel=1e-12)
+        assert by_name.pulse.value(time) == pytest.approx(explicit.pulse.value(time), rel=1e-12)
 
 
 def test_tabulated_shock(tmp_path):
     path = tmp_path / "drop.csv"
     path.write_text("time [ms], acceleration [G]\n0, 0\n0.25, 1500\n0.5, 0\n")
-    found = shock_pulse(shock(peak_acceleration=None, pulse_duration=None, table=str(path)))
-    assert found.source == "table drop.csv"
-    assert found.pulse.value(1.25e-4) == pytest.approx(750 * G)
+    pulse = shock_pulse(shock(peak_acceleration=None, pulse_duration=None, table=str(path)))
+    assert pulse.source == "table drop.csv"
+    assert pulse.pulse.value(1.25e-4) == pytest.approx(750 * G)
 
 
 @pytest.mark.parametrize(
@@ -50,10 +50,10 @@ def test_tabulated_shock(tmp_path):
     [({}, False), ({"peak_acceleration": 100 * G}, True), ({"gravity": "on"}, True), ({"gravity": "off"}, False)],
 )
 def test_gravity_is_left_out_where_it_is_negligible(changes, on):
-    found = shock_pulse(shock(**changes))
-    assert found.gravity["on"] is on
-    assert found.gravity["why"]
-    assert found.gravity["influence"] == pytest.approx(G / changes.get("peak_acceleration", 1500 * G))
+    pulse = shock_pulse(shock(**changes))
+    assert pulse.gravity["on"] is on
+    assert pulse.gravity["why"]
+    assert pulse.gravity["influence"] == pytest.approx(G / changes.get("peak_acceleration", 1500 * G))
 
 
 PROBLEMS = {
@@ -135,7 +135,7 @@ def test_base_that_follows_time_moves_as_the_large_mass_does():
     for _ in range(600):  # beyond the pulse
         motion.advance()
         motion.update_force()
-    near = (np.pi * motion.step / pulse.duration) ** 2  # what trapezoids miss of it, twelvefold
+    near = (np.pi * motion.step / pulse.duration) ** 2  # twelve times the error of the trapezoidal rule
     assert base.base_velocity(motion.time) == pytest.approx(motion.base_velocity(), rel=near)
     assert base.base_displacement(motion.time) == pytest.approx(motion.base_displacement(), rel=near)
 

@@ -16,7 +16,7 @@ def scene(**changes) -> StructureProblem:
 
 
 def test_factor_of_a_chain_is_that_of_a_band():
-    """Chains of nodes are cut into single fronts: work and fill grow with their length."""
+    """Chains of nodes are split into single fronts: work and fill are proportional to their length."""
     short, long = (box_factor((count, 1, 1)) for count in (255, 511))
     assert long.operations == pytest.approx(2 * short.operations, rel=0.02)
     assert long.entries == pytest.approx(2 * short.entries, rel=0.02)

@@ -1,4 +1,4 @@
-"""Where the time of windows goes, by a clock that the test sets."""
+"""Time shares of windows, with a clock set by the test."""
 
 import time
 
@@ -9,7 +9,7 @@ from reflowshock.fem.parallel.exchange import MessageClock
 
 
 class TwoRanks:
-    """Stands for two ranks: the one that asks, and another whose record is known."""
+    """Communicator of two ranks: the calling rank and another one with a prescribed record."""
 
     def __init__(self, other: dict) -> None:
         self.other = other
@@ -23,7 +23,7 @@ def at(monkeypatch, second: float) -> None:
     monkeypatch.setattr(time, "process_time", lambda: 0.5 * second)
 
 
-def test_waiting_is_told_from_work(monkeypatch):
+def test_waiting_is_separated_from_work(monkeypatch):
     sums, coupling = MessageClock(1.0, 1.0), MessageClock(1.0, 1.0)
     stopwatch = Stopwatch({"macro": MessageClock(), "meso": sums}, [coupling])
     for begin in (0.0, 100.0):
@@ -35,15 +35,15 @@ def test_waiting_is_told_from_work(monkeypatch):
         at(monkeypatch, begin + 10.0)
         sums.count(begin + 8.0, begin + 8.0, begin + 9.0)
         stopwatch.lap("meso")
-        sums.count(begin + 10.0, begin + 10.0, begin + 10.0 + 50.0)  # of a sample: not in a window
+        sums.count(begin + 10.0, begin + 10.0, begin + 10.0 + 50.0)  # sampling time, outside windows
     assert stopwatch.turns == {"macro": 8.0, "meso": 12.0}
     other = {"turns": {"macro": 20.0}, "sum_waiting": {"macro": 0.0}, "coupling_packing": 0.5, "coupling_waiting": 0.5}
     other["core_seconds"] = 15.0
-    found = stopwatch.summary(TwoRanks(other), 2)
-    assert found["ranks"][0]["coupling_packing"] == pytest.approx(2.0)
-    assert found["ranks"][0]["sum_packing"]["meso"] == pytest.approx(2.0)
-    assert found["window_seconds"] == pytest.approx(10.0)
-    assert found["window_core_seconds"] == pytest.approx((10.0 + 15.0) / 2)
-    assert found["busy_shares"] == pytest.approx([0.7, 0.975])
-    assert found["busy_share"] == pytest.approx(1.0 - 6.5 / 40.0)
-    assert found["coupling_overhead"] == pytest.approx(0.05)
+    summary = stopwatch.summary(TwoRanks(other), 2)
+    assert summary["ranks"][0]["coupling_packing"] == pytest.approx(2.0)
+    assert summary["ranks"][0]["sum_packing"]["meso"] == pytest.approx(2.0)
+    assert summary["window_seconds"] == pytest.approx(10.0)
+    assert summary["window_core_seconds"] == pytest.approx((10.0 + 15.0) / 2)
+    assert summary["busy_shares"] == pytest.approx([0.7, 0.975])
+    assert summary["busy_share"] == pytest.approx(1.0 - 6.5 / 40.0)
+    assert summary["coupling_overhead"] == pytest.approx(0.05)

@@ -1,4 +1,4 @@
-"""A run of a structure from its input to its results, on one rank."""
+"""A structure run from input to results on one rank."""
 
 import json
 from pathlib import Path
@@ -31,7 +31,7 @@ GRAVITY = 9.80665
 
 
 def run(directory: Path, mesh=None, **changes) -> tuple[dict, dict[str, np.ndarray]]:
-    """Run a structure; return its result and its history."""
+    """Run a structure and return its result and history."""
     request = structure_input(directory, mesh, **changes)
     run_structure(MPI.COMM_SELF, request)
     with np.load(request.output / "history.npz") as arrays:
@@ -61,7 +61,7 @@ def test_program_reads_its_input_and_writes_all_products(tmp_path, capsys):
 
 
 def test_hanging_rod_at_rest(tmp_path):
-    """Damped to rest under its weight along x: u = rho g L^2 / 2E at the end, E eps = rho g x, reaction = weight."""
+    """Damped to rest under its weight along x: end displacement rho g L^2 / 2E, E eps = rho g x, reaction = weight."""
     density, young = STEEL["density"], STEEL["young_modulus"]
     sound = np.sqrt(young / density)
     mode = 2 * np.pi * sound / (4 * LENGTH)
@@ -84,7 +84,7 @@ def test_hanging_rod_at_rest(tmp_path):
 
 
 def test_reaction_of_a_support_has_the_components_that_it_holds(tmp_path):
-    """The clamp carries the strip along z also at the nodes that it shares with the side, which holds y alone."""
+    """The clamp also supports z at the nodes shared with the side, which fixes only y."""
     supports = {"clamp": {"on": "x_min", "hold": ["x", "y", "z"]}, "side": {"on": "y_min", "hold": ["y"]}}
     _, history = run(tmp_path, supports=supports)
     assert np.abs(history["reaction@clamp"][:, 2]).max() > 0.0
@@ -131,14 +131,14 @@ def test_layers_have_their_materials_and_mass_scaling_is_reported(tmp_path):
 
 
 def test_large_mass_gives_what_direct_input_gives(tmp_path):
-    """Displacements are told relative to the supports; seen from them, the strip is pushed against the acceleration."""
+    """Displacements are relative to the supports, so the inertia force opposes the acceleration."""
     drop = structure_tables_of()["loads"]["drop"]
     _, direct = run(tmp_path)
     _, large = run(tmp_path, loads={"drop": drop | {"method": "large_mass"}})
     assert direct["displacement@tip"][:, 2].min() < -10 * direct["displacement@tip"][:, 2].max()
-    found = solver_differences(large, direct)
-    assert found["displacement_difference"] < 5e-3
-    assert found["strain_difference"] < 5e-3
+    differences = solver_differences(large, direct)
+    assert differences["displacement_difference"] < 5e-3
+    assert differences["strain_difference"] < 5e-3
     speed = np.abs(direct["velocity@tip"]).max()
     assert np.abs(large["velocity@tip"] - direct["velocity@tip"]).max() < 5e-3 * speed
     peak = np.abs(direct["reaction@clamp"]).max()
@@ -162,9 +162,9 @@ def test_both_solvers_agree_under_all_loads(tmp_path):
     assert result["health"]["energy_balance_error"]["value"] < 1e-10
     assert result["metrics"]["factor_entries"]["value"] > 0
     assert result["effects"]["strain_at_surface"]["on"]
-    found = solver_differences(explicit, implicit)
-    assert found["displacement_difference"] < 1e-3
-    assert found["strain_difference"] < 5e-3
+    differences = solver_differences(explicit, implicit)
+    assert differences["displacement_difference"] < 1e-3
+    assert differences["strain_difference"] < 5e-3
     reactions = explicit["reaction@clamp"], implicit["reaction@clamp"]
     assert np.linalg.norm(reactions[0] - reactions[1]) < 5e-3 * np.linalg.norm(reactions[1])
 
@@ -186,7 +186,7 @@ def test_implicit_solver_with_nothing_to_solve(tmp_path):
 
 
 def test_modes_of_a_cantilever(tmp_path):
-    """First bending: (1.8751^2 / 2 pi) sqrt(E I / (rho A L^4)), between a beam's and a wide plate's."""
+    """The first bending frequency, (1.8751^2 / 2 pi) sqrt(E I / (rho A L^4)), lies between beam and wide plate."""
     dynamics = {"duration": 1e-5, "modes": 3, "numerics": {"history_samples": 4, "field_samples": 2}}
     result, _ = run(tmp_path, dynamics=dynamics)
     modes = json.loads((tmp_path / "out" / "modes.json").read_text())
@@ -195,7 +195,7 @@ def test_modes_of_a_cantilever(tmp_path):
     )
     assert [mode["mode"] for mode in modes] == [1, 2, 3]
     assert beam < modes[0]["frequency"] < 1.05 * beam
-    assert modes[0]["mass_fraction"]["z"] == pytest.approx(0.613, abs=0.02)  # of a beam: 4 (0.7340 / 1.8751)^2
+    assert modes[0]["mass_fraction"]["z"] == pytest.approx(0.613, abs=0.02)  # beam: 4 (0.7340 / 1.8751)^2
     assert result["metrics"]["first_frequency"]["value"] == modes[0]["frequency"]
     assert (tmp_path / "out" / "modes.pvd").exists()
 

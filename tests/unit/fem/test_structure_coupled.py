@@ -1,4 +1,4 @@
-"""A structure as two models: every node and cell counts once, all loads arrive, the motion is that of one model."""
+"""A structure divided into two models: unique nodes and cells, all loads, and the motion of one model."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ LOADS = {
     "pull": {"kind": "motion", "on": "z_max", "component": "z", "peak": 0.1, "duration": 1e-5},
     "drop": {"kind": "input_g", "peak": 1e4, "duration": 2e-5, "direction": [1.0, 0.0, 0.2]},
     "poke": {"kind": "point_force", "at": [2e-4, 3e-4, 6.1e-3], "direction": [1.0, 1.0, 1.0], "peak": 0.2}
-    | {"duration": 1e-5},  # in the fine layer, beside the tie
+    | {"duration": 1e-5},  # in the fine layer, next to the tie
 }
 TABLES = {
     "supports": {
@@ -60,11 +60,11 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
 
 def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
     request = write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics())
-    found = divided_on_one_rank(request)
-    elements = {role: len(tables.part) for role, tables in found.tables.items()}
+    division = divided_on_one_rank(request)
+    elements = {role: len(tables.part) for role, tables in division.tables.items()}
     assert elements == {"macro": 2 * 4 * 4, "meso": 36 + 2 * 2 * 4}
-    assert found.coupling["cut_nodes"] == 2 * 9
-    assert [level["elements"] for level in found.coupling["levels"]] == list(elements.values())
+    assert division.coupling["cut_nodes"] == 2 * 9
+    assert [level["elements"] for level in division.coupling["levels"]] == list(elements.values())
 
 
 def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
@@ -82,22 +82,22 @@ def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
 def test_two_models_move_as_one(tmp_path, scheme):
-    """Within the error of their steps: loads across tie and interface, reactions, watch points of both models."""
+    """Loads across tie and interface, reactions and watch points agree within the error of the steps."""
     changes = {"coupling": {"scheme": scheme, "fine": ["layer_1"]}}
     result, two = run_bar(write_bar(tmp_path / "two", WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
     assert all(check["ok"] for check in result["health"].values())
     assert result["coupling"]["scheme"] == scheme
     single = dynamics(**changes)
     request = write_bar(tmp_path / "one", WIDTH, LAYERS, 1e-5, **TABLES, solver="dns", dynamics=single)
-    _, one = run_bar(request)
-    differences = solver_differences(two, one)
+    _, single_model = run_bar(request)
+    differences = solver_differences(two, single_model)
     assert differences["displacement_difference"] < 0.005
     assert differences["strain_difference"] < 0.02
     for name in ("reaction@clamp", "external"):
         values = np.array(
-            [np.interp(one["time"], two["time"], part) for part in two[name].reshape(len(two["time"]), -1).T]
+            [np.interp(single_model["time"], two["time"], part) for part in two[name].reshape(len(two["time"]), -1).T]
         )
-        assert relative_error(values, one[name].reshape(len(one["time"]), -1).T) < 0.02, name
+        assert relative_error(values, single_model[name].reshape(len(single_model["time"]), -1).T) < 0.02, name
 
 
 @pytest.mark.parametrize(
@@ -115,21 +115,21 @@ def test_two_models_move_as_one(tmp_path, scheme):
     ids=["pressure", "motion", "support", "point_force"],
 )
 def test_what_acts_on_fine_elements_strains_them_as_in_one_model(tmp_path, load, clamped):
-    """Nine steps a window at the end: by the window alone strains are 100 times too large, at a support 1.5 times."""
+    """With nine steps per window: loads applied per window give strains 100 times too large, 1.5 times at a support."""
     layers = bar_layers(("FR4", 6e-3, 6, (2, 2)), ("FR4", 1e-3, 16, (2, 2)))
     support = {"clamp": {"on": clamped, "hold": ["x", "y", "z"]}}
     scene = {"loads": {"load": load}, "supports": support, "watch": {"end": {"at": [0.0, 0.0, 7e-3 - 2.5e-5]}}}
     changes = dynamics(duration=6e-5, coupling={"scheme": "local_steps", "fine": ["layer_1"]})
     result, two = run_bar(write_bar(tmp_path / "two", WIDTH, layers, 1e-5, **scene, dynamics=changes))
-    _, one = run_bar(write_bar(tmp_path / "one", WIDTH, layers, 1e-5, **scene, solver="dns", dynamics=changes))
+    _, single = run_bar(write_bar(tmp_path / "one", WIDTH, layers, 1e-5, **scene, solver="dns", dynamics=changes))
     assert result["coupling"]["m"] == 9
     assert all(check["ok"] for check in result["health"].values())
-    assert solver_differences(two, one)["strain_difference"] < 0.03
+    assert solver_differences(two, single)["strain_difference"] < 0.03
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "impulse"])
-def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path, scheme):
-    """Nine steps a window; pushed once a window, elements at support and interface were strained 3.5 and 8 % wrong."""
+def test_support_in_the_meso_model_carries_a_body_force_as_in_one_model(tmp_path, scheme):
+    """With nine steps per window: a load per window gave strain errors of 3.5 and 8 % at support and interface."""
     layers = bar_layers(("FR4", 1e-3, 16, (2, 2)), ("FR4", 6e-3, 6, (2, 2)))
     scene = {
         "loads": {"drop": {"kind": "input_g", "peak": 1e4, "duration": 3e-5}},
@@ -138,14 +138,14 @@ def test_a_support_in_the_meso_model_bears_a_body_force_as_in_one_model(tmp_path
     }
     changes = dynamics(duration=6e-5, coupling={"scheme": scheme, "fine": ["layer_0"]})
     result, two = run_bar(write_bar(tmp_path / "two", WIDTH, layers, 1e-5, **scene, dynamics=changes))
-    _, one = run_bar(write_bar(tmp_path / "one", WIDTH, layers, 1e-5, **scene, solver="dns", dynamics=changes))
+    _, single = run_bar(write_bar(tmp_path / "one", WIDTH, layers, 1e-5, **scene, solver="dns", dynamics=changes))
     assert result["coupling"]["m"] == 9
     assert all(check["ok"] for check in result["health"].values())
-    assert solver_differences(two, one)["strain_difference"] < 0.01
+    assert solver_differences(two, single)["strain_difference"] < 0.01
 
 
 def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
-    """The macro model alone would know of it, and the meso model's interface run away: strains were 1.3 times wrong."""
+    """Only the macro model would have the motion, and the meso interface would drift: strains were wrong by 1.3."""
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
     with pytest.raises(CouplingError, match=r"loads\.side prescribes the motion of 6 interface nodes.*impulse"):
@@ -167,6 +167,6 @@ def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
     ],
 )
 def test_what_two_models_cannot_do_is_said_before_anything_is_computed(tmp_path, changes, key, words):
-    found = problems(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
-    assert [problem.key for problem in found] == [key]
-    assert words in found[0].message
+    messages = problems(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics(**changes)))
+    assert [problem.key for problem in messages] == [key]
+    assert words in messages[0].message

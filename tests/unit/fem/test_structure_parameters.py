@@ -1,4 +1,4 @@
-"""Parameters of a structure: what does not fit together is said with key, value, range and nearest name."""
+"""Parameters of a structure: errors name key, value, range and nearest name."""
 
 import pytest
 
@@ -13,7 +13,7 @@ YIELDING = TIN | {"plasticity": {"A": 40e6}}
 
 
 def scene(**changes) -> StructureProblem:
-    """Return a board on its holes, dropped; ``changes`` are tables that replace those of it."""
+    """Return a dropped board fixed at its holes; ``changes`` replace its tables."""
     board = {"material": "FR4", "thickness": 1e-3, "cells": 2}
     tables = {
         "structure": {
@@ -45,8 +45,8 @@ def test_a_good_scene_has_no_problem_and_survives_its_json():
 
 
 def test_own_materials_go_before_those_of_the_library():
-    own = scene(materials={"FR4": TIN}, structure=layered("FR4"), supports={})
-    assert own.layer_materials["board"].density == 7400.0
+    overridden = scene(materials={"FR4": TIN}, structure=layered("FR4"), supports={})
+    assert overridden.layer_materials["board"].density == 7400.0
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_large_mass_with_supports_across_its_direction():
 
 
 def test_a_force_beside_a_plane_of_symmetry_may_point_anywhere():
-    """Its mirror image acts as well; holes end at their walls."""
+    """Its mirror image acts as well; holes end at the symmetry walls."""
     at_wall = POKE | {"at": [0.0525, -0.037, 0.0]}
     assert not problems(scene(loads={"poke": POKE | {"direction": [1.0, 0.0, 0.0]}, "at_wall": at_wall}))
 

@@ -1,4 +1,4 @@
-"""Runs of structures that yield: plastic strain in histories and fields, and a restart to the same bits."""
+"""Plastic structures: plastic strain in histories and fields, and bitwise restart."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ PULLED = {
 
 
 def run(directory: Path, **changes) -> tuple[dict, dict[str, np.ndarray]]:
-    """Run a structure in a folder that may have checkpoints; return its result and its history."""
+    """Run a structure in a folder with optional checkpoints; return its result and history."""
     directory.mkdir(exist_ok=True)
     request = structure_input(directory, **(PULLED | changes))
     request = request.model_copy(update={"checkpoints": directory / "checkpoints"})
@@ -43,7 +43,7 @@ def whole(tmp_path_factory) -> tuple[Path, dict, dict[str, np.ndarray]]:
 
 
 def test_stress_follows_strain_on_the_yield_line(whole):
-    """The bar is free to contract: stress = A + B p, strain = stress / E + p as long as it is pulled."""
+    """With free lateral contraction, stress = A + B p and strain = stress / E + p under increasing load."""
     _, result, history = whole
     strain, stress = history["strain@middle"][-1, 0], history["stress@middle"][-1, 0]
     plastic = history["plastic_strain@middle"][-1, 0]

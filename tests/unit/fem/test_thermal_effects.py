@@ -1,4 +1,4 @@
-"""What is left out of a reflow changes the gaps by less than the threshold, and estimates are on the safe side."""
+"""Neglected reflow effects change the gaps by less than the threshold, with conservative estimates."""
 
 import itertools
 from dataclasses import replace
@@ -73,7 +73,7 @@ def test_bending_by_the_solder_stays_below_its_number(tmp_path, tension, acts):
     structure = ThermalStructure.build(MPI.COMM_SELF, small_structure(tmp_path))
     changes = []
     for signs in itertools.product((-1.0, 1.0), repeat=4):
-        if sum(signs) == 0.0:  # as in any balance, but for the weight
+        if sum(signs) == 0.0:  # as in any equilibrium except for the weight
             wrenches = np.zeros((4, 2, 6))
             wrenches[:, 0, 2], wrenches[:, 1, 2] = pull * np.array(signs), -pull * np.array(signs)
             changes.append(np.ptp((gaps(structure, REFERENCE, wrenches) - gaps(structure, REFERENCE))[:, 2]))

@@ -1,4 +1,4 @@
-"""The structure in a process of its own: the same answers, errors that come back, and an end with its parent."""
+"""The structure in a separate process: equal results, returned errors and termination with its parent."""
 
 import multiprocessing
 import os

@@ -1,4 +1,4 @@
-"""Pads, wrenches, weights, corners and free motions of a heated package: what must hold on any mesh."""
+"""Pads, wrenches, weights, corners and rigid-body modes of a heated package on any mesh."""
 
 from dataclasses import replace
 
@@ -181,9 +181,7 @@ def test_force_of_solder_may_be_left_out(tmp_path):
 
 
 def test_loads_of_another_shape_are_refused(floating):
-    with pytest.raises(
-        ValueError, match=r"wrenches has the shape \(3, 2, 6\); required: finite, shape \(4, 2, 6\)"
-    ):
+    with pytest.raises(ValueError, match=r"wrenches has the shape \(3, 2, 6\); required: finite, shape \(4, 2, 6\)"):
         floating.solve(REFERENCE, 0.0, np.zeros((3, 2, 6)), np.zeros(1))
     with pytest.raises(ValueError, match=r"rigid has the shape \(1,\), not all finite"):
         floating.solve(REFERENCE, 0.0, np.zeros((4, 2, 6)), np.array([np.nan]))

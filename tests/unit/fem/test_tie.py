@@ -1,4 +1,4 @@
-"""The tie: exact where it can be, an error where it cannot."""
+"""The tie: exact fields, and an error where no exact tie exists."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ def test_projection_inverts_the_bilinear_map_of_a_warped_facet():
     corners = np.array([[[0.0, 0, 0], [2, 0.1, 0.2], [1.8, 1.2, 0], [0.1, 0.9, 0.1]]])
     xi = np.array([[0.3, -0.7]])
     values = 0.25 * (1 + xi[0, 0] * np.array([-1, 1, 1, -1])) * (1 + xi[0, 1] * np.array([-1, -1, 1, 1]))
-    found, distance = project(values @ corners, corners)
-    assert np.allclose(found, xi, atol=1e-12)
+    coordinates, distance = project(values @ corners, corners)
+    assert np.allclose(coordinates, xi, atol=1e-12)
     assert distance[0] < 1e-14
 
 
@@ -29,7 +29,7 @@ def test_point_off_a_facet_has_its_distance():
 
 
 def test_a_point_where_the_sides_of_a_trapezium_meet_has_its_distance():
-    """There the bilinear map has no inverse."""
+    """The bilinear map is singular at this point."""
     trapezium = np.array([[[0.0, -1, 0], [2, -2, 0], [2, 2, 0], [0, 1, 0]]])
     _, xi, distance = closest_facets(np.array([[-2.0, 0.0, 0.0], [-9.0, 0.0, 0.0]]), np.repeat(trapezium, 2, axis=0))
     assert distance == pytest.approx([2.0, 9.0])

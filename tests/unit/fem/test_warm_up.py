@@ -1,4 +1,4 @@
-"""A force evaluated at rest leaves no trace in elements that have a path."""
+"""A force evaluation at rest does not change path-dependent elements."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from reflowshock.materials.library import SAC305
 
 @pytest.mark.parametrize(("kinematics", "rounding"), [("small", 0.0), ("finite", 1e-4)])
 def test_rest_leaves_no_path(kinematics, rounding):
-    """But round-off: 1e-4 Pa is 2e-15 of Young's modulus."""
+    """The tolerance is round-off: 1e-4 Pa is 2e-15 of Young's modulus."""
     points, cells = grid(*[np.linspace(0.0, 1.0, 3)] * 3)
     elements = Elements(
         points, cells, np.zeros(len(cells), np.int32), elasticity_matrix(SAC305)[None], np.full(len(cells), 7380.0)

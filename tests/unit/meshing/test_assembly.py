@@ -138,9 +138,11 @@ def test_estimate_knows_the_elements_around_holes(quarter):
     sides = np.sort(np.linalg.norm(np.roll(corners[:, :4], -1, axis=1) - corners[:, :4], axis=2), axis=1)
     box = np.isclose(sides[:, 0], sides[:, 1], rtol=1e-6) & np.isclose(sides[:, 2], sides[:, 3], rtol=1e-6)
     assert estimate.around_holes == np.sum(~box)
-    found = np.abs(np.linalg.det(np.array(estimate.shapes)))
-    meshed = [scaled_volume(own) for own in corners[~box]]
-    assert np.unique(np.round(found / MM**3, 6)) == pytest.approx(np.unique(np.round(np.array(meshed) / MM**3, 6)))
+    determinants = np.abs(np.linalg.det(np.array(estimate.shapes)))
+    meshed = [scaled_volume(vertices) for vertices in corners[~box]]
+    assert np.unique(np.round(determinants / MM**3, 6)) == pytest.approx(
+        np.unique(np.round(np.array(meshed) / MM**3, 6))
+    )
 
 
 def scaled_volume(corners: np.ndarray) -> float:

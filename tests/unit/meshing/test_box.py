@@ -58,8 +58,8 @@ def test_named_facets_lie_where_their_name_says(tmp_path):
     write_box(Box(SIZE, (16, 8), LAYERS, ("x",), holes=HOLES), tmp_path / "structure.msh")
     mesh = meshio.read(tmp_path / "structure.msh", file_format="gmsh")
     places = {"x_min": (0, 0.0), "x_max": (0, 20e-3), "y_min": (1, -10e-3), "z_min": (2, 0.0), "z_max": (2, 1.5e-3)}
-    for name, (axis, place) in places.items():
-        assert mesh.points[nodes_of(mesh, name), axis] == pytest.approx(place, abs=1e-12)
+    for name, (axis, coordinate) in places.items():
+        assert mesh.points[nodes_of(mesh, name), axis] == pytest.approx(coordinate, abs=1e-12)
     holes = mesh.points[nodes_of(mesh, "mounting_holes")]
     radius = np.hypot(np.abs(holes[:, 0]) - 15e-3, np.abs(holes[:, 1]) - 7e-3)
     assert radius == pytest.approx(1e-3, rel=1e-9)
@@ -77,12 +77,12 @@ def test_layers_whose_elements_differ_share_no_node_and_name_both_faces(tmp_path
     assert volume(mesh) == pytest.approx(0.5 * SIZE[0] * SIZE[1] * 2.8e-3, rel=1e-12)
     faces = {"slave@board-solder": 25 * 11, "master@board-solder": 17 * 9}
     faces |= {"slave@top-cover": 25 * 11, "master@top-cover": 17 * 9, "z_min": 17 * 9, "z_max": 17 * 9}
-    found = {name: nodes_of(mesh, name) for name in faces}
-    assert {name: len(nodes) for name, nodes in found.items()} == faces
-    assert not np.intersect1d(found["slave@board-solder"], found["master@board-solder"]).size
+    face_nodes = {name: nodes_of(mesh, name) for name in faces}
+    assert {name: len(nodes) for name, nodes in face_nodes.items()} == faces
+    assert not np.intersect1d(face_nodes["slave@board-solder"], face_nodes["master@board-solder"]).size
     for name, height in {"board-solder": 1e-3, "top-cover": 2.3e-3}.items():
         for side in ("slave", "master"):
-            assert mesh.points[found[f"{side}@{name}"], 2] == pytest.approx(height, abs=1e-12)
+            assert mesh.points[face_nodes[f"{side}@{name}"], 2] == pytest.approx(height, abs=1e-12)
     assert len(nodes_of(mesh, "y_min")) == 17 * 3 + 25 * 5 + 17 * 2
 
 

@@ -61,14 +61,14 @@ def places(*pairs, diameter=2.0):
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "told"),
+    ("changes", "key", "message"),
     [
         ({"holes": places((-8, -7), (17.0, 10))}, "board.holes.at", "beyond the board along x -10.5 mm to -"),
-        ({"holes": places((-8, 0), (14, 10))}, "board.holes.at", "beside the package.* along y"),
-        ({"holes": places((-8, -7), (-8, -7))}, "board.holes.at", "would turn"),
+        ({"holes": places((-8, 0), (14, 10))}, "board.holes.at", "next to the package.* along y"),
+        ({"holes": places((-8, -7), (-8, -7))}, "board.holes.at", "could rotate"),
         ({"holes": places((-8, -7), (14, 10), (13, -7))}, "board.holes.at", "neither in line nor apart along x"),
         ({"holes": places() | {"inset_x": MM}}, "board.holes.inset_y", "is missing"),
-        ({"holes": places((-8, -7), (14, 10)) | {"inset_x": MM}}, "board.holes.inset_x", "goes with no holes"),
+        ({"holes": places((-8, -7), (14, 10)) | {"inset_x": MM}}, "board.holes.inset_x", "cannot be combined"),
         ({"symmetry": "quarter"}, "board.centre", "in the middle"),
         (
             {"symmetry": "quarter", "centre": (0.0, 0.0), "length": 40 * MM, "width": 30 * MM},
@@ -78,9 +78,9 @@ def places(*pairs, diameter=2.0):
         ({"centre": (13 * MM, 0.0)}, "board.centre", "reaches beyond the board along its length within 12.5 mm"),
     ],
 )
-def test_impossible_boards_aside(changes, key, told):
+def test_impossible_boards_aside(changes, key, message):
     problem = found(package(), aside(**changes))[key]
-    assert re.search(told, f"{problem.message} {problem.allowed}")
+    assert re.search(message, f"{problem.message} {problem.allowed}")
 
 
 def with_holes(diameter, **changes):

@@ -72,5 +72,5 @@ def test_its_resolution_can_be_chosen():
 
 
 def test_a_ball_that_two_layers_cannot_hold_is_refused():
-    with pytest.raises(JointMeshError, match=r"A4: its layers hold 0\.\d+ of its volume.*use more layers"):
+    with pytest.raises(JointMeshError, match=r"A4: its layers enclose 0\.\d+ of its volume.*use more layers"):
         coarse_corner(bulge=0.25 * MM)

@@ -28,7 +28,7 @@ def meshes():
     for name, bulge in BULGES.items():
         body = barrel(sites[name].gap, bulge)
         fine.append(mesh_joint(body, sites[name], whole, side))
-        coarse.append(mesh_coarse_or_fine(body, fine[-1], (whole, sites[name]), side))
+        coarse.append(mesh_coarse_or_fine(body, fine[-1], sites[name], whole, side))
     return SimpleNamespace(fine=fine, coarse=coarse)
 
 

@@ -101,7 +101,7 @@ def test_levels_of_solder_divide_the_measuring_layer_and_grow_from_it():
 
 @pytest.mark.parametrize("layers", [4, 5, 6])
 def test_layers_that_cannot_grow_smoothly_are_refused(layers):
-    with pytest.raises(ValueError, match=f"{layers} layers, of which 2 in 2.5e-05 m at either pad, do not fill 0.0003"):
+    with pytest.raises(ValueError, match=f"{layers} layers, 2 of them in 2.5e-05 m at each pad, do not fill 0.0003"):
         layer_levels(300 * UM, JointNumerics(**(NUMERICS | {"layers": layers})))
 
 
@@ -124,8 +124,8 @@ def test_edges_of_columns_lie_on_lines_of_board_and_package(size, symmetry):
     half = 0.5 * (size or MM)
     for axis in (board_plan(whole, plate).x, package_plan(whole, plate).x):
         edges = {round(edge / MM, 9) for part in axis for edge in (part.start, part.end)}
-        wanted = {round((centre * MM + sign * half) / MM, 9) for centre in (0.5, 1.5) for sign in (-1.0, 1.0)}
-        assert wanted <= edges
+        expected = {round((centre * MM + sign * half) / MM, 9) for centre in (0.5, 1.5) for sign in (-1.0, 1.0)}
+        assert expected <= edges
         assert [part.end for part in axis[:-1]] == [part.start for part in axis[1:]]
 
 
@@ -153,8 +153,8 @@ def test_counts_of_a_plan_are_those_of_the_meshes():
     ],
 )
 def test_columns_without_room_are_refused(changes, key):
-    found = [problem.key for problem in problems(package(**changes), board(), Warpage())]
-    assert any(one.startswith(key) for one in found)
+    keys = [problem.key for problem in problems(package(**changes), board(), Warpage())]
+    assert any(name.startswith(key) for name in keys)
 
 
 def test_columns_with_room_are_taken():

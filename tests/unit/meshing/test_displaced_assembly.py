@@ -8,8 +8,8 @@ from reflowshock.meshing.board.assembly import write_assembly
 from reflowshock.meshing.board.displaced_assembly import (
     ContactError,
     DisplacementError,
-    computed,
-    prescribed,
+    computed_displacement,
+    prescribed_displacement,
     write_displaced_assembly,
 )
 from reflowshock.meshing.board.package_side import NotStructuredError, PackageSide, StructuredFace, underside
@@ -40,7 +40,7 @@ def bend(points):
 
 def test_warpage_lifts_the_package_only(flat):
     warpage = Warpage(corner=0.2 * MM)
-    write_displaced_assembly(flat / "flat.msh", prescribed(package(), warpage), flat / "warped.msh")
+    write_displaced_assembly(flat / "flat.msh", prescribed_displacement(package(), warpage), flat / "warped.msh")
     warped = MeshFile(flat / "warped.msh")
     under = warped.points[np.unique(warped.cells("package_side", "quad"))]
     expected = 0.35 * MM + lift(package(), warpage, under[:, 0], under[:, 1])
@@ -50,7 +50,7 @@ def test_warpage_lifts_the_package_only(flat):
 
 
 def test_nothing_else_changes(flat):
-    write_displaced_assembly(flat / "flat.msh", prescribed(package(), Warpage()), flat / "same.msh")
+    write_displaced_assembly(flat / "flat.msh", prescribed_displacement(package(), Warpage()), flat / "same.msh")
     before, after = MeshFile(flat / "flat.msh"), MeshFile(flat / "same.msh")
     assert set(before.mesh.field_data) == set(after.mesh.field_data)
     for name, (_, dimension) in before.mesh.field_data.items():
@@ -63,13 +63,13 @@ def test_only_what_the_package_does_beyond_the_board_counts(flat):
     mesh = MeshFile(flat / "flat.msh")
     is_package = np.zeros(len(mesh.points), bool)
     is_package[nodes_of(mesh, *PACKAGE)] = True
-    own = np.where(is_package[:, None], 2.0 * bend(mesh.points * [1.0, 1.0, 0.0]), 0.0)
+    package_motion = np.where(is_package[:, None], 2.0 * bend(mesh.points * [1.0, 1.0, 0.0]), 0.0)
     common = bend(mesh.points * [1.0, 1.0, 0.0])
     coarse = StructuredFace.of_nodes(*(a[(mesh.points[:, 2] == 0.0) & (mesh.points[:, :2] < 2.6 * MM).all(axis=1)]
                                        for a in (mesh.points, common)))  # fmt: skip
     common[is_package] = coarse(*mesh.points[is_package, :2].T)
-    displacement = computed(mesh.points, own + common, is_package)
-    assert np.abs(displacement(mesh.points[is_package]) - own[is_package]).max() < 1e-18
+    displacement = computed_displacement(mesh.points, package_motion + common, is_package)
+    assert np.abs(displacement(mesh.points[is_package]) - package_motion[is_package]).max() < 1e-18
     with pytest.raises(DisplacementError, match=r"no displacement is known at \(0, 0, 9\) m"):
         displacement(np.array([[0.0, 0.0, 9.0]]))
 
@@ -89,7 +89,9 @@ def test_the_underside_is_that_of_the_facets(tmp_path, symmetry):
 
 def test_prescribed_side_is_that_of_the_displaced_mesh(flat):
     warpage = Warpage(corner=0.05 * MM)
-    meshed = write_displaced_assembly(flat / "flat.msh", prescribed(package(), warpage), flat / "warped.msh")
+    meshed = write_displaced_assembly(
+        flat / "flat.msh", prescribed_displacement(package(), warpage), flat / "warped.msh"
+    )
     drawn = PackageSide.prescribed(package(), board(), warpage)
     x, y = np.random.default_rng(1).uniform(0.0, 2.5 * MM, (2, 500))
     assert meshed.height(x, y) == pytest.approx(drawn.height(x, y), abs=1e-15)
@@ -101,13 +103,13 @@ def test_underside_lies_on_copper():
 
 
 def test_a_package_in_the_board_is_refused(flat):
-    sunk = prescribed(package(), Warpage(corner=-0.2 * MM))
+    sunk = prescribed_displacement(package(), Warpage(corner=-0.2 * MM))
     with pytest.raises(ContactError, match=r"inside the board at x = 2\.5 mm, y = 2\.5 mm, allowed < 0 mm"):
         write_displaced_assembly(flat / "flat.msh", sunk, flat / "sunk.msh")
 
 
 def test_what_is_no_grid_is_refused():
-    with pytest.raises(NotStructuredError, match="3 nodes are no grid of 2 x 2 lines"):
+    with pytest.raises(NotStructuredError, match="3 nodes do not form a grid of 2 x 2 lines"):
         StructuredFace.of_nodes(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.zeros((3, 1)))
     side = PackageSide.prescribed(package(), board(), Warpage())
     with pytest.raises(NotStructuredError, match=r"x = 0\.003 m, allowed 0 to 0\.0025 m"):

@@ -93,17 +93,17 @@ def test_files_hold_hexahedra_and_tetrahedra(tmp_path, bridge):
     mesh, surface = bridge
     write_joints([mesh], tmp_path / "joints.msh")
     write_tetrahedra(tmp_path / "free_form.msh", mesh.name, mesh.tetrahedra)
-    found = {}
+    counts = {}
     for name in ("joints", "free_form"):
         with gmsh_model("read"):
             gmsh.open(str(tmp_path / f"{name}.msh"))
             groups = gmsh.model.getPhysicalGroups()
-            found[name] = {gmsh.model.getPhysicalName(*group) for group in groups}
+            counts[name] = {gmsh.model.getPhysicalName(*group) for group in groups}
             kinds = gmsh.model.mesh.getElementTypes(3)
             tags = gmsh.model.mesh.getElementsByType(kinds[0])[0]
             assert gmsh.model.mesh.getElementQualities(tags, "minDetJac").min() > 0.0
-    assert found["free_form"] == {"solder@A3+A4", "free", "pad_board", "pad_package"}
-    assert {"solder@A3+A4", "foot@A3", "head@A4"} <= found["joints"]
+    assert counts["free_form"] == {"solder@A3+A4", "free", "pad_board", "pad_package"}
+    assert {"solder@A3+A4", "foot@A3", "head@A4"} <= counts["joints"]
     assert joint_quality(mesh)["tetrahedra"]["volume_error"] < 1e-9
     wetted = sum(quad_areas(mesh.points, mesh.facets[f"pad_board@{name}"]).sum() for name in ("A3", "A4"))
     assert wetted == pytest.approx(2.0 * np.pi * (0.34**2 - 0.155**2) * MM**2, rel=0.03)

@@ -30,7 +30,7 @@ def meshed(surface: ClosedSurface, site: PadSite):
 
 @pytest.fixture
 def overflowed() -> ClosedSurface:
-    """Wetted discs wider than the pads, the upper one beside its pad."""
+    """Wetted discs wider than the pads, the upper one next to its pad."""
     return laid_between(barrel(0.25 * MM, 0.06 * MM, 0.26 * MM, 0.28 * MM), (ASIDE, 0.0), (SLOPE, 0.0))
 
 

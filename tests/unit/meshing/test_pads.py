@@ -58,7 +58,7 @@ def test_table_survives_its_file(tmp_path):
 
 
 def test_pads_lie_in_the_tangent_plane_of_the_lift():
-    """The normal of a turned pad is that of the lifted surface: (-w_x, -w_y, 1)."""
+    """The normal of a tilted pad equals the normal of the lifted surface, (-w_x, -w_y, 1)."""
     sites = pad_table(package(rows=10, columns=10), board(), Warpage(corner=0.5 * MM))
     for site in sites:
         normal = Rotation.from_rotvec([*site.tilt, 0.0]).apply([0.0, 0.0, 1.0])

@@ -143,7 +143,7 @@ def test_shape_that_is_not_star_shaped_is_refused_by_name():
 def test_too_few_layers_for_a_ball_are_refused_and_more_are_taken():
     mesh, _ = mesh_corner(bulge=0.2 * MM, joint_numerics={"layers": 2})
     quality = joint_quality(mesh)
-    assert re.match(r"its layers hold 0\.\d+ of its volume.*use more layers", quality["tries"][0]["missed"])
+    assert re.match(r"its layers enclose 0\.\d+ of its volume.*use more layers", quality["tries"][0]["missed"])
     assert (quality["method"], quality["layers"], quality["tries"][0]["layers"]) == ("swept", 4, 2)
 
 

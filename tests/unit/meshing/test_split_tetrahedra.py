@@ -33,12 +33,12 @@ def test_hexahedra_of_a_regular_tetrahedron_are_alike_and_well_shaped():
 def test_hexahedra_fill_the_tetrahedra_and_share_their_faces(cloud):
     points, cells, surface = cloud
     split = split_tetrahedra(points, cells)
-    own = volumes(split.points, split.cells).reshape(-1, 4).sum(axis=1)
-    assert own == pytest.approx(np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) / 6.0)
+    hexahedron_volumes = volumes(split.points, split.cells).reshape(-1, 4).sum(axis=1)
+    assert hexahedron_volumes == pytest.approx(np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) / 6.0)
     quads = boundary_quads(split.cells)
     assert quad_areas(split.points, quads).sum() == pytest.approx(22.0)
-    given = split.quads_of(surface)
-    assert {tuple(sorted(quad)) for quad in given.tolist()} == {tuple(sorted(quad)) for quad in quads.tolist()}
+    surface_quads = split.quads_of(surface)
+    assert {tuple(sorted(quad)) for quad in surface_quads.tolist()} == {tuple(sorted(quad)) for quad in quads.tolist()}
 
 
 def test_faces_keep_the_direction_of_their_triangles(cloud):

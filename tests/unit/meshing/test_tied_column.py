@@ -1,4 +1,4 @@
-"""Joints whose pads have another mesh than their columns: free-form ones, swept ones that had to be finer."""
+"""Joints whose pads have a different mesh from their columns: free-form joints, and swept joints with a finer mesh."""
 
 import numpy as np
 import pytest
@@ -18,22 +18,22 @@ LAYERS = NUMERICS | {"layers": 7}
 
 
 def hollow():
-    """A joint with a void in its columns, and what it is made of: package and site, underside, surface."""
+    """Return a joint with a void in its columns, its package, site, underside of the package and closed surface."""
     whole = package(joint_numerics=LAYERS, imprint={}, standoff=0.30 * MM)
     plate, side = board(symmetry="full"), side_of(BOWED, whole)
     site = {site.name: site for site in pad_table(whole, plate, BOWED)}["A4"]
     surface = with_void(barrel(site.gap, 0.04 * MM), (0.03 * MM, 0.0, 0.5 * site.gap), 0.07 * MM)
     columns = columns_of(site, whole, plate, side)
-    return mesh_joint(surface, site, whole, side, columns), (whole, site), side, surface
+    return mesh_joint(surface, site, whole, side, columns), whole, site, side, surface
 
 
 @pytest.fixture(scope="module")
-def made():
+def hollow_joint():
     return hollow()
 
 
-def test_columns_of_a_joint_with_a_void_are_those_of_a_swept_one(made):
-    mesh, swept = made[0], standing()[0]
+def test_columns_of_a_joint_with_a_void_are_those_of_a_swept_one(hollow_joint):
+    mesh, swept = hollow_joint[0], standing()[0]
     assert mesh.record["method"] == "free-form"
     for part in ("board_column@A4", "substrate_column@A4"):
         assert len(mesh.cells[part]) == len(swept.cells[part])
@@ -46,19 +46,19 @@ def test_columns_of_a_joint_with_a_void_are_those_of_a_swept_one(made):
 
 
 @pytest.mark.parametrize(("end", "copper"), [("foot", "board"), ("head", "package")])
-def test_its_copper_lies_on_a_pad_of_its_outline(made, end, copper):
-    """All nodes that are tied lie on it, although it ends before what boxes hold; the line around the pad is there."""
-    mesh = made[0]
+def test_copper_lies_on_a_pad_of_the_same_outline(hollow_joint, end, copper):
+    """All tied nodes lie on the pad, which excludes the outermost ring; an element line follows its outline."""
+    mesh = hollow_joint[0]
     assert f"{end}@A4" not in mesh.facets
-    tied, on = (mesh.facets[f"{name}@{end}@A4"] for name in ("slave", "master"))
+    tied, masters = (mesh.facets[f"{name}@{end}@A4"] for name in ("slave", "master"))
     assert np.intersect1d(tied, mesh.cells[f"copper_{copper}@A4"]).size == np.unique(tied).size
-    held = np.intersect1d(on, mesh.facets[f"column_{copper}@A4"])
-    assert held.size == 0
+    shared_with_sides = np.intersect1d(masters, mesh.facets[f"column_{copper}@A4"])
+    assert shared_with_sides.size == 0
     rims = 5 - 1 + {"board": 0, "package": 1}[copper]  # the package's pad is wider than the opening of its mask
-    assert len(on) == 48 + 16 * rims
-    pad = quad_areas(mesh.points, on[: 48 + 16 * (rims - 4)]).sum()
+    assert len(masters) == 48 + 16 * rims
+    pad = quad_areas(mesh.points, masters[: 48 + 16 * (rims - 4)]).sum()
     assert pad == pytest.approx(quad_areas(mesh.points, tied).sum(), rel=2e-3)
-    outwards = np.cross(*(mesh.points[on[:, k]] - mesh.points[on[:, 0]] for k in (1, 2)))[:, 2]
+    outwards = np.cross(*(mesh.points[masters[:, k]] - mesh.points[masters[:, 0]] for k in (1, 2)))[:, 2]
     assert (outwards * {"board": 1.0, "package": -1.0}[copper] > 0.0).all()
 
 
@@ -67,29 +67,28 @@ def test_a_swept_joint_with_a_finer_section_is_tied_to_the_columns_of_others():
     plate, side = board(symmetry="full"), side_of(BOWED, whole)
     site = {site.name: site for site in pad_table(whole, plate, BOWED)}["A4"]
     surface = barrel(site.gap, 0.0)
-    place = JointPlace.of(surface, site, side, whole.copper.thickness)
+    joint_place = JointPlace.of(surface, site, side, whole.copper.thickness)
     copper = CopperPads(whole.copper.thickness, columns=columns_of(site, whole, plate, side))
     finer = whole.joint_numerics.model_copy(update={"core": 5, "rings": 3})
-    mesh = build_joint(swept_solder(surface, finer, place), [site], copper, place)
+    mesh = build_joint(swept_solder(surface, finer, joint_place), [site], copper, joint_place)
     assert len(mesh.facets["slave@foot@A4"]) == 25 + 20 * 3
     assert len(mesh.cells["board_column@A4"]) == 7 * 128
 
 
-def test_a_pad_whose_outline_no_ring_follows_is_refused(made):
-    """Seen from its centre, the outline turns back."""
-    _, (whole, site), side, _ = made
+def test_a_pad_whose_outline_is_not_star_shaped_is_refused(hollow_joint):
+    _, whole, site, side, _ = hollow_joint
     column = columns_of(site, whole, board(symmetry="full"), side)[0]
     line = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]) * 0.1 * MM
     with pytest.raises(ValueError, match="not star-shaped about its centroid"):
         column_pad(column, np.column_stack([line, np.zeros(len(line))]), 1.0, 0)
 
 
-def test_where_it_stands_for_a_coarse_joint_it_has_no_column(made):
-    mesh, at, side, surface = made
-    stands = mesh_coarse_or_fine(surface, mesh, at, side)
-    assert "fine_instead" in stands.record
-    assert set(stands.cells) == {"solder@A4", "copper_board@A4", "copper_package@A4"}
-    assert {"foot@A4", "head@A4"} <= set(stands.facets)
+def test_a_fine_mesh_in_place_of_a_coarse_joint_has_no_column(hollow_joint):
+    mesh, whole, site, side, surface = hollow_joint
+    fine = mesh_coarse_or_fine(surface, mesh, site, whole, side)
+    assert "fine_instead" in fine.record
+    assert set(fine.cells) == {"solder@A4", "copper_board@A4", "copper_package@A4"}
+    assert {"foot@A4", "head@A4"} <= set(fine.facets)
 
 
 def test_a_pad_is_a_butterfly_with_circles_around_the_opening():

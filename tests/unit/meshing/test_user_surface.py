@@ -34,9 +34,9 @@ def test_any_format_gives_the_joint_in_its_own_frame(tmp_path, suffix):
     path = write(tmp_path, tilted(SHAPE.points), SHAPE.triangles, f"joint.{suffix}")
     surface = load_surface(path, "mm", SITE)
     assert enclosed_volume(surface) == pytest.approx(enclosed_volume(SHAPE), rel=1e-5)
-    expected, found = measure(SHAPE), measure(surface)
+    expected, measured = measure(SHAPE), measure(surface)
     for name in ("standoff", "max_width", "contact_radius_board", "contact_radius_package"):
-        assert found[name] == pytest.approx(expected[name], rel=1e-5)
+        assert measured[name] == pytest.approx(expected[name], rel=1e-5)
     lower = surface.points[np.unique(surface.triangles[surface.boundary == 1])]
     assert np.abs(lower).max(axis=0)[2] == 0.0
     assert lower.mean(axis=0) == pytest.approx(0.0, abs=1e-3 * MM)
@@ -45,9 +45,9 @@ def test_any_format_gives_the_joint_in_its_own_frame(tmp_path, suffix):
 def test_it_is_meshed_as_the_same_shape_from_a_reflow_is(tmp_path):
     surface = load_surface(write(tmp_path, tilted(SHAPE.points), SHAPE.triangles), "mm", SITE)
     side = side_of(Warpage(), package())
-    given, own = (joint_quality(mesh_joint(shape, SITE, package(), side)) for shape in (surface, SHAPE))
-    assert given["method"] == "swept"
-    assert given["minimum_scaled_jacobian"] == pytest.approx(own["minimum_scaled_jacobian"], rel=0.05)
+    imported, reflowed = (joint_quality(mesh_joint(shape, SITE, package(), side)) for shape in (surface, SHAPE))
+    assert imported["method"] == "swept"
+    assert imported["minimum_scaled_jacobian"] == pytest.approx(reflowed["minimum_scaled_jacobian"], rel=0.05)
 
 
 def test_a_void_and_noise_are_kept(tmp_path):
@@ -74,7 +74,7 @@ def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("fault", "told"),
+    ("fault", "message"),
     [
         (joints.hole, r"open edge: a hole \(3 such edges, allowed 0\), first at \("),
         (joints.flipped, r"triangle that faces another way than its neighbour"),
@@ -88,9 +88,9 @@ def test_heights_are_stretched_to_the_gap_and_tilt_of_the_site(tmp_path):
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
-def test_faults_are_refused_by_place(tmp_path, fault, told):
+def test_faults_are_refused_by_place(tmp_path, fault, message):
     path = write(tmp_path, *fault(SHAPE.points, SHAPE.triangles.astype(np.int64)))
-    with pytest.raises(SurfaceError, match=r"joint A4, .*joint\.stl: .*" + told):
+    with pytest.raises(SurfaceError, match=r"joint A4, .*joint\.stl: .*" + message):
         load_surface(path, "mm", SITE)
 
 
@@ -128,8 +128,8 @@ def test_another_unit_is_refused_and_the_right_one_named(tmp_path):
 
 
 def test_files_that_are_no_surface_are_refused(tmp_path):
-    for name, told in (("joint.obj", "suffix .obj, allowed .stl, .ply, .vtu"), ("none.stl", "no such file")):
-        with pytest.raises(SurfaceError, match=told):
+    for name, message in (("joint.obj", "suffix .obj, allowed .stl, .ply, .vtu"), ("none.stl", "no such file")):
+        with pytest.raises(SurfaceError, match=message):
             load_surface(tmp_path / name, "mm", SITE)
     (tmp_path / "text.ply").write_text("this is no surface\n")
     with pytest.raises(SurfaceError, match="cannot be read"):

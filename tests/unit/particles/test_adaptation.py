@@ -48,7 +48,7 @@ def ledger(flow):
 
 
 def check_kept(flow, event):
-    """Volume, centre and ledger by the event alone, momenta with the step after it."""
+    """Check volume, centre and energy budget after the event, and momenta after the next step."""
     before, losses, momenta = body_moments(flow.body), ledger(flow), flow.solver.state.momenta
     event.update(flow.body)
     after = body_moments(flow.body)
@@ -60,7 +60,7 @@ def check_kept(flow, event):
     assert boundary_loops(body.triangles) == ()
     flow.step()
     assert np.abs(momenta).min() > 1e-4
-    assert flow.solver.state.momenta == pytest.approx(momenta, abs=1e-6)  # what the linear solve leaves
+    assert flow.solver.state.momenta == pytest.approx(momenta, abs=1e-6)  # tolerance of the linear solver
 
 
 def test_long_edges_split_and_the_event_keeps_what_it_must():
@@ -126,7 +126,7 @@ def test_splits_change_no_shape():
 
 
 def test_a_collapse_that_would_pinch_the_surface_off_is_left_out():
-    """A prism whose waist has three edges: none of them has only two neighbours in common."""
+    """The waist of a prism has three edges, each with more than two common neighbours."""
     angle = 2.0 * np.pi * np.arange(3) / 3.0
     circle = np.column_stack((np.cos(angle), np.sin(angle)))
     points = np.concatenate(
@@ -140,7 +140,7 @@ def test_a_collapse_that_would_pinch_the_surface_off_is_left_out():
 
 
 def test_a_tip_of_three_triangles_on_a_narrow_base_is_cut_off():
-    """A corner of a cube became a thread: its three neighbours drew together, and swung with up to 2.5 m/s."""
+    """Otherwise the corner of a cube becomes a thread, whose neighbours oscillate with up to 2.5 m/s."""
     angle = 2.0 * np.pi * np.arange(3) / 3.0
     circle = np.column_stack((np.cos(angle), np.sin(angle)))
     foot, waist = (np.column_stack((radius * circle, np.full(3, z))) for radius, z in ((1, 0), (0.2, 1)))
@@ -159,7 +159,7 @@ def test_a_tip_of_three_triangles_on_a_narrow_base_is_cut_off():
 
 @pytest.mark.parametrize("change", [split_long, collapse_short])
 def test_contact_lines_change_only_where_they_may(change):
-    """Cones with three long edges on the wall, or with six edges of which one is short."""
+    """The cones have three long edges on the wall, or six edges, one of them short."""
     splits = change is split_long
     angle = 2.0 * np.pi / 3.0 * np.arange(3) if splits else np.array([0.0, 0.1, 1.2, 2.4, 3.6, 4.8])
     foot, count = np.column_stack((np.cos(angle), np.sin(angle), 0.0 * angle)), len(angle)
@@ -175,7 +175,7 @@ def test_contact_lines_change_only_where_they_may(change):
 
 
 def test_a_cube_that_becomes_a_film_keeps_enough_neighbours():
-    """5 an edge at 30 degrees: without new particles it ended in step 32, in a stencil with too few neighbours."""
+    """With 5 per edge at 30 degrees and no new particles the run failed in step 32 with too few neighbours."""
     drop = Drop(volume=1e-9, contact_angle=np.radians(30.0), particles_per_edge=5)
     fluid = Fluid(parameters="paper", effects=FlowEffects(inertia="on"), numerics=FlowNumerics(scheme="ispg"))
     solder = fluid.resolve(drop, "off")

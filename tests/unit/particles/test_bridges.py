@@ -19,9 +19,9 @@ def test_two_joints_touch_where_their_mean_width_reaches_the_pitch():
 
 
 def test_the_largest_overlap_comes_first_and_each_joint_knows_whom_it_touches():
-    found = contacts(ROW, {"A1": 0.98e-3, "A2": 1.03e-3, "A3": 1.2e-3}, mirrored=False)
-    assert [(contact.first, contact.second) for contact in found] == [("A2", "A3"), ("A1", "A2")]
-    assert neighbours(found) == {"A1": ["A2"], "A2": ["A1", "A3"], "A3": ["A2"]}
+    overlaps = contacts(ROW, {"A1": 0.98e-3, "A2": 1.03e-3, "A3": 1.2e-3}, mirrored=False)
+    assert [(contact.first, contact.second) for contact in overlaps] == [("A2", "A3"), ("A1", "A2")]
+    assert neighbours(overlaps) == {"A1": ["A2"], "A2": ["A1", "A3"], "A3": ["A2"]}
 
 
 def test_a_joint_touches_its_mirror_image():

@@ -1,4 +1,4 @@
-"""A run that was broken off continues to the same bits; a file that does not belong to it is never used."""
+"""Bitwise restart of an interrupted run, and rejection of foreign checkpoint files."""
 
 import signal
 import subprocess
@@ -55,20 +55,20 @@ def break_off(solder, path, steps=BREAK):
         solve_joint(JOINT, solder, stop, checkpoint=Checkpoint(path, (JOINT, solder), 0.0))
 
 
-def check_equal(found, expected):
+def check_equal(actual, expected):
     for field in fields(expected):
-        given = getattr(expected, field.name)
-        if isinstance(given, np.ndarray):
-            assert np.array_equal(getattr(found, field.name), given), field.name
-    assert all(np.array_equal(found.history[name], column) for name, column in expected.history.items())
-    assert len(found.snapshots) == len(expected.snapshots)
-    for one, other in zip(found.snapshots, expected.snapshots, strict=True):
-        assert one.time == other.time
-        assert np.array_equal(one.points, other.points)
-    assert {name: value for name, value in found.metrics.items() if name not in CLOCK} == {
+        expected_value = getattr(expected, field.name)
+        if isinstance(expected_value, np.ndarray):
+            assert np.array_equal(getattr(actual, field.name), expected_value), field.name
+    assert all(np.array_equal(actual.history[name], column) for name, column in expected.history.items())
+    assert len(actual.snapshots) == len(expected.snapshots)
+    for snapshot, other in zip(actual.snapshots, expected.snapshots, strict=True):
+        assert snapshot.time == other.time
+        assert np.array_equal(snapshot.points, other.points)
+    assert {name: value for name, value in actual.metrics.items() if name not in CLOCK} == {
         name: value for name, value in expected.metrics.items() if name not in CLOCK
     }
-    assert found.verdict == expected.verdict
+    assert actual.verdict == expected.verdict
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +123,7 @@ def test_a_broken_or_foreign_file_starts_the_run_anew(tmp_path, caplog, damage):
     checkpoint = Checkpoint(path, ("inputs",))
     assert checkpoint.read() is None
     assert f"{path}" in caplog.text
-    assert "the run starts anew" in caplog.text
+    assert "the run starts from the beginning" in caplog.text
     assert not checkpoint.continued
     assert not marker.exists()
 
@@ -136,7 +136,7 @@ def test_a_reflow_beside_a_forged_checkpoint_starts_anew(tmp_path, caplog, unint
     checkpoint = Checkpoint(path, (JOINT, QUASI_STATIC))
     check_equal(solve_joint(JOINT, QUASI_STATIC, checkpoint=checkpoint), uninterrupted)
     assert not checkpoint.continued
-    assert "the run starts anew" in caplog.text
+    assert "the run starts from the beginning" in caplog.text
     assert not marker.exists()
 
 

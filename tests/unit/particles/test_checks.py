@@ -51,9 +51,9 @@ def test_joints_overflow_where_the_package_is_lowest_even_if_no_meridian_is_foun
     solder, drawn = Solder(volume=0.0724e-9, effects=SolderEffects(inertia="on")), GEOMETRIES.values()
     assert unverified_joints(drawn, solder) is None
     assert unverified_joints(drawn, solder, -0.02e-3) is None
-    for way in (-0.17e-3, -0.26e-3):  # a flat joint of 0.05 mm has no meridian that is found
+    for way in (-0.17e-3, -0.26e-3):  # no meridian is available for a flat joint of 0.05 mm
         assert f"gap of {0.31 + 1e3 * way:.4g} mm" in unverified_joints(drawn, solder, way)
-    assert unverified_joints(drawn, solder, -0.32e-3) is None  # has no room at all, which other checks tell
+    assert unverified_joints(drawn, solder, -0.32e-3) is None  # no room at all, reported by other checks
 
 
 def test_a_slip_length_belongs_to_a_wall_with_slip():

@@ -18,7 +18,7 @@ from reflowshock.particles.surface.contact_line import (
     PINNED,
     RECEDING,
     ContactLine,
-    RubbingLine,
+    FrictionLine,
 )
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
@@ -38,7 +38,7 @@ def line_on(body, state=PINNED, pad=PAD):
 
 
 def load_of_angle(body, line, angle):
-    """Forces with which a surface at this contact angle pulls on the line, gamma = 1."""
+    """Return the forces of a surface at a contact angle on the line, gamma = 1."""
     load = np.zeros_like(body.points)
     radial, length = line.outward(body)
     load[body.cloud.rings[0]] = -np.cos(angle) * length[:, None] * radial
@@ -82,7 +82,7 @@ def test_a_vertex_near_the_edge_is_caught_where_the_edge_would_hold_it(body):
 
 
 def test_a_vertex_that_a_step_stopped_at_an_edge_is_held_for_the_next_one(body):
-    """While the others arrive: the angle of the first that is stopped is no longer that of the moving line."""
+    """The first stopped vertex stays pinned while the others arrive, although its angle differs."""
     line, ring = line_on(body, ON_MASK), body.cloud.rings[0]
     body.points[ring, :2] *= 1.03
     body.points[ring[4], :2] *= 0.97 / 1.03
@@ -132,7 +132,7 @@ def test_wetting_force_is_the_gradient_of_its_energy_and_vanishes_at_right_angle
 
 
 def test_wetting_energy_is_continuous_at_the_edge_and_falls_along_the_force(body):
-    """Half of the line on the mask: a vertex that leaves the edge takes no energy along, and does the force's work."""
+    """With half of the line on the mask, the energy change of a vertex leaving the edge is the work of its force."""
     line, ring = line_on(body), body.cloud.rings[0]
     wetting, count = Wetting(2.0, (line,), ()), len(body.cloud.rings[0]) // 2
     line.state[:count] = ON_MASK
@@ -151,7 +151,7 @@ def test_wetting_energy_is_continuous_at_the_edge_and_falls_along_the_force(body
 
 @pytest.mark.parametrize("degrees", [2.0, 155.0])
 def test_wetting_energy_does_not_jump_where_an_edge_releases_and_catches_a_vertex_of_an_uneven_line(body, degrees):
-    """Vertices that left an edge and came back are no longer evenly spaced along it."""
+    """Vertices that left an edge and returned are unevenly spaced along it."""
     line, ring = line_on(body, pad=np.radians(40.0)), body.cloud.rings[0]
     angle = 2.0 * np.pi * (np.arange(len(ring)) + 0.2 * np.sin(np.arange(len(ring)))) / len(ring)
     body.points[ring, :2] = line.edges[0] * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -166,7 +166,7 @@ def test_wetting_energy_does_not_jump_where_an_edge_releases_and_catches_a_verte
 
 
 def test_wetting_force_is_the_gradient_of_its_energy_where_vertices_differ():
-    """Vertices on the pad, on the mask and at the edge, in any order, on a plate that leans."""
+    """Vertices lie on pad, mask and edge in any order, on a tilted plate."""
     body = Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.6, (0.3, 0.0), (0.0, 0.1)), 2.2, 0.2))
     random = np.random.default_rng(3)
     ring, plate = body.cloud.rings[1], body.plates[1]
@@ -187,7 +187,7 @@ def test_wetting_force_is_the_gradient_of_its_energy_where_vertices_differ():
 
 
 def stadium(half_length, radius, count):
-    """Points `(4 count, 3)` along a stadium about (-half_length, 0) and (half_length, 0), counter-clockwise."""
+    """Return counter-clockwise points of a stadium about (-half_length, 0) and (half_length, 0), shape (4 count, 3)."""
     angle = np.linspace(-0.5, 0.5, count, endpoint=False) * np.pi
     arc = np.column_stack((half_length + radius * np.cos(angle), radius * np.sin(angle)))
     side = np.column_stack((np.linspace(half_length, -half_length, count, endpoint=False), np.full(count, radius)))
@@ -196,7 +196,7 @@ def stadium(half_length, radius, count):
 
 
 def line_over_pads(points, pads, corners=60):
-    """A line and as much of a body as a line looks at."""
+    """Return a contact line and the required part of a body."""
     ring = np.arange(len(points), dtype=np.int32)
     cloud = SimpleNamespace(points=points, rings=(ring,), spacing=0.1, symmetry=(), parts=1)
     body = SimpleNamespace(points=points, plates=(Plate.horizontal(0.0),), cloud=cloud)
@@ -207,9 +207,9 @@ PAIR = (Pad((-1.0, 0.0), 0.5, PAD), Pad((1.0, 0.0), 0.5, PAD))
 
 
 def test_a_line_around_two_pads_wets_the_mask_between_them():
-    """Pinned at the far side of both pads, on the mask between: the sides enclose 2 x 1, of which two half discs."""
+    """The line is pinned at both outer pad edges and free on the mask: its sides enclose 2 x 1 with two half discs."""
     line, body = line_over_pads(stadium(1.0, equal_area_radius(0.5, 60), 31), PAIR)
-    assert line.held_pads() == {0, 1}
+    assert line.wetted_pads() == {0, 1}
     assert verdict((line,), ruptured=False) == "bridged"
     assert (line.state == PINNED).sum() == 2 * 32  # the arcs and the first vertex of each side
     assert line.cosine_area(body) == pytest.approx(np.cos(MASK) * (2.0 * 1.0 - 0.25 * np.pi), rel=1e-2)
@@ -231,7 +231,7 @@ def test_the_energy_around_two_pads_falls_along_the_force():
 
 
 def test_a_line_steps_onto_a_pad_that_it_comes_to_and_stops_at_its_far_edge():
-    """A round line about the left pad grows until it has crossed the right one."""
+    """A circular line about the left pad grows until it has crossed the right pad."""
     angle = 2.0 * np.pi * np.arange(200) / 200
     circle = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(200)))
     line, body = line_over_pads(1.4 * circle - (1.0, 0, 0), PAIR)
@@ -239,25 +239,25 @@ def test_a_line_steps_onto_a_pad_that_it_comes_to_and_stops_at_its_far_edge():
     for radius in (1.4, 1.8, 2.2, 2.6):
         body.points = np.where((line.state == PINNED)[:, None], body.points, radius * circle - (1.0, 0, 0))
         line.update(body, load_of_angle(body, line, np.radians(120.0)), 1.0)
-        reached.append((line.held_pads(), int(line.state[0])))
+        reached.append((line.wetted_pads(), int(line.state[0])))
     assert reached == [(set(), ON_MASK), ({1}, ON_PAD), ({1}, ON_PAD), ({1}, PINNED)]
     assert body.points[0] == pytest.approx((1.0 + line.edges[1], 0.0, 0.0))
 
 
 def test_friction_holds_a_line_or_opposes_its_motion():
-    """Vertices that stand are let go where the wall cannot hold them, those that turn are held; friction takes."""
+    """Pinned vertices are released beyond the limit, reversing vertices are pinned, and friction dissipates energy."""
     body = Body.at_rest(box_cloud(1.0, 5))
     ring = body.cloud.rings[0]
-    line = RubbingLine(0, np.radians(60.0), np.radians(120.0), body.points[ring])
+    line = FrictionLine(0, np.radians(60.0), np.radians(120.0), body.points[ring])
     across, zero = line._area_gradient(body), np.zeros_like(body.points)
     needed = zero.copy()
     needed[ring] = np.resize([0.4, -0.4, 0.6, -0.6], len(ring))[:, None] * across
-    assert not line.settle(body, zero, needed, releases=False)
-    assert line.settle(body, zero, needed, releases=True)
+    assert not line.update_states(body, zero, needed, releases=False)
+    assert line.update_states(body, zero, needed, releases=True)
     assert np.array_equal(line.state, np.resize([PINNED, PINNED, RECEDING, ADVANCING], len(ring)))
     inward, outward = -np.resize([0.0, 0.0, 1.0, -1.0], len(ring)), zero.copy()
     outward[ring] = inward[:, None] * across
     assert (line.friction(body) * outward[ring]).sum() < 0.0
-    assert not line.settle(body, outward, needed, releases=False)
-    assert line.settle(body, -outward, needed, releases=False)
+    assert not line.update_states(body, outward, needed, releases=False)
+    assert line.update_states(body, -outward, needed, releases=False)
     assert (line.state == PINNED).all()

@@ -1,4 +1,4 @@
-"""Whole steps on a GPU: in Numba's simulator they are those of threads; without a GPU they are refused."""
+"""Complete GPU steps equal CPU steps in Numba's simulator and are rejected without a GPU."""
 
 import os
 import subprocess
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
 SIMULATED = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
 PROGRAM = """
 import copy, sys, numpy as np
-from tests.unit.particles.test_cuda_loops import SCENES, found_of, stirred
+from tests.unit.particles.test_cuda_loops import SCENES, results_of, stirred
 simulation = stirred(sys.argv[1], "cuda")
 assert "reflowshock.particles.sph.cuda_loops" in sys.modules
 saved = copy.deepcopy(simulation.saved())
@@ -36,7 +36,7 @@ for name in ("x", "z", "u", "w", "density", "mass", "viscosity"):
 for one in (simulation, again):
     one.step(1e-3 * one.time_step())
 assert all(np.array_equal(*pair) for pair in zip(simulation.fields, again.fields))
-np.savez(sys.argv[2], **found_of(simulation))
+np.savez(sys.argv[2], **results_of(simulation))
 """
 TANK = {"height": 0.6, "width": 0.6, "tank_length": 1.2, "sensor_height": 0.12, "duration": 0.02}
 INK = {
@@ -68,7 +68,7 @@ SCENES = {scene.__name__: scene for scene in (small_dam, small_channel, small_im
 
 
 def stirred(scene: str, device: str) -> Simulation:
-    """A flow a few steps after it was stirred at random, so that neighbours are found anew."""
+    """Return a flow some steps after a random disturbance, so that neighbour lists are rebuilt."""
     start, random = SCENES[scene](device), np.random.default_rng(7)
     fields, liquid = start.fields, slice(start.fluids)
     for speed in (fields.u, fields.w):
@@ -79,15 +79,18 @@ def stirred(scene: str, device: str) -> Simulation:
     return simulation
 
 
-def found_of(simulation: Simulation) -> dict[str, np.ndarray]:
-    """What is compared, in rows of equal size."""
-    found = {"fields": np.array(simulation.fields[:12]), "rates": simulation.rates}
+def results_of(simulation: Simulation) -> dict[str, np.ndarray]:
+    """Return the compared results, in rows of equal size."""
+    result = {"fields": np.array(simulation.fields[:12]), "rates": simulation.rates}
     if simulation.surface:
-        found["surface"] = simulation.surface.points.T
-    return found | {"viscosity": simulation.fields.viscosity[None], "builds": np.array([[simulation.particles.builds]])}
+        result["surface"] = simulation.surface.points.T
+    return result | {
+        "viscosity": simulation.fields.viscosity[None],
+        "builds": np.array([[simulation.particles.builds]]),
+    }
 
 
-# The simulator takes minutes for the others, whose kernels are compiled for the channel as well.
+# The simulator takes minutes for the other flows; the channel compiles the same kernels.
 QUICK = ("small_channel",)
 
 
@@ -100,10 +103,10 @@ def test_a_gpu_computes_what_threads_compute(scene, tmp_path):
     assert simulation.particles.builds > 1
     command = [sys.executable, "-c", PROGRAM, scene, str(tmp_path / "found.npz")]
     subprocess.run(command, env=os.environ | SIMULATED, cwd=ROOT, check=True, timeout=600)
-    with np.load(tmp_path / "found.npz") as found:
-        for name, here in found_of(simulation).items():
+    with np.load(tmp_path / "found.npz") as archive:
+        for name, here in results_of(simulation).items():
             largest = np.abs(here).max(axis=1, keepdims=True, initial=0.0)
-            assert np.allclose(found[name], here, rtol=1e-9, atol=1e-9 * largest.max()), name
+            assert np.allclose(archive[name], here, rtol=1e-9, atol=1e-9 * largest.max()), name
 
 
 def test_without_a_gpu_a_case_that_asks_for_one_is_refused():

@@ -27,7 +27,7 @@ DESCENDS = SimpleNamespace(traits=SolverTraits(support=2.0, descends=True))
 
 
 def joint():
-    """A joint between pads of unequal size, which hold its rims."""
+    """Return a joint between pads of unequal size with pinned contact lines."""
     cloud = joint_cloud(JointGeometry(GAP, *RADII), 3.07, 0.3)
     lines = []
     for wall, (ring, radius) in enumerate(zip(cloud.rings, RADII, strict=True)):
@@ -37,12 +37,12 @@ def joint():
 
 
 def drop():
-    """A free drop."""
+    """Return a free drop."""
     return Body.at_rest(free_box_cloud(1.0, 6)), Physics(TENSION, (), (), (), ())
 
 
 def lowered(body, physics, steps):
-    """The body after some steps along its forces at constant volume."""
+    """Return the body after some steps along its forces at constant volume."""
     volume = body.volume()[0]
     for _ in range(steps):
         force, slope = (physics.admit(body, field) for field in (physics.force(body), body.volume()[1]))
@@ -60,22 +60,22 @@ def smoothed(body, physics, highest, flips):
 
 
 def test_smoothing_uses_up_the_energy_that_it_may_take_and_no_more():
-    """Close to its least energy a joint has uneven triangles: to make them even raises the energy by 1e-4."""
+    """Near the energy minimum a joint has uneven triangles: full smoothing raises the energy by 1e-4."""
     start, physics = joint()
     body = lowered(start, physics, 150)
     low = physics.energy(body)
     rise = smoothed(body, physics, np.inf, flips=False)[0] - low
     assert rise > 5e-5 * low
-    for given in (0.0, 0.3, 0.9):
-        energy, volume, flips = smoothed(body, physics, low + given * rise, flips=False)
-        assert given - 1.1e-4 * given - 1e-9 <= (energy - low) / rise <= given
+    for budget in (0.0, 0.3, 0.9):
+        energy, volume, flips = smoothed(body, physics, low + budget * rise, flips=False)
+        assert budget - 1.1e-4 * budget - 1e-9 <= (energy - low) / rise <= budget
         assert volume == pytest.approx(1.0, abs=1e-12)
         assert flips == 0
     assert smoothed(body, physics, low - 0.1 * rise, flips=True)[2] is None
 
 
 def test_flips_that_raise_the_energy_are_left_out():
-    """The other diagonal of a quadrangle that is not flat may have more area on both of its sides."""
+    """The other diagonal of a non-planar quadrilateral can have a larger area on both sides."""
     start, physics = drop()
     body = lowered(start, physics, 400)
     low = physics.energy(body)
@@ -110,13 +110,13 @@ def test_momentum_plates_that_are_moved_and_friction_may_raise_the_energy():
 
 @dataclass
 class Edge:
-    """An event on trial that pulls a vertex out of the surface, by more than a step makes up for or less."""
+    """Trial event that pulls a vertex out of the surface by less or more than a step compensates."""
 
     pull: float
     attempts: int = 0
 
     def update(self, body):
-        """Nothing."""
+        """Do nothing."""
 
     def attempt(self, body):
         self.attempts += 1
@@ -126,7 +126,7 @@ class Edge:
 
 
 def begun(steps):
-    """A free drop after some steps, to the same bits each time."""
+    """Return a free drop after some steps, bitwise reproducible."""
     body, physics = drop()
     flow = LiquidFlow(
         body, replace(physics, operators=(Mass(1.0), *TENSION)), TimeStep(0.05, 0.2, 0.05), Relaxation(1.0)
@@ -136,8 +136,8 @@ def begun(steps):
     return flow
 
 
-@pytest.mark.parametrize(("pull", "kept"), [(1e-6, True), (0.1, False)])
-def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull, kept):
+@pytest.mark.parametrize(("pull", "is_accepted"), [(1e-6, True), (0.1, False)])
+def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull, is_accepted):
     flow, plain = begun(30), begun(30)
     body, edge, energy = flow.body, Edge(pull), flow.physics.energy(flow.body)
     flow.physics = replace(flow.physics, events=(edge,))
@@ -146,7 +146,7 @@ def test_what_is_on_trial_is_undone_where_the_step_does_not_make_up_for_it(pull,
     assert edge.attempts == 1
     assert flow.physics.energy(flow.body) <= energy * (1.0 + 1e-9)
     surface = slice(body.cloud.surface_count)
-    assert (np.abs(flow.body.points - plain.body.points)[surface].max() < 1e-12) != kept
+    assert (np.abs(flow.body.points - plain.body.points)[surface].max() < 1e-12) != is_accepted
     assert flow.time_step.binding != "energy"
 
 

@@ -10,10 +10,17 @@ from reflowshock.particles.flows.droplet_metrics import base_width, outcome
 from reflowshock.particles.flows.flow_effects import decide_flow
 from reflowshock.particles.scenes.products import read_flow, write_flow
 from reflowshock.particles.sph import flow
+from reflowshock.particles.sph.capillary_forces import (
+    Capillarity,
+    contact_cosines,
+    outward_along,
+    over_sliding_velocity,
+)
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import SurfaceLost, cosines_of, is_folded, outward_along, sliding
 from reflowshock.particles.sph_flows.droplet import droplet, solve_droplet, width
+from reflowshock.particles.surface.remeshing import is_folded
+from reflowshock.particles.surface.surface_mesh import SurfaceLost, SurfaceMesh
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 0.02}
 COARSE = DropletNumerics(particles_per_diameter=8)
@@ -33,10 +40,10 @@ def test_a_drop_has_its_volume_and_its_surface_encloses_it():
 
 
 def test_a_half_sphere_starts_with_its_contact_line_on_the_wall_and_loses_energy_from_then_on():
-    """Some of its line was above the wall: the first step put it there, and the volume was 3 % too large."""
+    """If part of the line starts above the wall, the volume is 3 % too large."""
     simulation = droplet(drop(contact_angle=0.5 * np.pi))
     surface = simulation.surface
-    assert not any(surface.points[ring, 2].any() for ring in surface.rings)
+    assert not any(surface.points[ring, 2].any() for ring in surface.mesh.rings)
     energy = surface.energy
     for _ in range(3):
         simulation.step(simulation.time_step())
@@ -57,14 +64,14 @@ def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy_at_its_press
     surface = droplet(drop(contact_angle=1.0)).surface
     forces, random = surface.forces(), np.random.default_rng(5)
     direction = random.normal(size=surface.points.shape)
-    for ring in surface.rings:
+    for ring in surface.mesh.rings:
         direction[ring, 2] = 0.0
     step, start, pressure = 1e-6, surface.points.copy(), surface.pressure
     energies = []
     for sign in (1.0, -1.0):
-        surface.points = start + sign * step * direction
+        surface.mesh.points = start + sign * step * direction
         energies.append(surface.energy - pressure * surface.volume)
-    surface.points = start
+    surface.mesh.points = start
     work = -(energies[0] - energies[1]) / (2.0 * step)
     assert work == pytest.approx((forces * direction).sum(), rel=1e-6)
     free = droplet(drop()).surface
@@ -72,11 +79,11 @@ def test_forces_of_the_surface_are_minus_the_gradient_of_its_energy_at_its_press
 
 
 def test_a_sphere_of_liquid_rests_under_the_pressure_of_its_surface():
-    """Tension and pressure leave little on vertices of an uneven triangulation; particles are shifted nowhere."""
+    """Tension and pressure nearly cancel on an uneven triangulation, and particles do not drift."""
     scene = drop()
     simulation = droplet(scene)
     surface = simulation.surface
-    forces, pull = surface.forces(), surface.pressure * np.linalg.norm(surface._outward(), axis=1)
+    forces, pull = surface.forces(), surface.pressure * np.linalg.norm(surface.mesh.outward_areas(), axis=1)
     assert surface.pressure == pytest.approx(scene.laplace_pressure, rel=0.01)
     assert simulation.pressures == pytest.approx(surface.pressure)
     assert np.linalg.norm(forces, axis=1).mean() < 0.1 * pull.mean()
@@ -96,7 +103,7 @@ def test_forces_that_particles_share_keep_momentum_and_work():
     before = surface.points.copy()
     surface.move(velocity, 1e-3, scene_volume := surface.volume)
     moved = (surface.points - before) / 1e-3
-    simulation.surface.points = before
+    surface.mesh.points = before
     work = (surface.forces() * moved).sum()
     assert work == pytest.approx((rates[1:4] * velocity * fields.mass).sum(), rel=1e-9)
     assert scene_volume > 0.0
@@ -132,7 +139,7 @@ def test_a_mirror_does_what_images_would():
 
 
 def test_a_tank_in_space_rests_under_its_weight():
-    """A periodic layer on a mirror: pressure as deep as it lies, 2 %."""
+    """In a periodic layer on a mirror the pressure is hydrostatic within 2 %."""
     spacing, deep = 0.1, 12
     places, heights = np.arange(8) + 0.5, np.arange(deep) + 0.5
     points = spacing * np.stack(np.meshgrid(places, places, heights, indexing="ij")).reshape(3, -1)
@@ -167,7 +174,8 @@ def test_widths_of_a_cap_are_found():
 def test_liquid_that_left_its_surface_is_refused():
     simulation = droplet(drop())
     surface = simulation.surface
-    lost = LiquidSurface(surface.points + 5.0, surface.triangles, 1.0, 0.0, surface.law)
+    mesh = SurfaceMesh(surface.points + 5.0, surface.triangles, surface.law.spacing, has_wall=False)
+    lost = LiquidSurface(mesh, Capillarity(1.0, 0.0, surface.law))
     with pytest.raises(SurfaceLost, match="left its surface"):
         lost.add_to(simulation.rates, simulation.fields, simulation.fluids)
 
@@ -185,14 +193,14 @@ def test_a_surface_without_particles_ends_the_run_in_words(monkeypatch):
 def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     simulation = droplet(drop(speed=3.0))
     surface = simulation.surface
-    assert not surface.rings
+    assert not surface.mesh.rings
     while simulation.time < 0.15:
         simulation.step(simulation.time_step())
-    assert len(surface.rings) == 1
+    assert len(surface.mesh.rings) == 1
     area, volume = surface.wetted_area, surface.volume
     assert area > 0.1
-    surface._make_anew("worn")
-    assert surface.rebuilds == 1
+    surface.remeshing.rebuild(surface.mesh, "worn", surface.capillarity.energy)
+    assert surface.remeshing.rebuilds == 1
     assert surface.wetted_area == pytest.approx(area, rel=0.2)  # a foot of a spacing is closed, of 8 across
     assert surface.volume == pytest.approx(volume, rel=0.03)
     simulation.step(simulation.time_step())
@@ -220,52 +228,52 @@ def test_a_drop_that_does_not_wet_its_wall_rebounds():
         ((0.0, 0.9), 1, 2, "stays on the wall, sheds satellites"),
     ],
 )
-def test_what_became_of_a_drop_is_told_in_words(foot, parts, shed, words):
+def test_outcome_of_an_impact_in_words(foot, parts, shed, words):
     history = {"foot": np.array(foot), "parts": np.array([1.0, parts]), "shed": np.array([0.0, shed])}
     assert outcome(history) == words
 
 
-def test_what_strikes_fast_is_told_how_wide_such_drops_spread():
-    told = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
-    assert told == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by that of computed ones"
+def test_fast_impacts_report_the_expected_spread():
+    spread = solve_droplet(drop(weber=100.0, reynolds=1000.0, duration=1e-4)).words["spread_expected"]
+    assert spread == "2.67 to 2.83 D by correlations of measured drops, 3.15 D by a correlation of computed drops"
     assert "spread_expected" not in solve_droplet(drop(weber=8.0, reynolds=7.7, duration=1e-4)).words
 
 
 def test_a_wall_holds_a_contact_line_at_rest_and_one_that_moves_has_its_angle():
     outward, push = np.array([[2.0, 0.0], [0.0, 2.0]]), np.array([[0.6, 0.0], [0.0, -0.6]])
-    held = cosines_of((-0.5, 0.4), outward, push, np.zeros((2, 2)))
+    held = contact_cosines(-0.5, 0.4, outward, push, np.zeros((2, 2)))
     assert held[:, 0] == pytest.approx([-0.3, 0.3])
-    assert cosines_of((-0.5, 0.4), outward, push, 0.1 * outward)[:, 0] == pytest.approx([-0.5, 0.1])
-    assert cosines_of((-0.5, 0.4), outward, push, -outward)[:, 0] == pytest.approx([0.4, 0.4])
+    assert contact_cosines(-0.5, 0.4, outward, push, 0.1 * outward)[:, 0] == pytest.approx([-0.5, 0.1])
+    assert contact_cosines(-0.5, 0.4, outward, push, -outward)[:, 0] == pytest.approx([0.4, 0.4])
 
 
 @pytest.mark.parametrize("across", [8, 12])
 def test_friction_takes_less_than_the_velocity_of_a_contact_line_in_a_step(across):
-    """Shares W, masses m, lengths L: dv/dt = -gamma W / m W^T L v / v_sliding; to take all is unstable."""
+    """With weights W, masses m, lengths L: dv/dt = -gamma W / m W^T L v / v_sliding; full removal is unstable."""
     numerics = DropletNumerics(particles_per_diameter=across)
     simulation = droplet(drop(contact_angle=0.5 * np.pi, advancing_angle=2.0, numerics=numerics))
     simulation.step(simulation.time_step())
-    surface, (offsets, indices) = simulation.surface, simulation.surface._lists
-    (ring,) = surface.rings
+    surface, (offsets, indices) = simulation.surface, simulation.surface.coupling.lists
+    (ring,) = surface.mesh.rings
     shares = np.zeros((len(ring), len(simulation.fields.mass)))
     for row, vertex in zip(shares, ring, strict=True):
         pairs = slice(offsets[vertex], offsets[vertex + 1])
-        row[indices[pairs]] = surface._shares[0, pairs]
+        row[indices[pairs]] = surface.coupling.shares[0, pairs]
     lengths = np.linalg.norm(outward_along(surface.points[ring]), axis=1)
-    slowness = sliding(np.ones((1, 3)), surface.tension, simulation.law)[0, 0]
+    slowness = over_sliding_velocity(np.ones((1, 3)), surface.tension, simulation.law)[0, 0]
     taken = surface.tension * slowness * (shares / simulation.fields.mass) @ shares.T * lengths
     assert 0.2 < simulation.time_step() * np.abs(np.linalg.eigvals(taken)).max() < 0.5
 
 
 def test_threads_change_no_droplet(every_thread):
-    found = []
+    results = []
     for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation = droplet(drop(speed=3.0))
         for _ in range(15):
             simulation.step(simulation.time_step())
-        found.append(np.array(simulation.fields[:8]))
-    assert np.array_equal(*found)
+        results.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*results)
 
 
 def test_a_droplet_continues_to_the_same_bits(tmp_path):
@@ -293,8 +301,8 @@ def test_a_droplet_continues_to_the_same_bits(tmp_path):
 
 def test_effects_of_a_droplet_follow_from_its_numbers():
     small = drop(diameter=1e-4, density=1e3, surface_tension=0.07, viscosity=1e-3, contact_angle=1.0)
-    told = decide_flow(small)
-    assert not told["droplet_gravity"]["on"] and told["droplet_tension"]["on"]
+    decisions = decide_flow(small)
+    assert not decisions["droplet_gravity"]["on"] and decisions["droplet_tension"]["on"]
     large = small.model_copy(update={"diameter": 2e-3})
     assert decide_flow(large)["droplet_gravity"]["on"]
     assert not decide_flow(large.model_copy(update={"contact_angle": None}))["droplet_gravity"]["on"]

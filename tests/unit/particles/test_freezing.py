@@ -1,4 +1,4 @@
-"""Freezing: layer growth on a cold plate against Neumann's exact solution, conservation of heat, a freezing drop."""
+"""Freezing on a cold plate: Neumann's exact layer growth, heat conservation and a freezing drop."""
 
 from math import erf, exp, pi, sqrt
 
@@ -80,7 +80,7 @@ def test_enthalpy_and_temperature_are_inverse_outside_the_latent_heat():
 
 
 def frozen(restart_after=None):
-    """Let a drop of solder land on a plate and freeze; return it and the particles that were solid halfway."""
+    """Run the landing and freezing of a solder drop; return it and the particles solid at half time."""
     scene = Printing(
         drop_volume=2.5e-13, surface_tension=0.345, viscosity=1.3e-3, speed=1.5, delay=1.0, pitch=1e-4, columns=1,
         rows=1, density=DENSITY, freezing=Freezing(**SOLDER), numerics=PrintingNumerics(particles_per_diameter=8),
@@ -109,7 +109,7 @@ def test_a_drop_freezes_from_the_plate_upwards_and_frozen_particles_stay_fixed()
     assert np.array_equal(deposit.points[solid], points[solid])
     assert (deposit.state == SOLID).all() and len(deposit.bodies) == 1
     top = deposit.points[:, 2].max() + 0.5 * scene.spacing
-    assert 0.7 < deposit.time / scene.freezing.time_for(top, DENSITY) < 1.6  # a drop is not an infinite layer
+    assert 0.7 < deposit.time / scene.freezing.time_for(top, DENSITY) < 1.6  # finite size of the drop
     _, again, _ = frozen(restart_after=150)
     assert np.array_equal(again.points, deposit.points) and again.time == deposit.time
 

@@ -247,11 +247,11 @@ def test_factors_of_an_earlier_matrix_solve_and_are_restored():
     assert exact == pytest.approx(np.linalg.solve(first, right))
     few = factors.iterations
     again.restore(factors.saved())
-    found = factors.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
-    assert found == pytest.approx(np.linalg.solve(now, right))
+    solution = factors.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
+    assert solution == pytest.approx(np.linalg.solve(now, right))
     assert factors.iterations > few
     same = again.solve(now.__matmul__, lambda: pytest.fail("the factors are there"), right, tolerance)
-    assert np.array_equal(found, same)
+    assert np.array_equal(solution, same)
 
 
 def test_a_matrix_without_factors_is_an_error():
@@ -311,7 +311,7 @@ def shaken_inside(ball):
 
 
 def test_no_mode_of_the_linearised_scheme_grows(ball):
-    """Squared frequencies of m v' = -K x + B^T p, x' = v, B v = 0 are positive; those of the second mode are 8.
+    """Squared frequencies of m v' = -K x + B^T p, x' = v, B v = 0 are positive, and 8 for the second mode.
 
     A mode is weighted by its share of the divergence-free linear velocities; grid modes have almost none.
     """
@@ -341,7 +341,7 @@ def test_a_swing_keeps_its_momenta(ball):
     motions, state = rigid_motions(flow.body.points), flow.solver.state
     size = np.sqrt(2.0 * state.kinetic * np.array([(motion**2).sum(axis=1).mean() for motion in motions]))
     assert state.kinetic > 0.05
-    assert state.momenta / size == pytest.approx(0.0, abs=1e-6)  # what the linear solve leaves
+    assert state.momenta / size == pytest.approx(0.0, abs=1e-6)  # tolerance of the linear solver
 
 
 def test_a_swing_keeps_its_centre(ball):

@@ -21,46 +21,46 @@ def points():
 
 
 def test_images_equal_a_loop_over_particles(points):
-    """Twin: the reflection formula, one particle at a time."""
+    """The twin applies the reflection formula to one particle at a time."""
     plate = tilted()
-    found = mirror(points, (plate,), REACH)
+    images = mirror(points, (plate,), REACH)
     expected, source = [], []
     for number, point in enumerate(points):
         height = float((point - plate.origin) @ plate.normal)
         if 1e-6 * REACH < height < REACH:
             expected.append(point - 2.0 * height * plate.normal)
             source.append(number)
-    assert found.source.tolist() == source
-    assert found.points == pytest.approx(np.array(expected))
+    assert images.source.tolist() == source
+    assert images.points == pytest.approx(np.array(expected))
 
 
 def test_particles_on_the_wall_are_their_own_image(points):
-    found = mirror(points, (Plate.horizontal(0.0),), REACH)
-    assert not set(found.source) & set(range(20))
+    images = mirror(points, (Plate.horizontal(0.0),), REACH)
+    assert not set(images.source) & set(range(20))
 
 
 def test_an_edge_between_two_walls_has_images_of_both():
     side = Plate(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
-    found = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
+    images = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
     expected = [[-0.1, 0.5, -0.1], [-0.1, 0.5, 0.1], [0.1, 0.5, -0.1]]
-    assert np.array(sorted(found.points.tolist())) == pytest.approx(np.array(expected))
-    velocity = found.vector(1) @ np.array([1.0, 2.0, 3.0])
-    assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *found.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
+    assert np.array(sorted(images.points.tolist())) == pytest.approx(np.array(expected))
+    velocity = images.vector(1) @ np.array([1.0, 2.0, 3.0])
+    assert pytest.approx(np.sign([[0.1, 0.5, 0.1], *images.points]) * [1.0, 2.0, 3.0]) == velocity.reshape(3, -1).T
 
 
 @pytest.mark.parametrize("slip", [np.inf, 0.1, 0.0])
 def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
-    """Rigid motion of plate and liquid: that of the images, those of images at a second plate included."""
+    """Images follow the rigid motion of plate and liquid, including images at a second plate."""
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (tilted(), Plate.horizontal(0.4, side=1.0))
     twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
-    found = mirror(points, plates, 2.0 * REACH, [slip, slip])
+    mirrored = mirror(points, plates, 2.0 * REACH, [slip, slip])
     other = np.concatenate((twist[:3] + np.cross(twist[3:], plates[1].origin - plates[0].origin), twist[3:]))
     moving = plates[0].rigid_velocity(twist, points)
-    images = np.einsum("gcd,gd->gc", found.reflection, moving[found.source])
-    images += found.drift(points, plates, {0: twist, 1: other})
-    assert set(found.parent) - set(range(30))
-    assert images == pytest.approx(plates[0].rigid_velocity(twist, found.points))
+    images = np.einsum("gcd,gd->gc", mirrored.reflection, moving[mirrored.source])
+    images += mirrored.drift(points, plates, {0: twist, 1: other})
+    assert set(mirrored.parent) - set(range(30))
+    assert images == pytest.approx(plates[0].rigid_velocity(twist, mirrored.points))
 
 
 def test_a_plate_that_slides_takes_nothing_along_without_friction():
@@ -71,7 +71,7 @@ def test_a_plate_that_slides_takes_nothing_along_without_friction():
 
 
 def gradients(basis):
-    """Gradients at the particles of a wall, of an even and of a mirrored vector field."""
+    """Return gradients at wall particles, of an even field and a mirrored vector field."""
     axis = np.linspace(0.0, 1.0, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     cloud += np.random.default_rng(8).uniform(-0.02, 0.02, cloud.shape) * (cloud[:, 2:] > 0.0)
@@ -89,13 +89,13 @@ def gradients(basis):
 
 @pytest.mark.parametrize("basis", ["linear", "quadratic"])
 def test_linear_fields_that_fit_the_wall_are_exact_on_it(basis):
-    """A scalar without slope across the wall, and a velocity that slips along it."""
+    """The fields are a scalar without normal gradient and a velocity along the wall."""
     exact = np.array([[2.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.0, 0.0, 2.0]])
     assert gradients(basis) == pytest.approx(np.broadcast_to(exact[:, :, None], gradients(basis).shape), abs=1e-9)
 
 
 def test_a_quadratic_even_field_is_exact_at_the_wall():
-    """u = x^2 - z^2 is even in z: its Laplacian vanishes on the wall, its slope across it as well."""
+    """For the even field u = x^2 - z^2 the Laplacian and the normal gradient vanish on the wall."""
     axis = np.linspace(-0.5, 0.5, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis + 0.5, indexing="ij"), axis=-1).reshape(-1, 3)
     ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)

@@ -1,4 +1,4 @@
-"""Parts of the printed scheme against exact fields and printed sums."""
+"""Parts of the published scheme against exact fields and published sums."""
 
 import numpy as np
 import pytest
@@ -33,14 +33,14 @@ def operators(box):
 
 
 def test_smoothing_equals_the_printed_sum():
-    """Twin of eq 28, one particle at a time."""
+    """The twin evaluates eq 28 for one particle at a time."""
     random = np.random.default_rng(2)
-    shape, old, new, kept = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
-    result = smooth(Velocities(old, kept), new, sparse.csr_matrix(shape))
+    shape, old, new, retained = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
+    result = smooth(Velocities(old, retained), new, sparse.csr_matrix(shape))
     for j in range(4):
         change = sum(shape[j, i] * (new[i] - old[i]) for i in range(4))
         end = sum(shape[j, i] * new[i] for i in range(4))
-        assert result.unsmoothed[j] == pytest.approx(0.5 * (kept[j] + change) + 0.5 * end)
+        assert result.unsmoothed[j] == pytest.approx(0.5 * (retained[j] + change) + 0.5 * end)
     assert result.coefficients is new
 
 
@@ -71,7 +71,7 @@ def test_a_failed_solve_tells_its_residual():
 
 
 def test_viscous_pressure_of_an_even_strain(box):
-    """Twin: 2 mu n . grad v . n, on the faces of a cube the strain along their axis."""
+    """The viscous pressure is 2 mu n . grad v . n, the normal strain on the faces of a cube."""
     body, strain = Body.at_rest(box), np.diag([-0.5, -1.5, 2.0])
     gradient = np.broadcast_to(strain[:, :, None], (3, 3, len(box.points)))
     result = viscous_pressure(body, 0.3, gradient)
@@ -84,7 +84,7 @@ def test_viscous_pressure_of_an_even_strain(box):
 
 
 def test_an_edge_bears_what_is_left_on_a_held_vertex(box):
-    """All of the line is pinned: its pressure is the mean of the neighbours, the balance within the wall left out."""
+    """On a pinned line the pressure is the mean of the neighbours, without the balance within the wall."""
     body = Body.at_rest(box)
     ring = box.rings[0]
     line = ContactLine.__new__(ContactLine)
@@ -106,7 +106,7 @@ def test_plates_that_move_are_refused(box):
 
 
 def test_the_end_of_the_printed_scheme_says_why(monkeypatch):
-    """Whatever it breaks with, such as a division by zero; other schemes say where, and have no such flaw."""
+    """Every failure is reported with its reason, including a division by zero."""
     solder = Solder(volume=1e-9, numerics=SolderNumerics(scheme="gripc", time_step_limit=0.5))
     effects = {"gravity": False, "inertia": True, "viscosity": True, "surface_tension": True, "wall_adhesion": False}
     printed = start_flow(box_cloud(1e-3, 5), solder, effects, ())
@@ -120,7 +120,7 @@ def test_the_end_of_the_printed_scheme_says_why(monkeypatch):
 
 
 def test_walls_let_fluid_slip(box):
-    """A shear along the wall has neither divergence nor viscous force next to it, whatever its amplitude."""
+    """A shear flow along the wall has zero divergence and viscous force there at any amplitude."""
     operators = collocate(box.points, (Plate.horizontal(0.0),), box.spacing, "quadratic")
     shear = np.concatenate((np.full(len(box.points), 3.0), np.zeros(2 * len(box.points))))
     assert operators.divergence @ shear == pytest.approx(0.0, abs=1e-9)

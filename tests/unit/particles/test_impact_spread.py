@@ -1,4 +1,4 @@
-"""Correlations of the largest width of drops that strike walls."""
+"""Correlations of the maximum spread of impacting drops."""
 
 import numpy as np
 import pytest

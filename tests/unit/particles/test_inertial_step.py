@@ -14,7 +14,7 @@ from reflowshock.particles.steps.inertial_step import InertialFlow, InertialStep
 
 
 def test_a_plate_arrives_exactly_and_rests():
-    """Backward differences of second order carry half of the last step on: a plate that stops must not overshoot."""
+    """Second-order backward differences extrapolate half of the last step, but a stopping plate must not overshoot."""
     density, speed, time_step, target = 3.0, 0.5, 0.02, Plate.horizontal(1.045, side=1.0)
     body = Body.at_rest(joint_cloud(JointGeometry(1.0, 0.5, 0.5), 0.7, 0.25))
     travel = Travel(1, target, speed, lever=0.5)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, joint_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import cell_volumes, volume_gradients
-from reflowshock.particles.core.windings import winding_numbers
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
 from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
 from reflowshock.particles.discretisation.inner_tetrahedra import fill
@@ -21,7 +21,7 @@ CLOUDS = {
 
 
 def jittered(name, amount):
-    """A body whose particles are displaced at random by up to an amount of the spacing, along its walls."""
+    """Return a body with randomly displaced particles (amount in spacings), tangential on walls."""
     body = Body.at_rest(CLOUDS[name]())
     shift = np.random.default_rng(5).uniform(-amount, amount, body.points.shape) * body.cloud.spacing
     shift[body.cloud.wall >= 0, 2] = 0.0
@@ -32,7 +32,7 @@ def jittered(name, amount):
 @pytest.mark.parametrize("name", CLOUDS)
 @pytest.mark.parametrize("amount", [0.0, 0.1, 0.3])
 def test_volume_and_its_gradient_are_those_of_the_surface(name, amount):
-    """Also where the surface is not Delaunay (0.3) or its neck is far inside the convex hull."""
+    """This includes a non-Delaunay surface (0.3) and a neck far inside the convex hull."""
     body = jittered(name, amount)
     cells = fill(body)
     volume, gradient = body.volume()
@@ -51,7 +51,7 @@ def test_a_neck_is_not_filled_to_its_hull():
 
 
 def winding_number_by_numpy(point, corners):
-    """Sum of the solid angles over 4 pi."""
+    """Return the sum of solid angles over 4 pi."""
     a, b, c = np.moveaxis(corners - point, 1, 0)
     lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
     products = (a * b).sum(axis=1) * lengths[2] + (b * c).sum(axis=1) * lengths[0] + (c * a).sum(axis=1) * lengths[1]
@@ -64,7 +64,7 @@ def test_winding_numbers_tell_inside_from_outside():
     walls = [wall_corners(body.points, *on_wall) for on_wall in zip(body.cloud.rings, body.plates, strict=True)]
     corners = np.concatenate([body.points[body.triangles], *walls])
     points = np.array([[0.0, 0.0, 0.5], [0.45, 0.0, 0.05], [0.45, 0.0, 0.5], [0.0, 0.0, -0.1]])
-    result = winding_numbers(points, corners)
+    result = winding_numbers.at_points(points, corners)
     assert result == pytest.approx([1.0, 1.0, 0.0, 0.0], abs=1e-9)
     assert result == pytest.approx([winding_number_by_numpy(point, corners) for point in points], abs=1e-12)
 
@@ -98,7 +98,7 @@ def test_a_transfer_keeps_momentum_and_raises_no_energy():
 
 @pytest.mark.parametrize("count", [5, 8])
 def test_flipped_edges_of_a_lattice_are_single_cells(count):
-    """Neighbouring diagonals on the faces of a cube differ from Delaunay's: no cell is inverted, so none overlaps."""
+    """Surface diagonals of a cube may differ from Delaunay's: no cell is inverted, so cells do not overlap."""
     body = Body.at_rest(box_cloud(1.0, count))
     volumes = cell_volumes(body.points, fill(body))
     assert volumes.min() >= 0.0

@@ -69,7 +69,7 @@ def merged(old):
 
 @pytest.fixture(scope="module")
 def pair():
-    """Two spinning balls of 147 particles in an off-centre collision."""
+    """Return two spinning balls of 147 particles in an off-centre collision."""
     first = spinning(sphere_cloud(BALL, 3), (-1.05, 0.1, 0.0), (0.2, 0.05, 0.0), (0.0, 0.1, 0.2))
     second = spinning(sphere_cloud(BALL, 3), (1.05, -0.1, 0.0), (-0.3, 0.0, 0.02), (0.0, 0.0, 0.2))
     assert touch(first.body, second.body)

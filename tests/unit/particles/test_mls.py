@@ -25,22 +25,22 @@ def weights(offsets, support):
 
 @pytest.mark.parametrize("row", [171, 0])
 def test_quadratic_weights_equal_a_dense_least_squares_fit(cloud, row):
-    """Twin: NumPy's lstsq on the weighted Taylor expansion, inside and at a corner."""
-    found = fit(cloud, [row], "quadratic")
+    """The twin applies NumPy's lstsq to the weighted Taylor expansion, inside and at a corner."""
+    actual = fit(cloud, [row], "quadratic")
     d = np.delete(cloud, row, axis=0) - cloud[row]
     x, y, z = d.T
     taylor = np.column_stack((x, y, z, x * x / 2, y * y / 2, z * z / 2, x * y, x * z, y * z))
     root = np.sqrt(weights(d, SUPPORT["quadratic"]))[:, None]
     fitted = np.linalg.pinv(taylor * root) * root.T
     expected = np.vstack((fitted[:3], fitted[3:6].sum(axis=0)))
-    operators = np.vstack([m.toarray() for m in (*found.gradient, found.laplacian)])
-    assert found.order[0] == 2
+    operators = np.vstack([m.toarray() for m in (*actual.gradient, actual.laplacian)])
+    assert actual.order[0] == 2
     assert np.delete(operators, row, axis=1) == pytest.approx(expected, abs=1e-9)
     assert operators.sum(axis=1) == pytest.approx(0.0, abs=1e-10)
 
 
 def mls_value(cloud, values, at):
-    """Twin: value of the linear MLS approximation at a point."""
+    """Return the linear MLS approximation at a point."""
     basis = np.column_stack((np.ones(len(cloud)), cloud - at))
     w = weights(cloud - at, SUPPORT["linear"])
     return np.linalg.solve(basis.T @ (w[:, None] * basis), basis.T @ (w * values))[0]

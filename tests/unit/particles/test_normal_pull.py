@@ -21,7 +21,7 @@ ALONG_WALL = [0, 1, 5]  # two translations and the rotation that a frictionless 
 
 @pytest.fixture(scope="module")
 def body():
-    """Skewed cube on a wall, without symmetry."""
+    """Return a skewed cube on a wall, without symmetry."""
     cube = Body.at_rest(box_cloud(1.0, 5))
     x, y, z = cube.points.T
     return replace(cube, points=cube.points + 0.1 * np.column_stack((x * y + z, x * z - y**2, z * x)))

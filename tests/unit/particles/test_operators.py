@@ -30,7 +30,7 @@ def power(matrix, field):
 
 
 def test_viscous_power_of_simple_flows(body):
-    """2 mu D : D over the volume: shear mu V, extension 4 mu V, rotation none."""
+    """The integral of 2 mu D : D is mu V in shear, 4 mu V in extension and zero in rotation."""
     space = discretise(body)
     matrix = Viscosity(2.0).matrix(body, space, 1.0)
     x, y, z = body.points.T
@@ -66,7 +66,7 @@ def test_shift_keeps_particles_below_the_surface_and_on_their_wall(body):
 
 
 def test_shift_equals_numpy_twin(body):
-    """Twin of the repulsion, for particles deep inside."""
+    """The twin evaluates the repulsion of inner particles."""
     rng, spacing, count = np.random.default_rng(12), body.cloud.spacing, body.cloud.surface_count
     body.points[body.interior] += 0.1 * spacing * rng.uniform(-1, 1, (len(body.interior), 3))
     neighbours = NeighbourList(2.4 * spacing, 0.0)
@@ -98,5 +98,5 @@ def test_time_step_is_cut_by_the_displacement_and_grows_back():
 
 
 def test_capillary_limit_of_solder():
-    """0.25 sqrt(rho h^3 / (2 pi gamma)): 4.72 us at 0.05 mm."""
+    """The limit 0.25 sqrt(rho h^3 / (2 pi gamma)) is 4.72 us at 0.05 mm."""
     assert capillary_limit(8930.0, 5e-5, 0.4985) == pytest.approx(4.72e-6, rel=1e-3)

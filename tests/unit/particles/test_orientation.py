@@ -1,4 +1,4 @@
-"""Joints in canonical orientation: what a turn and a mirror image do to places, wrenches and shapes."""
+"""Joints in canonical orientation: rotation and reflection of positions, wrenches and shapes."""
 
 import numpy as np
 import pytest
@@ -26,9 +26,9 @@ def joint(offset, tilt):
 def test_the_orientation_brings_the_canonical_plate_to_where_it_is(offset, tilt):
     geometry = joint(offset, tilt)
     upright, orientation = canonical(geometry)
-    own, one = joint_plates(geometry)[1], joint_plates(upright)[1]
-    assert orientation.vectors(one.origin[None])[0] == pytest.approx(own.origin, abs=1e-15)
-    assert orientation.vectors(one.normal[None])[0] == pytest.approx(own.normal, abs=1e-12)
+    inclined, upright_plate = joint_plates(geometry)[1], joint_plates(upright)[1]
+    assert orientation.vectors(upright_plate.origin[None])[0] == pytest.approx(inclined.origin, abs=1e-15)
+    assert orientation.vectors(upright_plate.normal[None])[0] == pytest.approx(inclined.normal, abs=1e-12)
     assert upright.tilt[0] == 0.0 and upright.tilt[1] <= 0.0 <= upright.offset[1]
 
 
@@ -47,7 +47,7 @@ def test_lengths_below_a_picometre_have_no_direction():
 
 
 def test_wrenches_keep_their_power():
-    """Forces are vectors, moments axial ones, as velocities and spins of the plate are."""
+    """Forces and velocities are vectors; moments and spins are axial vectors."""
     rng = np.random.default_rng(1)
     for orientation in (Orientation(0.7, False), Orientation(-2.1, True)):
         points, force = rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
@@ -58,7 +58,7 @@ def test_wrenches_keep_their_power():
 
 
 def test_the_shape_of_a_mirror_image_is_that_of_its_own_reflow():
-    """Rings stay counter-clockwise, triangles outward, discs where they belong."""
+    """Rings stay counter-clockwise, triangles point outwards and discs stay on their pads."""
     geometry = JointGeometry(0.33e-3, RADIUS, RADIUS, (2e-5, 3e-5), (0.03, 0.05))
     upright, orientation = canonical(geometry)
     assert orientation.mirror

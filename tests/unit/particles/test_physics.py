@@ -1,4 +1,4 @@
-"""What plates, planes of symmetry and edges admit is said once."""
+"""Consistent constraints of plates, planes of symmetry and pad edges."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ from reflowshock.particles.physics.physics import Physics
 
 
 def test_projections_do_what_admit_does():
-    """In a quarter of a body on two tilted plates: a particle of each kind, some on a plane of symmetry."""
+    """The body is a quarter model on two tilted plates, with each kind of particle."""
     random = np.random.default_rng(2)
     points = random.uniform(0.5, 1.0, (30, 3))
     points[::2, 0], points[::3, 1] = 0.0, 0.0

@@ -21,7 +21,7 @@ def shaken_flow(count, seed=17):
 
 
 def edges(body, support):
-    """Weights and weighted squared lengths of all pairs with the images of those off the wall z = 0, `(n, n)` each."""
+    """Return pair weights and weighted squared lengths, with images behind the wall z = 0, shape (n, n) each."""
     points, off = body.points, body.cloud.wall < 0
     weight, moment = np.zeros((2, len(points), len(points)))
     for image in (False, True):
@@ -50,7 +50,7 @@ def test_laplacian_equals_its_plain_twin():
 
 
 def test_laplacian_of_a_quadratic_potential():
-    """-V times the Laplacian of x^2 + y^2 + z^2 is -6 V, in the mean over particles far from the boundary."""
+    """The mean of -V times the Laplacian of x^2 + y^2 + z^2 over inner particles is -6 V."""
     body, _, flow = shaken_flow(13)
     inner = (np.abs(body.points - [0.0, 0.0, 0.5]) < 0.25).all(axis=1)
     result = (flow.laplacian @ (body.points**2).sum(axis=1))[inner]
@@ -58,14 +58,14 @@ def test_laplacian_of_a_quadratic_potential():
 
 
 def test_velocity_of_a_potential_that_is_even_at_the_wall_is_exact():
-    """phi = 2 x - y has the gradient (2, -1, 0) everywhere, images at the wall included."""
+    """The gradient of phi = 2 x - y is (2, -1, 0) everywhere, with images at the wall."""
     body, _, flow = shaken_flow(7)
     result = flow.velocity(body.points @ np.array([2.0, -1.0, 0.0]))
     assert result == pytest.approx(np.tile([2.0, -1.0, 0.0], (len(result), 1)), abs=1e-7)
 
 
 def test_velocity_of_a_stagnation_flow_converges():
-    """phi = x^2 + y^2 - 2 z^2 above the wall z = 0: of first order on a jittered cloud."""
+    """For phi = x^2 + y^2 - 2 z^2 above the wall z = 0 the order is one on a jittered cloud."""
     errors = []
     for count in (9, 17):
         body, _, flow = shaken_flow(count)

@@ -1,4 +1,4 @@
-"""Printed parts: where drops land, what cures, what is solid, a restart, the numbers of a part, its files."""
+"""Printed parts: landing, curing, solid particles, restart, metrics and files."""
 
 from contextlib import nullcontext
 
@@ -20,7 +20,7 @@ INK = {
     "drop_volume": 6.37e-15, "surface_tension": 0.072, "viscosity": 0.0149, "speed": 3.0, "delay": 1e-3,
     "pitch": 23.2e-6, "columns": 2, "rows": 1,
 }  # fmt: skip
-BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: a second has to land on what is cured
+BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: the second lands on cured ink
 
 
 def printing(**changes):
@@ -58,9 +58,9 @@ def test_what_gets_its_dose_is_held_and_a_body_without_liquid_is_solid():
     assert deposit.cure()
     assert (deposit.state == SOLID).all() and deposit.simulation is None and len(deposit.bodies) == 1
     again = Deposit(scene)
-    again.restore(deposit.saved())  # where a run was killed while nothing was liquid
-    for one in (deposit, again):
-        one.add_drop((0.0, 0.0))
+    again.restore(deposit.saved())  # interrupted while everything was solid
+    for state in (deposit, again):
+        state.add_drop((0.0, 0.0))
     assert np.array_equal(again.points, deposit.points) and np.array_equal(again.dose, deposit.dose)
     below, above = deposit.points[deposit.drop == 0], deposit.points[deposit.drop == 1]
     gaps = np.linalg.norm(below[:, None] - above, axis=2)
@@ -96,7 +96,7 @@ def test_the_largest_spray_of_a_print_is_kept():
 
 @pytest.mark.long
 def test_one_thread_and_two_print_the_same_bits():
-    found = []
+    results = []
     for threads in (1, 2):
         deposit = Deposit(printing())
         deposit.add_drop((0.0, 0.0))
@@ -107,10 +107,10 @@ def test_one_thread_and_two_print_the_same_bits():
         for _ in range(150):
             deposit.step(1.0)
         deposit.update()
-        found.append((deposit.points, deposit.surface.points, deposit.fields.density))
-    assert (deposit.surface.wetness[0] > 0.0).any()
-    for one, two in zip(*found, strict=True):
-        assert np.array_equal(one, two)
+        results.append((deposit.points, deposit.surface.points, deposit.fields.density))
+    assert (deposit.surface.mesh.wetness > 0.0).any()
+    for serial, parallel in zip(*results, strict=True):
+        assert np.array_equal(serial, parallel)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def test_sections_integrate_to_the_volume():
 
 
 def test_profile_of_a_sphere_between_two_planes():
-    """Vertices on the zone |z| < 0.6 of the unit sphere: the fit sees the inscribed polyhedron, 0.3 % too small."""
+    """Vertices lie on the zone |z| < 0.6 of the unit sphere; the inscribed polyhedron is 0.3 % too small."""
     cloud = joint_cloud(JointGeometry(1.2, 0.8, 0.8), 3.3, 0.08)
     points = cloud.points - [0.0, 0.0, 0.6]
     radius = np.sqrt(1.0 - points[:, 2] ** 2)

@@ -9,7 +9,6 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, collapsing, rebuild, touch
-from reflowshock.particles.surface.closing import without_slits
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
 from reflowshock.particles.surface.level_set import (
     LevelSet,
@@ -18,8 +17,9 @@ from reflowshock.particles.surface.level_set import (
     relax,
     signed_distance,
     smooth_union,
-    windings_on,
+    winding_numbers_on,
 )
+from reflowshock.particles.surface.morphological_closing import smooth_slits
 from tests.support.level_sets import ball, cap_radius, grid_around_ball
 
 R = 0.5e-3
@@ -74,7 +74,7 @@ def test_signed_distance_of_a_net_is_that_of_the_sphere():
 
 
 def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
-    """Two balls of one net that overlap: between their sheets the nearest one faces the wrong way."""
+    """In the overlap of two balls of one surface the nearest sheet has the wrong orientation."""
     points, triangles = extract_surface(ball(grid_around_ball((0, 0, 0), R, R / 8), (0, 0, 0), R))
     aside = np.array([0.8 * R, 0.0, 0.0])
     both = np.concatenate((points - aside, points + aside)), np.concatenate((triangles, triangles + len(points)))
@@ -84,11 +84,11 @@ def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     exact = np.minimum(*(np.linalg.norm(nodes - centre, axis=1) - R for centre in (-aside, aside)))
     clear = np.abs(exact) > 0.05 * R
     assert np.array_equal(level.values.ravel()[clear] < 0.0, exact[clear] < 0.0)
-    assert np.array_equal(depths(nodes[clear], both) > 0.0, exact[clear] < 0.0)
+    assert np.array_equal(depths(nodes[clear], *both) > 0.0, exact[clear] < 0.0)
 
 
 def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
-    """An octahedron: all triangles of its upper half meet above its centre, and edges lie above its axes."""
+    """In an octahedron all upper triangles meet above the centre, and edges lie above the axes."""
     corners = np.concatenate((np.eye(3), -np.eye(3)))
     sides = np.array([[x, y, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)], np.int32)
     inward = np.linalg.det(corners[sides]) < 0.0
@@ -98,10 +98,10 @@ def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
     distance = np.abs(nodes).sum(axis=-1) - 1.0
     clear = distance != 0.0
     for order in permutations(range(6)):
-        place = np.array(order, np.int32)
-        surface = corners[place], np.argsort(place).astype(np.int32)[sides]
-        assert np.array_equal(windings_on(grid, *surface)[clear], (distance < 0.0)[clear])
-        assert np.array_equal(depths(nodes[clear], surface) > 0.0, distance[clear] < 0.0)
+        permutation = np.array(order, np.int32)
+        surface = corners[permutation], np.argsort(permutation).astype(np.int32)[sides]
+        assert np.array_equal(winding_numbers_on(grid, *surface)[clear], (distance < 0.0)[clear])
+        assert np.array_equal(depths(nodes[clear], *surface) > 0.0, distance[clear] < 0.0)
 
 
 def test_smooth_union_closes_gaps_narrower_than_half_its_reach():
@@ -126,7 +126,7 @@ def test_a_rebuilt_drop_on_a_wall_has_one_ring_and_its_volume():
     assert np.all(ring[:, 2] == 0.0)
     x, y = ring[:, 0], ring[:, 1]
     assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0  # counter-clockwise
-    # the net rounds the edge between the drop and its mirror image within a cell
+    # the surface rounds the edge between drop and mirror image within a cell
     assert np.hypot(x, y) == pytest.approx(radius * np.sin(angle), rel=0.03)
     assert cloud.points[:, 2].min() == 0.0
     assert (cloud.wall[cloud.surface_count :] == 0).any()
@@ -176,7 +176,7 @@ def test_bodies_that_cannot_rebuild():
 
 
 def test_a_groove_narrower_than_a_cell_is_blunted_and_a_smooth_net_stays():
-    """Two bars that touch along an edge: both of their nets have the vertices of its cells."""
+    """Two bars touch along an edge, and both surfaces share the vertices of its cells."""
     grid = Grid.around(np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), 0.1)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     x, y = x - 0.03, y - 0.03
@@ -188,9 +188,9 @@ def test_a_groove_narrower_than_a_cell_is_blunted_and_a_smooth_net_stays():
         return np.unique(edges, axis=0, return_counts=True)[1].max()
 
     assert most(grooved) > 2
-    assert most(without_slits(grooved)) == 2
+    assert most(smooth_slits(grooved)) == 2
     smooth = ball(grid, (0, 0, 0), 0.4)
-    assert without_slits(smooth) is smooth
+    assert smooth_slits(smooth) is smooth
 
 
 def test_a_collapsed_surface_is_made_even_again():

@@ -15,12 +15,12 @@ from reflowshock.particles.steps.flow import StepRecord
 from reflowshock.particles.steps.rest import CALM_STEPS, NotAtRest, Run, StopRule, is_calm, is_lasting, run_to_rest
 
 PERIOD = 60  # steps
-# Surface of a body that moves by this in a step, of the spacing, is at the bound of calm.
+# Surface displacement per step at the limit of calm, in spacings.
 BOUND = 1e-4
 
 
 def records_of(displacements):
-    """Steps of one second that move the surface; its energy does not change."""
+    """Return one-second step records that move the surface at constant energy."""
     nan = float("nan")
     return [
         StepRecord(number, float(number), 1.0, "", 0.0, 1.0, 1.0, 0.0, displacement, 0, 0, nan, nan)
@@ -29,14 +29,14 @@ def records_of(displacements):
 
 
 def swing(amplitude, decay, steps):
-    """Displacements of a swing of an amplitude, in spacings, that loses a share in a step; it starts where it turns."""
+    """Return displacements [spacings] of a damped oscillation that starts at its turning point."""
     turn = 2.0 * pi / PERIOD
     positions = [amplitude * (1.0 - decay) ** step * cos(turn * step) for step in range(steps + 1)]
     return np.abs(np.diff(positions))
 
 
 def steps_to_rest(records, rule):
-    """After how many steps a run with these records would have been found at rest, and its run."""
+    """Return the number of steps until rest is detected, and the run."""
     run = Run()
     for record in records:
         run.records.append(record)
@@ -48,7 +48,7 @@ def steps_to_rest(records, rule):
 
 
 def test_a_swing_is_not_at_rest_where_it_turns():
-    """Its amplitude is found so with three steps when it is eight times as large as that with a quarter of a period."""
+    """With three steps the detected amplitude would be eight times the amplitude with a quarter period."""
     records = records_of(swing(amplitude=0.02, decay=1e-3, steps=5000))
     three, quarter = StopRule(9999, 1e-6, 1.0), StopRule(9999, 1e-6, 1.0, lasting=0.25 * PERIOD)
     results = [steps_to_rest(records, rule) for rule in (three, quarter)]
@@ -61,7 +61,7 @@ def test_a_swing_is_not_at_rest_where_it_turns():
 
 @pytest.mark.parametrize(("ratio", "most"), [(0.987, 1.43), (0.9, 1.54), (0.74, 1.82)])
 def test_speed_at_rest_of_an_oscillation_slower_than_estimated(ratio, most):
-    """Ratios of exact to estimated frequency for caps of 60, 120 and 148 degrees."""
+    """The ratios of exact to estimated frequency are for caps of 60, 120 and 148 degrees."""
     records = records_of(swing(amplitude=0.02, decay=1e-4, steps=40000))
     run = steps_to_rest(records, StopRule(99999, 1e-6, 1.0, lasting=0.25 * ratio * PERIOD))
     fastest = 0.02 * (1.0 - 1e-4) ** len(run.records) * 2.0 * pi / PERIOD
@@ -88,7 +88,7 @@ def test_the_slowest_swing_of_half_a_ball_is_that_of_the_ball():
 
 
 def test_the_slowest_swing_of_a_cap():
-    """Real solder, 1 mm^3, swung so with 60 degrees; the paper's, as a meridian, rose and sank so with 120 and 148."""
+    """Reference frequencies: 1 mm^3 of real solder at 60 degrees; published values at 120 and 148 degrees."""
     assert cap_frequency(pi / 3.0, 1e-9, 8930.0, 0.4985) / (2.0 * pi) == pytest.approx(108.7, rel=0.02)
     periods = {120: 2.69e-3, 148: 3.7e-3}
     results = [2.0 * pi / cap_frequency(np.radians(angle), 1e-9, 8930.0, 4.985) / periods[angle] for angle in periods]
@@ -96,14 +96,14 @@ def test_the_slowest_swing_of_a_cap():
 
 
 def test_the_slowest_swing_of_a_film():
-    """Rayleigh's quotient of the ellipse for a film: 12 gamma angle / (rho a^3), a the radius of its foot."""
+    """The Rayleigh quotient of an elliptic film is 12 gamma angle / (rho a^3), a the base radius."""
     angle, radius = 0.01, 1e-3
     film = cap_frequency(angle, pi * radius**3 * angle / 4.0, 8930.0, 0.5)
     assert film**2 == pytest.approx(12.0 * angle * 0.5 / (8930.0 * radius**3), rel=1e-3)
 
 
 def relaxed_ball(solder, shells):
-    """Particles of a ball at rest."""
+    """Return the particles of a ball at rest."""
     still = solder.model_copy(update={"numerics": SolderNumerics(time_step_limit=100.0)})
     effects = {effect.name: effect.name == "surface_tension" for effect in LIQUID_EFFECTS}
     flow = start_flow(sphere_cloud(solder.volume, shells), still, effects, ())
@@ -112,7 +112,7 @@ def relaxed_ball(solder, shells):
 
 
 def test_a_drop_of_real_solder_that_swings_is_not_found_at_rest_where_it_turns():
-    """A ball of 147 particles that moves two and a half times as fast as one at rest, and is calm for some steps."""
+    """A ball of 147 particles at 2.5 times the speed limit of rest is calm for some steps."""
     solder = Solder(volume=1e-9, numerics=SolderNumerics(scheme="ispg", time_step_limit=100.0, max_steps=16))
     effects = {effect.name: effect.name in ("inertia", "viscosity", "surface_tension") for effect in LIQUID_EFFECTS}
     cloud = relaxed_ball(solder, 3)

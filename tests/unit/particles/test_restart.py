@@ -1,4 +1,4 @@
-"""Runs that are broken off continue to the same bits: joints that move, drops, every way to solve a step."""
+"""Bitwise restart of interrupted runs: moving joints, drops and each solver option."""
 
 from functools import partial
 from pathlib import Path
@@ -36,7 +36,7 @@ class BrokenOff(Exception):
 
 
 class BreakingCheckpoint(Checkpoint):
-    """A checkpoint after every step; the run breaks off after some of them."""
+    """Checkpoint after every step that interrupts the run after a given number."""
 
     def __init__(self, path, steps):
         super().__init__(path, ("inputs",), 0.0)
@@ -59,7 +59,7 @@ def settle(checkpoint):
 
 
 def follow(checkpoint):
-    """Broken off on the way to the second of three places."""
+    """Run a joint to three positions, interrupted on the way to the second."""
     path = [JointGeometry(gap, RADIUS, RADIUS) for gap in (0.29e-3, 0.27e-3)]
 
     def at(number):
@@ -70,18 +70,18 @@ def follow(checkpoint):
 
 
 def pull(checkpoint):
-    """A package that is pulled up and aside by the scheme ispg, for the time of some steps."""
+    """Run a package pulled up and sideways in the scheme ispg for some steps."""
     end = joint_plates(JointGeometry(0.34e-3, RADIUS, RADIUS, (1e-5, 0.0), (0.0, 0.01)))[1]
     return moved_in_galerkin_form(Travel(1, end, 0.2, RADIUS), checkpoint)
 
 
 def float_on(checkpoint):
-    """A package that floats, by the scheme ispg, for the time of some steps."""
+    """Run a floating package in the scheme ispg for some steps."""
     return moved_in_galerkin_form(Floating(1, LIFT, np.array([0.0, 0.0, 1e-4])), checkpoint)
 
 
 def viscous():
-    """Solder that hardly swings, in a short process."""
+    """Return solder with strong viscous damping in a short process."""
     effects = SolderEffects(inertia="on", viscosity="on")
     numerics = SolderNumerics(spacing=8e-5, scheme="ispg", time_step_limit=100)
     fluid = {"surface_tension": 4.985, "viscosity": 0.227, "process_time": 2e-4}
@@ -89,7 +89,7 @@ def viscous():
 
 
 def coarse_viscous(process_time):
-    """The same with fewer particles, which rests after some hundred steps."""
+    """Return viscous solder with fewer particles, which rests after some hundred steps."""
     solder = viscous()
     numerics = solder.numerics.model_copy(update={"spacing": 1e-4})
     return solder.model_copy(update={"numerics": numerics, "process_time": process_time})
@@ -102,12 +102,12 @@ def moved_in_galerkin_form(motion, checkpoint):
 
 
 def carry(checkpoint, solder=SOLDER):
-    """Carried from a file to another place, on the way to which it is broken off; then its shape there."""
+    """Carry a joint from a file to another position with an interruption, and return its shape."""
     if checkpoint is None:
         with TemporaryDirectory() as folder:
             return carry(BreakingCheckpoint(Path(folder) / "state", -1), solder)
     first, now = (Checkpoint(checkpoint.path.with_name(name), ("inputs",)) for name in ("first", "now"))
-    moved = JointGeometry(0.29e-3, RADIUS + 1e-10, RADIUS, (1e-5, 0.0), (0.0, -0.01))  # alike, but not to the bit
+    moved = JointGeometry(0.29e-3, RADIUS + 1e-10, RADIUS, (1e-5, 0.0), (0.0, -0.01))  # equal, but not bitwise
     carry_joint(JOINT, solder, None, first)
     wrenches = carry_joint(moved, solder, first, BreakingCheckpoint(now.path, checkpoint.left)).wrenches
     return [wrenches, carried_shape(moved, solder, first, now).points]
@@ -118,14 +118,14 @@ def carry_in_galerkin_form(checkpoint):
 
 
 def stand(checkpoint):
-    """A drop whose contact line has hysteresis."""
+    """Run a drop with contact angle hysteresis."""
     drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=5)
     flow, _ = flow_to_rest(drop, SOLDER.model_copy(update={"volume": 1e-9}), checkpoint=checkpoint)
     return [flow.body.points, *(line.state for line in flow.physics.lines)]
 
 
 def stand_with_inertia(checkpoint):
-    """A contact line that rubs on its wall, broken off while some of its vertices stand."""
+    """Run a drop with contact-line friction, interrupted while some vertices are pinned."""
     solder = flow_of("ispg", 20.0)[1].model_copy(update={"process_time": 8e-4})
     drop = Drop(volume=1e-9, receding_angle=1.0, advancing_angle=2.2, particles_per_edge=7)
     flow, run = flow_to_rest(drop, solder, checkpoint=checkpoint)
@@ -140,7 +140,7 @@ def stand_with_inertia(checkpoint):
 
 
 def flow_of(scheme, limit, section="none"):
-    """A drop that moves with inertia, for the time of some steps."""
+    """Return the flow of a drop with inertia for some steps."""
     effects = SolderEffects(inertia="on", viscosity="on")
     numerics = SolderNumerics(spacing=1e-4, scheme=scheme, time_step_limit=limit)
     solder = Solder(volume=1e-9, effects=effects, numerics=numerics, process_time=2e-4)
@@ -181,7 +181,7 @@ def merge(checkpoint):
 
 
 def merge_with_inertia(checkpoint):
-    """Two balls that are one from the start, whose surface is split and collapses on the way."""
+    """Run two initially merged balls with splits and collapses of surface edges."""
     scene = Drops(volume_left=1e-10, volume_right=2e-10, distance=6.6e-4, spacing=1e-4)
     solder = flow_of("ispg", 20.0)[1].model_copy(update={"volume": scene.volume, "process_time": 8e-4})
     shape = pair_to_rest(scene, solder, checkpoint=checkpoint).shape
@@ -208,23 +208,23 @@ RUNS = [
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_a_broken_off_run_continues_to_the_same_bits(tmp_path, run):
+def test_interrupted_run_continues_bitwise(tmp_path, run):
     path = tmp_path / "state"
     with pytest.raises(BrokenOff):
         run(BreakingCheckpoint(path, 5))
-    expected, found = run(None), run(BreakingCheckpoint(path, -1))
-    assert len(found) == len(expected)
-    assert all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
+    expected, actual = run(None), run(BreakingCheckpoint(path, -1))
+    assert len(actual) == len(expected)
+    assert all(np.array_equal(left, right) for left, right in zip(actual, expected, strict=True))
 
 
-def leaves(value, place=""):
-    """All numbers and arrays of an object by their place; what PETSc keeps is left out: it is made anew."""
+def leaves(value, path=""):
+    """Yield all numbers and arrays of an object with their paths, except PETSc objects, which are rebuilt."""
     if sparse.issparse(value):
         value = {name: getattr(value, name) for name in ("data", "indices", "indptr", "shape")}
-    if place.endswith("/_solver"):
+    if path.endswith("/_solver"):
         return
     if value is None or isinstance(value, bool | int | float | str | np.ndarray | np.generic):
-        yield place, value
+        yield path, value
         return
     if isinstance(value, list | tuple):
         value = dict(enumerate(value))
@@ -232,7 +232,7 @@ def leaves(value, place=""):
         slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
         value = getattr(value, "__dict__", {}) | {name: getattr(value, name) for name in slots}
     for name, part in value.items():
-        yield from leaves(part, f"{place}/{name}")
+        yield from leaves(part, f"{path}/{name}")
 
 
 def start_drop(scheme, limit):
@@ -251,22 +251,22 @@ def start_drop(scheme, limit):
     ],
     ids=["relaxation", "inertial", "ispg", "gripc"],
 )
-def test_nothing_of_a_flow_is_forgotten(tmp_path, begin):
-    """Whatever a flow, its solver or what acts on it may remember from now on must be saved, too."""
+def test_checkpoint_contains_the_whole_state(tmp_path, begin):
+    """All state of the flow, its solver and its physics must be saved."""
     flow, again = begin(), begin()
     for _ in range(4):
         flow.step()
     Checkpoint(tmp_path / "state", ()).write(flow.saved())
     again.restore(Checkpoint(tmp_path / "state", ()).read(RECORDS))
-    found, expected = dict(leaves(again)), dict(leaves(flow))
-    assert found.keys() == expected.keys()
-    different = [place for place, value in expected.items() if not np.array_equal(found[place], value)]
+    actual, expected = dict(leaves(again)), dict(leaves(flow))
+    assert actual.keys() == expected.keys()
+    different = [path for path, value in expected.items() if not np.array_equal(actual[path], value)]
     assert not different
 
 
 def test_an_exchange_that_ends_with_the_process_passes_no_forces_on(tmp_path):
     now = Checkpoint(tmp_path / "state", ("inputs",))
-    for _ in range(2):  # from the start, and from what was left
+    for _ in range(2):  # from the start and from the checkpoint
         with pytest.raises(NotAtRest, match=r"process ends before the joint is at rest.*solder\.process_time"):
             carry_joint(JOINT, coarse_viscous(2e-4), None, now)
 

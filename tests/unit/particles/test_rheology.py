@@ -1,4 +1,4 @@
-"""Viscosity by the rate of shear: laws, the rate at a particle, effects, restarts, printed ink."""
+"""Shear-rate dependent viscosity: laws, particle shear rates, effects, restart, printed ink."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def ink(rheology, **changes):
     return Droplet(**INK | changes, rheology=rheology, numerics=DropletNumerics(particles_per_diameter=8))
 
 
-@pytest.mark.parametrize("rheology", LAWS, ids=lambda one: f"{one.law} {one.exponent}")
+@pytest.mark.parametrize("rheology", LAWS, ids=lambda item: f"{item.law} {item.exponent}")
 def test_particles_have_the_viscosity_of_the_parameters(rheology):
     law = droplet(ink(rheology)).law
     for rate in (0.0, 1.0, 1e3, 7e4, 1e5, 3e6, 1e9):
@@ -37,8 +37,8 @@ def test_limits_of_the_laws():
     assert thickening.largest(0.02, 1e12) == pytest.approx(0.1)
 
 
-def test_the_rate_at_a_particle_is_that_of_the_flow():
-    """A linear flow, of which the gradient is exact everywhere, at the surface too."""
+def test_particle_shear_rate_equals_the_flow():
+    """In a linear flow the gradient is exact everywhere, including the surface."""
     simulation = droplet(ink(CARREAU))
     fields, rows = simulation.fields, simulation.particles.rows
     gradient = np.random.default_rng(2).normal(size=(3, 3)) * 1e5
@@ -46,12 +46,12 @@ def test_the_rate_at_a_particle_is_that_of_the_flow():
     strain = 0.5 * (gradient + gradient.T)
     expected = CARREAU.viscosity(float(np.sqrt(2.0 * (strain**2).sum())), 0.0149)
     for i in range(0, simulation.fluids, 17):
-        found = viscosity_of(np.uint64(i), simulation.fluids, rows.of(i), fields, simulation.law)
-        assert found == pytest.approx(expected, rel=1e-10)
+        viscosity = viscosity_of(np.uint64(i), simulation.fluids, rows.of(i), fields, simulation.law)
+        assert viscosity == pytest.approx(expected, rel=1e-10)
     turning = np.array([[0.0, -1e6, 0.0], [1e6, 0.0, 0.0], [0.0, 0.0, 0.0]])
     fields.u[:], fields.v[:], fields.w[:] = turning @ np.array(fields[:3])
-    found = viscosity_of(np.uint64(0), simulation.fluids, rows.of(0), fields, simulation.law)
-    assert found == pytest.approx(0.0149, rel=1e-9)  # a body that turns as a whole is not sheared
+    viscosity = viscosity_of(np.uint64(0), simulation.fluids, rows.of(0), fields, simulation.law)
+    assert viscosity == pytest.approx(0.0149, rel=1e-9)  # rigid rotation has no shear
 
 
 def test_an_exponent_of_one_computes_what_constant_viscosity_does():
@@ -78,7 +78,7 @@ def test_shear_dependence_acts_where_it_is_given_and_viscosity_acts():
 
 @pytest.mark.long
 def test_a_drop_that_thins_spreads_as_a_less_viscous_one():
-    """At rates far above that of the law a Carreau liquid has its viscosity at infinity."""
+    """At rates far above its reference rate a Carreau liquid has its infinite-shear viscosity."""
     thin = Rheology(law="carreau", exponent=0.2, shear_rate=1.0, viscosity_at_infinity=5e-3)
     simulations = [droplet(ink(rheology, speed=3.0, viscosity=mu)) for rheology, mu in ((thin, 0.0149), (None, 5e-3))]
     for simulation in simulations:

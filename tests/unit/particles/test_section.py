@@ -35,7 +35,7 @@ CLOUDS = {
 
 @pytest.fixture(params=CLOUDS, scope="module")
 def body(request):
-    """A section whose particles off the wall and the axis are not on a lattice."""
+    """Return a section with displaced particles off the wall and the axis."""
     polyline, cloud = CLOUDS[request.param]
     shake = np.random.default_rng(5).uniform(-0.12, 0.12, cloud.points.shape) * [1.0, 0.0, 1.0] * cloud.spacing
     shake[cloud.wall >= 0] = 0.0
@@ -47,7 +47,7 @@ def body(request):
 
 
 def water(*forces, viscosity=0.0, inertia=True):
-    """Density and surface tension are one."""
+    """Return the physics of unit density and surface tension."""
     tension = PolylineTension(1.0)
     operators = (Mass(1.0), tension, *((Viscosity(viscosity),) if viscosity else ()))
     return Physics((tension, *forces), operators, (Inertia(1.0),) if inertia else (), (), ())
@@ -173,7 +173,7 @@ def test_period_and_decay_of_a_free_drop(polyline):
 
 @pytest.mark.parametrize("polyline", [MERIDIAN, pytest.param(RING, marks=pytest.mark.long)], ids=["meridian", "plane"])
 def test_decay_with_long_steps(polyline):
-    """The decay is little more than viscous; with tension in the prediction only, the oscillation grew."""
+    """The decay slightly exceeds the viscous rate; with tension only in the predictor the oscillation grew."""
     _, decay, flow = oscillated(polyline, 8, 16, 2)
     assert 0.9 < decay < 1.5
     assert flow.solver.state.losses.integration > 0.0
@@ -214,7 +214,7 @@ def test_a_plane_drop_becomes_a_circular_segment():
 
 
 def solder_of(drop, **effects):
-    """The paper's values, whose viscosity brings a drop to rest soon."""
+    """Return solder with published values, whose viscosity damps a drop quickly."""
     numerics = SolderNumerics(spacing=drop.resolution, scheme="ispg", time_step_limit=100.0)
     return Solder(
         volume=drop.volume,
@@ -229,7 +229,7 @@ def solder_of(drop, **effects):
 
 @cache
 def axisymmetric_drop(count):
-    """A drop at rest on a wall of 148 degrees, with `count` particles along the edge of the initial cube."""
+    """Return a drop at rest on a wall of 148 degrees, with ``count`` particles per edge of the initial cube."""
     drop = Drop(volume=1e-9, contact_angle=np.radians(148.0), particles_per_edge=count, section="axisymmetric")
     return drop_to_rest(drop, solder_of(drop))
 
@@ -266,7 +266,7 @@ def test_products_show_the_whole_body():
 
 @pytest.fixture(scope="module")
 def plane_drop():
-    """Plane drop at rest under its weight, Bond number 1, with a volume other than one."""
+    """Return a plane drop at rest at Bond number 1, with a volume other than one."""
     drop = Drop(volume=2e-9, contact_angle=np.radians(120.0), particles_per_edge=9, section="plane")
     solder = solder_of(drop).model_copy(update={"gravity": 4.985 / (8930.0 * drop.edge**2)})
     effects = solder.effects.model_copy(update={"gravity": "on"})

@@ -6,13 +6,13 @@ import pytest
 from reflowshock.particles.reference.young_laplace import sphere_meridian
 from reflowshock.particles.scenes.metrics import distance, shape_error
 
-VOLUME = 4.0 / 3.0 * np.pi * 1e-9  # of a sphere of 1 mm
+VOLUME = 4.0 / 3.0 * np.pi * 1e-9  # sphere of 1 mm
 OCTAHEDRON = np.vstack((np.eye(3), -np.eye(3)))
 FACES = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
 
 
 def refined(points, triangles):
-    """Each triangle cut into four, its new corners on the unit sphere."""
+    """Split each triangle into four with new vertices on the unit sphere."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     middles = [(a + b) / 2, (b + c) / 2, (c + a) / 2]
     ab, bc, ca = (m / np.linalg.norm(m, axis=1, keepdims=True) for m in middles)

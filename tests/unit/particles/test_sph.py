@@ -28,8 +28,8 @@ AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.p
 
 
 def small_dam(**changes):
-    given = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.02}
-    return DamBreak(**given | changes, numerics=SphNumerics(particles_across=10))
+    parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.02}
+    return DamBreak(**parameters | changes, numerics=SphNumerics(particles_across=10))
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
@@ -53,7 +53,7 @@ def test_the_kernel_beyond_a_plane_is_that_of_a_lattice_behind_it(kernel):
     line = (np.arange(-40, 40) + 0.5) / 20.0
     x, y, z = np.meshgrid(line, line, line, indexing="ij")
     radius = np.sqrt(x * x + y * y + z * z).ravel()
-    levels = norm(kernel, 3, 1.0) / 20.0**3 * np.array([shape(kernel, False, one) for one in radius[radius < 2.0]])
+    levels = norm(kernel, 3, 1.0) / 20.0**3 * np.array([shape(kernel, False, ratio) for ratio in radius[radius < 2.0]])
     planes = np.array([0.0, 0.2, 0.7, 1.5, 2.0])
     sums = [levels[z.ravel()[radius < 2.0] > plane].sum() for plane in planes]
     assert beyond_plane(kernel, planes) == pytest.approx(sums, abs=2e-3)
@@ -63,11 +63,11 @@ def test_the_kernel_beyond_a_plane_is_that_of_a_lattice_behind_it(kernel):
 def test_walls_list_the_liquid_alone_and_the_liquid_all():
     law = dam(small_dam()).law
     points, fluids = np.random.default_rng(5).uniform(0.0, 6.0 * law.length, (300, 3)), 100
-    one, all_ = Rows(law, fluids), Rows(law, 300)
-    one.update(points.T)
-    all_.update(points.T)
+    liquid_rows, all_rows = Rows(law, fluids), Rows(law, 300)
+    liquid_rows.update(points.T)
+    all_rows.update(points.T)
     for i in range(300):
-        mine, every = one.of(i), all_.of(i)
+        mine, every = liquid_rows.of(i), all_rows.of(i)
         assert sorted(mine) == sorted(every if i < fluids else every[every < fluids])
         assert not np.diff((mine < fluids).astype(int)).max(initial=-1) > 0  # the liquid comes first
 
@@ -85,7 +85,7 @@ def test_periodic_neighbours_are_those_of_a_tree_of_the_torus():
 
 
 def disturbed(simulation: Simulation) -> Simulation:
-    """The same with particles, velocities and densities pushed at random."""
+    """Return the simulation with random disturbances of positions, velocities and densities."""
     random, fields = np.random.default_rng(7), simulation.fields
     for axis in (fields.x, fields.z):
         axis += random.uniform(-0.2, 0.2, axis.shape) * simulation.law.spacing
@@ -123,9 +123,9 @@ def test_the_gradient_of_a_linear_density_is_exact_and_does_not_diffuse():
     rows.update(fields[:3])
     inner = np.flatnonzero((np.abs(fields.x - 0.5) < 0.3) & (np.abs(fields.z - 0.5) < 0.3))
     for i in inner[::7]:
-        found = rates_of(np.uint64(i), simulation.fluids, rows.of(i), fields, law)
-        assert found[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
-        assert abs(found[0]) < 1e-12 * law.sound / law.length
+        rates = rates_of(np.uint64(i), simulation.fluids, rows.of(i), fields, law)
+        assert rates[4:7] == pytest.approx((0.01, 0.0, -0.02), abs=1e-12)
+        assert abs(rates[0]) < 1e-12 * law.sound / law.length
     assert solved((1e-3, 0.0, 1e-3, 0.0, 0.0, 0.0), (1.0, 0.0, 1.0), 2) == (0.0, 0.0, 0.0)
 
 
@@ -145,8 +145,8 @@ def test_the_reproducing_gradient_is_exact_for_linear_densities_at_surfaces_and_
     rows = Rows(law, lattice.shape[1])
     rows.update(fields[:3])
     for i in range(lattice.shape[1]):
-        found = rates_of(np.uint64(i), lattice.shape[1], rows.of(i), fields, law)
-        assert found[4:7] == pytest.approx(tuple(slopes), abs=1e-9)
+        rates = rates_of(np.uint64(i), lattice.shape[1], rows.of(i), fields, law)
+        assert rates[4:7] == pytest.approx(tuple(slopes), abs=1e-9)
     alone = rates_of(np.uint64(0), lattice.shape[1], rows.of(0)[:3], fields, law)
     assert alone[4:7] == (0.0, 0.0, 0.0)  # too few neighbours
 
@@ -182,7 +182,7 @@ def test_walls_carry_liquid_at_rest():
     fields, liquid = simulation.fields, slice(simulation.fluids)
     depth = 0.6 - fields.z[liquid]
     inner = (depth > 3 * simulation.law.spacing) & (np.abs(fields.x[liquid] - 1.6) < 1.0)
-    assert np.abs(simulation.rates[3][inner]).max() < 0.05 * 9.81  # the layer at the floor; 1 % farther up
+    assert np.abs(simulation.rates[3][inner]).max() < 0.05 * 9.81  # bottom layer; 1 % above
     below = fields.z[simulation.fluids :] < 0.0
     assert fields.pressure[simulation.fluids :][below].max() > 0.9 * 1000.0 * 9.81 * 0.6
 
@@ -199,14 +199,14 @@ def test_walls_do_not_slip_where_viscosity_acts():
 
 
 def test_threads_change_nothing(every_thread):
-    found = []
+    results = []
     for threads in (1, every_thread):
         numba.set_num_threads(threads)
         simulation = disturbed(dam(small_dam()))
         for _ in range(5):
             simulation.step(simulation.time_step())
-        found.append(np.array(simulation.fields[:8]))
-    assert np.array_equal(*found)
+        results.append(np.array(simulation.fields[:8]))
+    assert np.array_equal(*results)
 
 
 def test_a_flow_continues_to_the_same_bits(tmp_path, monkeypatch):
@@ -229,8 +229,8 @@ def test_a_flow_continues_to_the_same_bits(tmp_path, monkeypatch):
     continued = solve_dam_break(scene, None, again)
     assert again.continued
     assert all(np.array_equal(whole.history[name], continued.history[name]) for name in whole.history)
-    for one, other in zip(whole.pictures, continued.pictures, strict=True):
-        assert all(np.array_equal(value, fields_of(other)[name]) for name, value in fields_of(one).items())
+    for expected, actual in zip(whole.pictures, continued.pictures, strict=True):
+        assert all(np.array_equal(value, fields_of(actual)[name]) for name, value in fields_of(expected).items())
 
 
 def test_a_flow_is_read_as_it_was_written(tmp_path):
@@ -239,11 +239,11 @@ def test_a_flow_is_read_as_it_was_written(tmp_path):
     )
     write_flow(tmp_path, result)
     read = read_flow(tmp_path)
-    assert [one.time for one in read.pictures] == [one.time for one in result.pictures]
+    assert [picture.time for picture in read.pictures] == [picture.time for picture in result.pictures]
     assert read.history.keys() == result.history.keys()
     assert np.array_equal(read.walls, result.walls)
     assert "seconds" not in read.metrics
-    points = np.concatenate([one.points for one in read.pictures])
+    points = np.concatenate([picture.points for picture in read.pictures])
     assert points[:, 0].min() >= 0.0 and points[:, 0].max() <= 1.25e-3
 
 

@@ -1,4 +1,4 @@
-"""Steady motion: a body that slides without resistance reaches its goal in a few steps of any size."""
+"""Steady motion: a freely sliding body reaches its goal in a few steps of any size."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ class Slope:
 
 
 def drop(pull):
-    """A drop at rest on a uniform wall, 90 degrees, that a force pulls along it."""
+    """Return a drop of 90 degrees at rest on a uniform wall, pulled by a tangential force."""
     cloud = box_cloud(1.0, 6)
     ring = cloud.rings[0]
     local = cloud.plates[0].local(cloud.points[ring])

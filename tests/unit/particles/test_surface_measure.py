@@ -20,7 +20,7 @@ CLOUDS = [box_cloud(1.0, 5), joint_cloud(JointGeometry(1.0, 0.8, 0.6), 1.9, 0.25
 
 
 def shaken(cloud, seed=6):
-    """Points moved at random, on the walls within them."""
+    """Return randomly displaced points, tangential on walls."""
     move = 0.05 * cloud.spacing * np.random.default_rng(seed).normal(size=cloud.points.shape)
     move[cloud.wall >= 0, 2] = 0.0
     return cloud.points + move
@@ -48,15 +48,15 @@ def test_area_equals_numpy_twin(cloud):
 
 @pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
 def test_volume_equals_numpy_twin(cloud):
-    """Twin: the integral of z n_z over the free surface and over the upper wall."""
+    """The twin integrates z n_z over the free surface and the upper wall."""
     points = shaken(cloud)
     a, b, c = (points[cloud.triangles[:, k]] for k in range(3))
     free = float((np.cross(b - a, c - a)[:, 2] * (a + b + c)[:, 2]).sum() / 6)
     walls = sum(
         plate.origin[2] * ring_area(points, ring) for ring, plate in zip(cloud.rings[1:], cloud.plates[1:], strict=True)
     )
-    found = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.plates)
-    assert found == pytest.approx(free + walls)
+    volume = enclosed_volume(points, cloud.triangles, cloud.rings, cloud.plates)
+    assert volume == pytest.approx(free + walls)
 
 
 @pytest.mark.parametrize("cloud", CLOUDS, ids=["drop", "joint"])
@@ -96,7 +96,7 @@ def test_potential_energy_is_weight_times_height_of_the_centroid():
 
 @pytest.mark.parametrize("cloud", CLOUDS)
 def test_the_force_of_gravity_is_the_gradient_of_its_energy(cloud):
-    """Exactly, in any direction: not of the integral that the triangles stand for, but of what they give for it."""
+    """The force is the exact gradient of the discrete energy in any direction."""
     body, gravity = Body.at_rest(cloud), Gravity(3.0)
     points = shaken(cloud)
     direction = np.random.default_rng(11).normal(size=points.shape)
@@ -120,7 +120,7 @@ def test_the_gradient_of_the_area_is_that_of_the_stiffness():
 
 
 def test_the_stiffness_of_the_area_is_nearly_its_second_derivative():
-    """Of a ball that is stretched at its volume; a flat sheet resists what moves it across, and some along it."""
+    """The test stretches a ball at constant volume; a flat sheet resists normal and some tangential displacements."""
     cloud = sphere_cloud(1.0, 6)
     points, triangles, count = cloud.points, cloud.triangles, cloud.surface_count
     stretch = np.array([-1.0, -1.0, 2.0])

@@ -8,7 +8,7 @@ from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoo
 
 
 def opposite_angle_sums(points, triangles):
-    """NumPy twin: sum of the two angles opposite to each inner edge."""
+    """Return the sum of the two angles opposite each inner edge, by NumPy."""
     sums = {}
     for triangle in triangles:
         for k in range(3):
@@ -38,8 +38,8 @@ def test_a_delaunay_surface_is_left_alone():
     assert (triangles == cloud.triangles).all()
 
 
-def test_flips_even_out_the_triangles_around_the_vertices_of_squares():
-    """They have eight and four by turns, all Delaunay; another time none are flipped, nor back."""
+def test_flips_equalise_vertex_valences_of_squares():
+    """Vertices alternate between eight and four Delaunay triangles; a second pass flips none."""
     cloud = box_cloud(1.0, 8)
     count = cloud.surface_count
     top = np.flatnonzero((cloud.points[:, 2] == 1.0) & (np.abs(cloud.points[:, :2]) < 0.3).all(axis=1))
@@ -52,7 +52,7 @@ def test_flips_even_out_the_triangles_around_the_vertices_of_squares():
 
 
 def test_flips_of_one_pass_do_not_double_an_edge():
-    """Both edges along a narrow finger ask for the same edge across: with it twice the tip would be a flat flap."""
+    """Both edges along a narrow finger would flip to the same edge, which would make the tip a flat flap."""
     points = np.array([[0.0, 0, 0], [1, 0, 0.1], [0.3, 0.1, 0], [1, 0, -0.1], [0.3, -0.1, 0], [2, 0, 0]])
     sides = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [5, 2, 1], [5, 3, 2], [5, 4, 3], [5, 1, 4]]
     triangles, flips = flip_to_delaunay(points, np.array(sides, np.int32), ())
@@ -79,9 +79,9 @@ def test_smoothing_equals_numpy_twin():
     area = np.linalg.norm(normal, axis=1)
     offset = smoothing_offsets(points, cloud.triangles, count, cloud.rings)
     for vertex in np.setdiff1d(np.arange(count), cloud.rings[0]):
-        own = (cloud.triangles == vertex).any(axis=1)
-        mean = area[own] @ corner[own].mean(axis=1) / area[own].sum() - points[vertex]
-        n = normal[own].sum(axis=0)
+        incident = (cloud.triangles == vertex).any(axis=1)
+        mean = area[incident] @ corner[incident].mean(axis=1) / area[incident].sum() - points[vertex]
+        n = normal[incident].sum(axis=0)
         n /= np.linalg.norm(n)
         assert offset[vertex] == pytest.approx(0.3 * (mean - (mean @ n) * n), abs=1e-14)
 

@@ -1,4 +1,4 @@
-"""A part of a body between planes of symmetry measures what the whole does, and stays on the planes."""
+"""Half and quarter bodies between planes of symmetry have the measures of the whole body."""
 
 from math import inf
 
@@ -18,7 +18,7 @@ AXES = [(0,), (0, 1)]
 
 
 def drop(axes=(), pad_radius=inf) -> tuple[Body, Physics]:
-    """A cube bulged by the same smooth map, whole or cut."""
+    """Return a cube deformed by the same smooth map, whole or cut."""
     cloud = cut(box_cloud(1e-3, 5), axes)
     physics = build_physics(SOLDER, ON, (contact_line(cloud, 0, pad_radius, SOLDER),))
     body = Body.at_rest(cloud)
@@ -29,7 +29,7 @@ def drop(axes=(), pad_radius=inf) -> tuple[Body, Physics]:
 
 
 def in_whole(part, whole):
-    """Number in the whole of each particle of the part."""
+    """Return the index in the whole body of each particle of the part."""
     distance = np.linalg.norm(whole.cloud.points[None] - part.cloud.points[:, None], axis=2)
     assert distance.min(axis=1).max() < 1e-15
     return distance.argmin(axis=1)

@@ -72,7 +72,7 @@ def test_constraint_is_the_gradient_of_volumes(drop):
 
 
 def test_mass_is_exact_for_linear_velocities(drop):
-    """Second moments of the polyhedron, from the tetrahedra (origin, surface triangle)."""
+    """The reference is the second moments of the tetrahedra (origin, surface triangle)."""
     body, tetrahedra = drop
     corners = body.points[body.triangles]
     volumes = np.einsum("td,td->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
@@ -90,7 +90,7 @@ def test_stabilisation_sees_no_linear_pressure(drop):
 
 
 def test_viscous_power_of_simple_flows(drop):
-    """2 mu D : D over the drop: shear mu V, extension 4 mu V, rotation none."""
+    """The integral of 2 mu D : D is mu V in shear, 4 mu V in extension and zero in rotation."""
     body, tetrahedra = drop
     space = tetrahedra(body)
     matrix, volume = Viscosity(2.0).matrix(body, space, 1.0), space.weights.sum()
@@ -102,7 +102,7 @@ def test_viscous_power_of_simple_flows(drop):
 
 
 def test_backward_difference_is_of_second_order():
-    """x'' = -x with steps of alternating size; the damping of the first-order start is part of the error."""
+    """Steps of x'' = -x alternate in size; the error includes the damping of the first-order start."""
     errors = []
     for steps in (50, 100, 200):
         sizes = np.where(np.arange(steps) % 2 == 0, 0.8, 1.2) / steps

@@ -1,4 +1,4 @@
-"""Films and rims of droplets: friction of the wall, the surface that stays with its particles, its triangles."""
+"""Thin films and rims of droplets: wall friction, surface tracking and triangle quality."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,13 @@ import pytest
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.surface_care import evened_out, on_wall, strays, without_dry_spots
-from reflowshock.particles.sph.surface_loops import find_weights
-from reflowshock.particles.sph.thin_films import hold_films
+from reflowshock.particles.sph.surface_coupling import find_weights
+from reflowshock.particles.sph.thin_films import add_wall_friction, film_sums
 from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
-from reflowshock.particles.surface.closing import narrowest_gap
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
+from reflowshock.particles.surface.morphological_closing import narrowest_gap
+from reflowshock.particles.surface.remeshing import smoothed, without_dry_spots
+from reflowshock.particles.surface.surface_mesh import on_wall
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 1.0}
@@ -21,7 +22,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def film(layers, height):
-    """A film on a wall that holds it, periodic, of particles a spacing of one apart or over a height; viscosity one."""
+    """Return a periodic film on a no-slip wall with unit spacing or a given height, and unit viscosity."""
     law, _ = liquid_of(Droplet(**INK | {"viscosity": 1.0, "speed": 1.0}, numerics=COARSE), 1.0)
     wide = ACROSS / np.sqrt(height / layers)
     law = law._replace(period_x=wide, period_y=wide, sound=1e3, diffusion=0.0, gravity_z=0.0, shifting=0.0)
@@ -32,7 +33,7 @@ def film(layers, height):
 
 
 def mean_speed(layers):
-    """Of a film under a force along the wall, over Nusselt's H^2 / 3: particles of one layer move alike."""
+    """Return the mean speed under a tangential force over Nusselt's H^2 / 3; layers move uniformly."""
     simulation = film(layers, layers)
     fields, drag = simulation.fields, np.empty((layers, layers))
     layer = np.round(fields.z - 0.5).astype(int)
@@ -44,14 +45,14 @@ def mean_speed(layers):
 
 
 def test_a_wall_holds_a_film_as_in_nusselts_solution():
-    """With the viscosity along the line of two particles, images too, films of 2 and 4 were 1.28 and 1.16 too fast."""
+    """With pairwise radial viscosity, films of 2 and 4 particles were too fast by factors of 1.28 and 1.16."""
     assert mean_speed(2) == pytest.approx(1.0, abs=0.2)
     assert mean_speed(4) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("height", [0.6, 0.8, 1.0])
 def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
-    """3 mu u / H a unit of area; sums over images alone give a ninth to a half of it."""
+    """The friction is 3 mu u / H per area; sums over images alone give a ninth to a half of it."""
     simulation = film(1, height)
     fields, law = simulation.fields, simulation.law
     fields.u[:] = 1.0
@@ -62,7 +63,8 @@ def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
     lists = np.arange(0, count * count + 1, count, dtype=np.int32), np.tile(np.arange(count, dtype=np.int32), count)
     weights = np.empty((2, 2, count * count))
     find_weights(points, lists, fields, law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, law, simulation.rates)
+    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], count)
+    add_wall_friction(sums, fields, law, simulation.rates)
     assert by_images < 0.6 * height**2
     assert -simulation.rates[1].mean() * height**2 / 3.0 == pytest.approx(1.0, abs=0.05)
 
@@ -76,21 +78,22 @@ def test_a_film_of_two_particles_is_left_to_the_sums_over_pairs():
     lists = np.array([0, simulation.fluids], np.int32), np.arange(simulation.fluids, dtype=np.int32)
     weights = np.empty((2, 2, simulation.fluids))
     find_weights(points, lists, fields, simulation.law, weights)
-    hold_films((points, UP * np.ones_like(points), lists, weights[1]), fields, simulation.law, simulation.rates)
+    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], simulation.fluids)
+    add_wall_friction(sums, fields, simulation.law, simulation.rates)
     assert np.array_equal(simulation.rates, before)
 
 
 def test_vertices_that_particles_pass_or_leave_behind_follow_them():
     simulation = droplet(Droplet(**INK, numerics=COARSE))
     surface, spacing = simulation.surface, simulation.law.spacing
-    normals, lists = surface._normals(), surface._lists
-    assert not strays((surface.points, normals), lists, simulation.fields, spacing).any()
+    normals, coupling = surface.mesh.normals(), surface.coupling
+    assert not coupling.distances_to_cover(surface.points, normals, simulation.fields).any()
     for shift, sign in ((-0.8, 1.0), (1.8, -1.0)):
         moved = surface.points + shift * spacing * normals
-        found = strays((moved, normals), lists, simulation.fields, spacing)
-        assert (sign * found >= 0.0).all() and (found != 0.0).mean() > 0.3
+        stray = coupling.distances_to_cover(moved, normals, simulation.fields)
+        assert (sign * stray >= 0.0).all() and (stray != 0.0).mean() > 0.3
         depth = (
-            np.linalg.norm(moved + found[:, None] * normals, axis=1)
+            np.linalg.norm(moved + stray[:, None] * normals, axis=1)
             - np.linalg.norm(np.array(simulation.fields[:3]), axis=0).max()
         )
         assert depth.min() > -spacing and depth.max() < 2.0 * spacing
@@ -104,15 +107,15 @@ def test_what_faces_the_wall_wets_it_and_a_film_is_not_yet_dry():
 
 
 def test_sharp_bends_of_contact_lines_are_blunted_and_round_ones_stay():
-    """A fan of triangles: a circle of twelve, one of whose vertices is a spike."""
+    """A fan of twelve triangles has one spike on its circle."""
     angles = 2.0 * np.pi * np.arange(12) / 12
     points = np.concatenate(([[0.0, 0.0, 1.0]], np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)))
     ring = np.arange(1, 13, dtype=np.int32)
     triangles = np.stack((np.zeros(12, np.int32), ring, np.roll(ring, -1)), axis=1).astype(np.int32)
-    round_one, _ = evened_out(points, triangles, (ring,), (ring,))
+    round_one, _ = smoothed(points, triangles, (ring,), (ring,))
     assert np.linalg.norm(round_one[ring], axis=1) == pytest.approx(1.0, abs=1e-12)
     points[3] *= 2.0
-    blunt, _ = evened_out(points, triangles, (ring,), (ring,))
+    blunt, _ = smoothed(points, triangles, (ring,), (ring,))
     assert 1.2 < np.linalg.norm(blunt[3]) < 1.8
 
 
@@ -125,7 +128,7 @@ def test_a_notch_is_no_gap():
 
 
 def test_a_dry_spot_smaller_than_a_particle_is_closed():
-    """A plate of triangles on a wall, in the middle of which one is missing."""
+    """One triangle is missing in the middle of a triangulated plate on a wall."""
     x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
     points = np.stack((x.ravel(), y.ravel(), np.full(25, 0.5)), axis=1)
     corner = np.array([i + 5 * j for j in range(4) for i in range(4)], np.int32)

@@ -7,7 +7,7 @@ from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep, large
 
 
 def test_a_flow_that_no_step_can_follow_is_an_error():
-    """Speed grows as the step shrinks: an unstable scheme."""
+    """In an unstable scheme the speed grows as the step decreases."""
     step = TimeStep(largest=1e-6, spacing=1e-4, size=1e-6)
     with pytest.raises(StepCollapsed, match="unstable"):
         while not step.accepts(speed=1e-3 / step.size):
@@ -44,7 +44,7 @@ def test_a_step_at_its_bound_goes_on_as_far_as_the_spacing_allows_and_the_next_o
 
 
 def test_ispg_may_take_as_many_steps_as_its_slowest_swing_needs_to_die_away():
-    """Values of the paper: a swing decays at 5 mu / (rho R^2) and has 30 steps a period, 3501 steps in all."""
+    """For published values an oscillation decays with 5 mu / (rho R^2) at 30 steps per period: 3501 steps."""
     numerics = SolderNumerics(scheme="ispg", time_step_limit=100.0)
     solder = Solder(volume=1e-9, surface_tension=4.985, viscosity=0.227, numerics=numerics)
     size, bound = largest_step(solder, 1e-4)
@@ -63,6 +63,6 @@ def test_the_case_says_how_many_steps_else_a_thousand(settings, steps):
 
 
 def test_ispg_takes_no_more_steps_than_the_process():
-    """Without viscosity a swing never dies away."""
+    """Without viscosity an oscillation never decays."""
     solder = Solder(volume=1e-9, viscosity=1e-9, process_time=0.1, numerics=SolderNumerics(scheme="ispg"))
     assert most_steps(solder, 1e-4) == 1000 + ceil(0.1 / largest_step(solder, 1e-4)[0])

@@ -1,4 +1,4 @@
-"""Solve of the surface alone at constant volume."""
+"""Surface-only solution at constant volume."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from reflowshock.particles.discretisation.volume_constraint import solve_volume
 
 
 def test_what_nothing_moves_stays_where_it_is():
-    """The last unknown has no stiffness and no load, as the shift of a plate whose edges hold no particle."""
+    """The last unknown has no stiffness and load, like the shift of a plate without pinned particles."""
     operator = sparse.csr_matrix(np.array([[2.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]]))
     operator.eliminate_zeros()
     constraint = sparse.csr_matrix([[1.0, 1.0, 0.0]])

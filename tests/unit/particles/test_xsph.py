@@ -1,4 +1,4 @@
-"""XSPH: particles move with a smoothed velocity; momentum and the centre of mass are what they are without it."""
+"""XSPH moves particles with a smoothed velocity and conserves momentum and centre of mass."""
 
 import numpy as np
 import pytest
@@ -16,10 +16,10 @@ def ink(xsph, **changes):
 
 
 def drifts(simulation):
-    found, rows = np.empty((3, simulation.fluids)), simulation.particles.rows
+    velocities, rows = np.empty((3, simulation.fluids)), simulation.particles.rows
     for i in range(simulation.fluids):
-        found[:, i] = drift_of(np.uint64(i), simulation.fluids, rows.of(i), simulation.fields, simulation.law)
-    return found
+        velocities[:, i] = drift_of(np.uint64(i), simulation.fluids, rows.of(i), simulation.fields, simulation.law)
+    return velocities
 
 
 def test_noise_is_smoothed_and_the_centre_of_mass_stays():
@@ -28,17 +28,17 @@ def test_noise_is_smoothed_and_the_centre_of_mass_stays():
     for speed in fields[3:6]:
         speed[:] = random.normal(size=simulation.fluids)
     fields.density[:] *= random.uniform(0.95, 1.05, simulation.fluids)
-    found = drifts(simulation)
-    assert np.abs(found @ fields.mass).max() < 1e-12 * np.abs(found).max() * fields.mass.sum()
-    assert np.std(fields.u + found[0]) < 0.85 * np.std(fields.u)
-    pairwise = np.zeros(3)  # a plain sum over all pairs, for one particle
+    drift = drifts(simulation)
+    assert np.abs(drift @ fields.mass).max() < 1e-12 * np.abs(drift).max() * fields.mass.sum()
+    assert np.std(fields.u + drift[0]) < 0.85 * np.std(fields.u)
+    pairwise = np.zeros(3)  # sum over all pairs for one particle
     law, i = simulation.law, 40
     for j in range(simulation.fluids):
         q = np.linalg.norm([fields[k][i] - fields[k][j] for k in range(3)]) / law.length
         level = 1.0 - 1.5 * q * q * (1.0 - 0.5 * q) if q < 1.0 else 0.25 * max(2.0 - q, 0.0) ** 3
         weight = 0.5 * fields.mass[j] * level / (np.pi * law.length**3 * 0.5 * (fields.density[i] + fields.density[j]))
         pairwise += weight * np.array([fields[3 + k][j] - fields[3 + k][i] for k in range(3)])
-    assert found[:, i] == pytest.approx(pairwise, rel=1e-12)
+    assert drift[:, i] == pytest.approx(pairwise, rel=1e-12)
 
 
 def test_what_moves_as_a_whole_is_not_touched_and_beside_a_wall_the_image_counts():
@@ -47,9 +47,9 @@ def test_what_moves_as_a_whole_is_not_touched_and_beside_a_wall_the_image_counts
     assert not drifts(simulation).any()
     above = ink(0.5, contact_angle=1.5)
     above.fields.u[:], above.fields.w[:] = 3.0, -1.0
-    found, near = drifts(above), above.fields.z < above.law.length
-    assert not found[:2].any()  # along the wall an image moves on
-    assert (found[2, near] > 0.0).all()  # across it, it comes back
+    drift, near = drifts(above), above.fields.z < above.law.length
+    assert not drift[:2].any()  # along the wall the image has the same velocity
+    assert (drift[2, near] > 0.0).all()  # across the wall it is reversed
 
 
 def test_a_drop_rests_with_it_as_without_it():
@@ -59,7 +59,7 @@ def test_a_drop_rests_with_it_as_without_it():
             simulation.step(simulation.time_step())
     widths = [np.ptp(simulation.surface.points, axis=0) for simulation in pair]
     assert widths[1] == pytest.approx(widths[0], rel=0.03)
-    momentum = np.array([one @ simulation.fields.mass for one in simulation.fields[3:6]])
+    momentum = np.array([component @ simulation.fields.mass for component in simulation.fields[3:6]])
     assert np.abs(momentum).max() < 1e-10 * simulation.fields.mass.sum()
 
 

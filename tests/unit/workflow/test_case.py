@@ -1,4 +1,4 @@
-"""Reading a case, and refusing what is no case: each message names place, key, value, range and nearest name."""
+"""Reading and validation of case files: each message names file, key, value and allowed values."""
 
 import os
 import re
@@ -220,11 +220,11 @@ def test_more_ranks_are_welcome_with_oversubscribe():
 
 
 def test_values_are_shown_in_the_units_of_users():
-    shown = display_values(read_case(SMALL_CASE))
-    assert shown["package.pitch"] == "1 mm"
-    assert shown["shock.peak_acceleration"] == "1500 G"
-    assert shown["solder.mask_contact_angle"] == "148 deg"
-    assert shown["shock.numerics.modes"] == "[two_scale, dns]"
+    values = display_values(read_case(SMALL_CASE))
+    assert values["package.pitch"] == "1 mm"
+    assert values["shock.peak_acceleration"] == "1500 G"
+    assert values["solder.mask_contact_angle"] == "148 deg"
+    assert values["shock.numerics.modes"] == "[two_scale, dns]"
 
 
 def test_cores_are_those_of_this_process():

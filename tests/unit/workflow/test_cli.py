@@ -45,11 +45,11 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
     path = tmp_path / "mine.toml"
     mine, template = (display_values(read_case(file)) for file in (path, DEFAULT))
     assert mine == template | {"case.name": "mine"}
-    given = dict(flat(tomllib.loads(path.read_text())))
-    names = {key: name for key, name in given.items() if key.startswith("materials.")}
+    values = dict(flat(tomllib.loads(path.read_text())))
+    names = {key: name for key, name in values.items() if key.startswith("materials.")}
     materials = read_case(path).materials.by_role
     assert {role: LIBRARY[names[f"materials.{role}"]] for role in materials} == materials
-    others = [{key for key in keys if not key.startswith(("scales.", "materials."))} for keys in (given, mine)]
+    others = [{key for key in keys if not key.startswith(("scales.", "materials."))} for keys in (values, mine)]
     assert others[0] == others[1]
 
 
@@ -63,21 +63,21 @@ def flat(table: dict, prefix: str = ""):
 
 def test_a_plan_for_scripts(call):
     code, output, _ = call("plan", str(CASE), "--set", "scale=quick", "--json")
-    found = json.loads(output)
+    plan = json.loads(output)
     assert code == 0
-    assert found["stages"]["shock"] == {
+    assert plan["stages"]["shock"] == {
         "runs": True,
         "why": "no product yet",
-        "seconds": found["stages"]["shock"]["seconds"],
+        "seconds": plan["stages"]["shock"]["seconds"],
     }
-    stages = sum(stage["seconds"] or 0.0 for stage in found["stages"].values())
-    assert found["seconds"] == pytest.approx(found["compilation"] + stages)
-    assert found["effects"]["gravity"]["why"]
+    stages = sum(stage["seconds"] or 0.0 for stage in plan["stages"].values())
+    assert plan["seconds"] == pytest.approx(plan["compilation"] + stages)
+    assert plan["effects"]["gravity"]["why"]
 
 
 def test_a_dry_run_is_a_plan(call, tmp_path):
-    shown = call("run", str(CASE), "--set", "scale=quick", "--dry-run")
-    assert shown == call("plan", str(CASE), "--set", "scale=quick")
+    output = call("run", str(CASE), "--set", "scale=quick", "--dry-run")
+    assert output == call("plan", str(CASE), "--set", "scale=quick")
     assert not list(tmp_path.iterdir())
 
 
@@ -158,7 +158,7 @@ def test_another_case_is_not_cleaned(call, tmp_path):
     with locked(tmp_path / "run", "run", "other"):
         pass
     code, _, errors = call("clean", str(CASE), "--out", str(tmp_path / "run"))
-    assert (code, "holds the run of other" in errors) == (2, True)
+    assert (code, "contains the run of other" in errors) == (2, True)
 
 
 def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):

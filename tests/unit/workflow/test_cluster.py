@@ -47,11 +47,14 @@ def case(name: str, *settings: str):
 
 
 def test_ranks_and_cores_of_a_package_become_tasks():
-    found = stage_resources(case("bga_drop", "shock.ranks.total=6", "reflow.ranks=5"))
-    assert list(found) == ["geometry", "reflow", "surface", "solder_mesh", "shock"]
-    assert {stage: one.tasks for stage, one in found.items() if one.tasks > 1} == {"reflow": 5, "shock": 6}
-    assert found["shock"].of_rule("srun --mpi=pmix")["mpi"] == "srun --mpi=pmix"
-    assert "mpi" not in found["geometry"].of_rule("mpirun")
+    resources = stage_resources(case("bga_drop", "shock.ranks.total=6", "reflow.ranks=5"))
+    assert list(resources) == ["geometry", "reflow", "surface", "solder_mesh", "shock"]
+    assert {stage: resource.tasks for stage, resource in resources.items() if resource.tasks > 1} == {
+        "reflow": 5,
+        "shock": 6,
+    }
+    assert resources["shock"].of_rule("srun --mpi=pmix")["mpi"] == "srun --mpi=pmix"
+    assert "mpi" not in resources["geometry"].of_rule("mpirun")
     alone = stage_resources(case("bga_drop"), cores=4)
     assert (alone["reflow"].tasks, alone["reflow"].cpus_per_task) == (1, 4)
 
@@ -67,7 +70,7 @@ def test_walltime_and_memory_follow_what_plan_foresees():
 def test_each_kind_of_case_has_jobs():
     assert list(stage_resources(case("sessile_drop"))) == ["reflow"]
     board = stage_resources(case("jedec_board", "dynamics.ranks=3"))
-    assert {stage: one.tasks for stage, one in board.items()} == {"geometry": 1, "shock": 3}
+    assert {stage: resource.tasks for stage, resource in board.items()} == {"geometry": 1, "shock": 3}
 
 
 def test_the_profile_that_comes_along_can_be_read():

@@ -120,8 +120,8 @@ def test_auto_kinematics_follow_the_deflection():
     assert decided(soft).shock.numerics.kinematics == "small"
     far = read_case(CASES / "bga_drop/case.toml", [auto], True)
     assert decided(far).shock.numerics.kinematics == "corotational"
-    told = kind_of(far).forecast(far).effects["finite_rotation"]
-    assert told["on"] and "auto" in told["why"] and told["influence"] > 0.3
+    decision = kind_of(far).forecast(far).effects["finite_rotation"]
+    assert decision["on"] and "auto" in decision["why"] and decision["influence"] > 0.3
     with pytest.raises(ValueError, match="decided by the case"):
         _ = far.shock.numerics.decided_kinematics
 

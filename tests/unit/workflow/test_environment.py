@@ -1,4 +1,4 @@
-"""The environment of the program and of all that it starts is completed, and what is too small is told."""
+"""Environment of the program and its subprocesses: defaults are set, and folders that are too small are reported."""
 
 import os
 import resource
@@ -19,63 +19,66 @@ from reflowshock.workflow.process.environment import (
 
 @pytest.fixture
 def nowhere(tmp_path):
-    """A path that is no folder, nor can become one."""
+    """A path that is not a folder and cannot be created."""
     (tmp_path / "file").write_text("", encoding="utf-8")
     return str(tmp_path / "file" / "folder")
 
 
 def test_places_of_the_user_stay(tmp_path):
-    own = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    found = dict(own)
+    original = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    found = dict(original)
     complete(found)
-    assert {name: found[name] for name in own} == own
+    assert {name: found[name] for name in original} == original
     assert found["NUMBA_CACHE_DIR"].startswith(str(tmp_path / "cache"))
     assert not {"XDG_CONFIG_HOME", "XDG_DATA_HOME", "MPLCONFIGDIR"} & set(found)
 
 
 def test_twice_is_as_once(tmp_path, nowhere):
-    found = {"HOME": nowhere, "TMPDIR": str(tmp_path)}
-    complete(found)
-    once = dict(found)
-    complete(found)
-    assert found == once
+    variables = {"HOME": nowhere, "TMPDIR": str(tmp_path)}
+    complete(variables)
+    once = dict(variables)
+    complete(variables)
+    assert variables == once
 
 
 def test_a_home_that_is_not_there_is_a_private_temporary_folder(tmp_path, nowhere):
-    found = {"HOME": nowhere, "TMPDIR": str(tmp_path)}
-    complete(found)
+    variables = {"HOME": nowhere, "TMPDIR": str(tmp_path)}
+    complete(variables)
     home = tmp_path / f"reflowshock-{os.getuid()}"
-    assert found["HOME"] == str(home)
+    assert variables["HOME"] == str(home)
     assert stat.S_IMODE(home.stat().st_mode) == 0o700
-    assert found["NUMBA_CACHE_DIR"].startswith(str(home))
+    assert variables["NUMBA_CACHE_DIR"].startswith(str(home))
 
 
 def test_a_home_that_cannot_be_written_to_stays_but_nothing_is_kept_there(tmp_path):
-    found = {"HOME": "/proc", "TMPDIR": str(tmp_path)}
-    complete(found)
-    assert found["HOME"] == "/proc"
-    assert all(found[name].startswith(str(tmp_path)) and os.path.isdir(found[name]) for name in environment.PLACES)
+    variables = {"HOME": "/proc", "TMPDIR": str(tmp_path)}
+    complete(variables)
+    assert variables["HOME"] == "/proc"
+    assert all(
+        variables[name].startswith(str(tmp_path)) and os.path.isdir(variables[name])
+        for name in environment.USER_FOLDERS
+    )
 
 
-@pytest.mark.parametrize("name", [*environment.PLACES, "NUMBA_CACHE_DIR"])
+@pytest.mark.parametrize("name", [*environment.USER_FOLDERS, "NUMBA_CACHE_DIR"])
 def test_a_named_place_that_cannot_be_written_to_is_another(tmp_path, nowhere, name):
-    found = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), name: nowhere}
-    complete(found)
-    assert found[name].startswith(str(tmp_path))
-    assert found[name] != nowhere
+    variables = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), name: nowhere}
+    complete(variables)
+    assert variables[name].startswith(str(tmp_path))
+    assert variables[name] != nowhere
 
 
 def test_matplotlib_finds_its_own_place(tmp_path, nowhere):
-    found = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "MPLCONFIGDIR": nowhere}
-    complete(found)
-    assert "MPLCONFIGDIR" not in found
+    variables = {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), "MPLCONFIGDIR": nowhere}
+    complete(variables)
+    assert "MPLCONFIGDIR" not in variables
 
 
 def test_temporary_files_go_where_they_can(tmp_path, nowhere, monkeypatch):
     monkeypatch.setattr(environment, "TEMPORARY", (nowhere, str(tmp_path)))
-    found = {"HOME": str(tmp_path), "TMPDIR": nowhere}
-    complete(found)
-    assert found["TMPDIR"] == str(tmp_path)
+    variables = {"HOME": str(tmp_path), "TMPDIR": nowhere}
+    complete(variables)
+    assert variables["TMPDIR"] == str(tmp_path)
 
 
 def test_nowhere_to_write_is_told(nowhere, monkeypatch):
@@ -95,21 +98,21 @@ def test_a_folder_that_somebody_else_has_made_is_not_trusted(tmp_path):
 
 
 def test_what_a_job_of_mpi_left_is_removed(tmp_path):
-    found = {
+    variables = {
         "HOME": str(tmp_path), "OMPI_COMM_WORLD_SIZE": "1", "PMIX_RANK": "0", "OMPI_MCA_ess": "x", "PMI_RANK": "0",
         "OMPI_MCA_btl": "self", "PMIX_MCA_gds": "hash",
     }  # fmt: skip
-    complete(found)
-    assert {name for name in found if name.startswith(("OMPI", "PMI"))} == {"OMPI_MCA_btl", "PMIX_MCA_gds"}
+    complete(variables)
+    assert {name for name in variables if name.startswith(("OMPI", "PMI"))} == {"OMPI_MCA_btl", "PMIX_MCA_gds"}
 
 
 def test_several_ranks_are_refused_by_the_first():
     for rank in "01":
         with pytest.raises(
             EnvironmentProblem, match="started on 2 MPI ranks; start it without mpirun, it starts its own"
-        ) as told:
+        ) as raised:
             check_ranks({"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": rank})
-        assert (told.value.exit_code, told.value.silent) == (2, rank == "1")
+        assert (raised.value.exit_code, raised.value.silent) == (2, rank == "1")
     check_ranks({"OMPI_COMM_WORLD_SIZE": "1"})
 
 
@@ -133,9 +136,9 @@ def test_more_files_are_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(resource, "getrlimit", lambda one: (32, 100_000))
     monkeypatch.setattr(resource, "setrlimit", lambda one, limits: asked.append((one, limits)))
-    monkeypatch.setattr(environment, "LEAST", ())
+    monkeypatch.setattr(environment, "MINIMUM_LIMITS", ())
     check_limits()
-    assert asked == [(resource.RLIMIT_NOFILE, (environment.WANTED_FILES, 100_000))]
+    assert asked == [(resource.RLIMIT_NOFILE, (environment.TARGET_FILES, 100_000))]
 
 
 def test_threads_that_cannot_be_started_are_told(monkeypatch):

@@ -1,4 +1,4 @@
-"""What a run of the package fem says on its standard output reaches the user."""
+"""Messages and progress that a run of the package fem prints."""
 
 import json
 
@@ -6,8 +6,8 @@ from reflowshock.workflow.process.fem_launch import _pass_on
 
 
 def test_progress_and_warnings_are_passed_on_and_other_words_are_not(caplog):
-    told = []
+    messages = []
     for line in (json.dumps({"warning": "a file is broken"}), "scheme: held velocity", '{"progress": 0.25, "time": 1}'):
-        _pass_on(line, told.append)
-    assert told == [0.25]
+        _pass_on(line, messages.append)
+    assert messages == [0.25]
     assert [record.message for record in caplog.records] == ["a file is broken"]

@@ -62,9 +62,9 @@ def test_a_new_case_shows_what_the_keys_take():
     [("all", "two_way", False), ("critical", "two_way", True), (("A3",), "two_way", True), ("all", "one_way", True)],
 )
 def test_coarse_joints_are_an_effect_of_what_is_not_fine(chosen, direction, needed):
-    given = {"fine_joints": chosen, "direction": direction}
+    parameters = {"fine_joints": chosen, "direction": direction}
     case = read_case(SMALL_CASE)
-    coupling = case.shock.coupling.model_copy(update=given)
+    coupling = case.shock.coupling.model_copy(update=parameters)
     assert needs_coarse_joints(coupling) is needed
     effect = of_joint_meshes(changed(case, "shock.coupling", coupling))["coarse_joints"]
     assert effect["on"] is needed

@@ -181,10 +181,10 @@ def test_problems_have_the_place_of_their_key(tmp_path):
         read_case(path, ["scale=quick", "board.width=1 kg"])
     problems = {problem.key: problem for problem in caught.value.problems}
     assert (problems["package.pitch"].line, problems["package.pitch"].column) == (number + 1, 1)
-    told = "\n".join(caught.value.lines())
-    assert f'{path}:{number + 1}:1: package.pitch = "1 kg": is a mass; expected a length' in told
-    assert f"{path}:{len(lines) + 2}:1 [scales.quick]: board.thickness" in told
-    assert "--set: board.width" in told
+    output = "\n".join(caught.value.lines())
+    assert f'{path}:{number + 1}:1: package.pitch = "1 kg": is a mass; expected a length' in output
+    assert f"{path}:{len(lines) + 2}:1 [scales.quick]: board.thickness" in output
+    assert "--set: board.width" in output
 
 
 def test_a_message_is_one_line_of_what_can_be_seen(tmp_path):
@@ -215,7 +215,7 @@ def test_units_are_annotations_of_quantities(kind):
     """Else a case could only have bare numbers."""
     for model in _reachable(kind):
         for name, field in model.model_fields.items():
-            assert not any(isinstance(one, str) for one in field.metadata), f"{model.__name__}.{name}"
+            assert not any(isinstance(annotation, str) for annotation in field.metadata), f"{model.__name__}.{name}"
 
 
 @pytest.mark.parametrize("path", templates().values(), ids=templates())

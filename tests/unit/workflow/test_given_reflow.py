@@ -27,8 +27,8 @@ NAMES = ("A3", "A4", "B3", "B4")
 def run(tmp_path) -> Run:
     """A case of which all joints are given, one of them wider."""
     for name in NAMES:
-        given = barrel(0.35 * MM, (0.1 if name == "A4" else 0.06) * MM)
-        meshio.write(tmp_path / f"{name}.stl", meshio.Mesh(given.points / MM, [("triangle", given.triangles)]))
+        shape = barrel(0.35 * MM, (0.1 if name == "A4" else 0.06) * MM)
+        meshio.write(tmp_path / f"{name}.stl", meshio.Mesh(shape.points / MM, [("triangle", shape.triangles)]))
     settings = [f'package.surfaces.{name}="{tmp_path / name}.stl"' for name in NAMES]
     case = read_case(SMALL_CASE, ["warpage.corner=0 mm", "package.standoff=0.35 mm", *settings], oversubscribe=True)
     for name in ("geometry", "reflow"):
@@ -38,7 +38,7 @@ def run(tmp_path) -> Run:
 
 
 def test_nothing_is_reflowed_and_records_tell_what_was_given(run):
-    found = reflow(run, run.folder / "reflow")
+    result = reflow(run, run.folder / "reflow")
     records = json.loads((run.folder / "reflow/joints.json").read_text())
     assert list(records) == list(NAMES)
     assert {record["verdict"] for record in records.values()} == {"given"}
@@ -48,9 +48,9 @@ def test_nothing_is_reflowed_and_records_tell_what_was_given(run):
     assert metrics["contact_radius_board"]["value"] == pytest.approx(0.24 * MM, rel=0.005)
     steep = 90.0 + np.degrees(np.arctan(0.4 / 0.35))
     assert metrics["contact_angle_board"] == {"value": pytest.approx(steep, abs=0.5), "unit": "deg"}
-    assert found.metrics["distinct_shapes"]["value"] == 0
-    assert found.metrics["joint_width_max"]["value"] == metrics["max_width"]["value"]
-    assert all(check["ok"] for check in found.health.values())
+    assert result.metrics["distinct_shapes"]["value"] == 0
+    assert result.metrics["joint_width_max"]["value"] == metrics["max_width"]["value"]
+    assert all(check["ok"] for check in result.health.values())
     assert joint_records(run.folder)[1]["angles"].startswith(f"{metrics['contact_angle_board']['value']:.1f} / ")
     assert {row[1] for row in joint_tables.verdicts(run.folder)["rows"]} == {"given"}
 
@@ -58,11 +58,11 @@ def test_nothing_is_reflowed_and_records_tell_what_was_given(run):
 def test_others_are_judged_beside_them():
     values = {"max_width": 5e-4, "width_error": 1e-3, "volume_drift": 2e-12}
     flowed = {"shape": "A1", "metrics": {name: {"value": value} for name, value in values.items()}}
-    given = {"given": "a2.stl", "verdict": "given", "metrics": {"max_width": {"value": 6e-4}}}
-    found = findings.of_reflow({"A1": flowed | {"verdict": "overflow"}, "A2": given}, {})
-    assert found.health["joints_not_ok"]["value"] == 1
-    assert found.health["joint_volume_drift_max"]["value"] == 2e-12
-    assert findings.of_reflow({"A1": flowed | {"verdict": "ok"}, "A2": given}, {}).health["joints_not_ok"]["ok"]
+    imported = {"given": "a2.stl", "verdict": "given", "metrics": {"max_width": {"value": 6e-4}}}
+    result = findings.of_reflow({"A1": flowed | {"verdict": "overflow"}, "A2": imported}, {})
+    assert result.health["joints_not_ok"]["value"] == 1
+    assert result.health["joint_volume_drift_max"]["value"] == 2e-12
+    assert findings.of_reflow({"A1": flowed | {"verdict": "ok"}, "A2": imported}, {}).health["joints_not_ok"]["ok"]
 
 
 def test_plan_foresees_only_those_that_are_reflowed(run):

@@ -1,4 +1,4 @@
-"""Joints whose surfaces the user gives: refused by key before anything runs, taken instead of what was reflowed."""
+"""Surfaces from files instead of reflow: they are validated by key before anything runs."""
 
 import re
 import shutil
@@ -34,15 +34,15 @@ from tests.support.workflow_command import SMALL_CASE
 
 @pytest.fixture
 def case_file(tmp_path) -> Path:
-    """A case beside a surface of A4, another 10 % wider than the reflowed ones."""
+    """A case next to a surface of A4, another 10 % wider than the reflowed ones."""
     shutil.copy(SMALL_CASE, tmp_path / "case.toml")
-    given = barrel(0.35 * MM, 0.06 * MM)
-    low, wrong = barrel(0.25 * MM, 0.06 * MM), given.triangles.copy()
-    wrong[7, 1] = len(given.points) + 5
+    shape = barrel(0.35 * MM, 0.06 * MM)
+    low, wrong = barrel(0.25 * MM, 0.06 * MM), shape.triangles.copy()
+    wrong[7, 1] = len(shape.points) + 5
     for name, points, triangles in (
-        ("a4.stl", given.points, given.triangles),
+        ("a4.stl", shape.points, shape.triangles),
         ("low.ply", low.points, low.triangles),
-        ("index.ply", given.points, wrong),
+        ("index.ply", shape.points, wrong),
     ):
         meshio.write(tmp_path / name, meshio.Mesh(points / MM, [("triangle", triangles)]))
     return tmp_path / "case.toml"
@@ -70,7 +70,7 @@ def test_a_case_with_them_can_be_written_as_a_template(case_file):
 
 
 @pytest.mark.parametrize(
-    ("name", "path", "told"),
+    ("name", "path", "message"),
     [
         ("A44", "a4.stl", r"package\.surfaces\.A44.*not a joint.*A4"),
         ("A4", "case.toml", r"package\.surfaces\.A4.*unknown file format.*\.stl, \.ply, \.vtu"),
@@ -79,10 +79,10 @@ def test_a_case_with_them_can_be_written_as_a_template(case_file):
         ("A4", "index.ply", r"package\.surfaces\.A4.*triangle 7 has the vertices .*, allowed 0 to"),
     ],
 )
-def test_what_does_not_fit_is_refused_by_key(case_file, name, path, told):
+def test_what_does_not_fit_is_refused_by_key(case_file, name, path, message):
     with pytest.raises(CaseError) as caught:
         read(case_file, **{name: path})
-    assert any(re.search(told, f"{p.key} {p.message} {p.allowed} {p.hint}") for p in caught.value.problems)
+    assert any(re.search(message, f"{p.key} {p.message} {p.allowed} {p.hint}") for p in caught.value.problems)
 
 
 def shape_of(surface, arrays) -> JointShape:
@@ -143,16 +143,16 @@ def test_given_reflowed_and_bridged_surfaces_are_written_and_meshed(run):
     assert set(measures) == {"A4", "B4", "A3+B3"}
     assert measures["A4"]["max_width"] == pytest.approx(0.6 * MM, rel=0.02)
     assert measures["B4"]["max_width"] == pytest.approx(0.48 * MM, rel=0.02)
-    found = findings.of_surface(measures)
-    assert found.health["surface_volume_error_max"]["ok"]
-    assert found.metrics["given_surface_volume_change_max"]["value"] < 1e-5  # the gap is the surface's own
+    result = findings.of_surface(measures)
+    assert result.health["surface_volume_error_max"]["ok"]
+    assert result.metrics["given_surface_volume_change_max"]["value"] < 1e-5  # the gap is the surface's own
     measures["A4"]["volume_change"] = -0.07
     assert findings.of_surface(measures).metrics["given_surface_volume_change_max"]["value"] == 0.07
-    given = read_surface(run.folder / "surface/A4.vtu")
-    assert enclosed_volume(given) == pytest.approx(measures["A4"]["volume"])
+    surface = read_surface(run.folder / "surface/A4.vtu")
+    assert enclosed_volume(surface) == pytest.approx(measures["A4"]["volume"])
     coarse = needs_coarse_joints(run.case.shock.coupling)
     qualities = mesh_real_joints(run.case, run.folder, run.folder / "solder_mesh", coarse=coarse)
     assert set(qualities[""]) == {"A4", "B4"} and set(qualities["bridged_"]) == {"A3+B3"}
     assert (run.folder / "solder_mesh/free_form_A3+B3.msh").exists()
-    found = findings.of_solder_mesh(qualities, {})
-    assert all(check["ok"] for check in found.health.values())
+    result = findings.of_solder_mesh(qualities, {})
+    assert all(check["ok"] for check in result.health.values())

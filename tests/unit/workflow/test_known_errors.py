@@ -119,11 +119,11 @@ def test_omitted_effects_are_sorted_by_influence():
 
 
 @pytest.mark.parametrize(
-    "known", [Discretisation(), Discretisation({"peel_stress": 0.04}, {"peel_stress": "Richardson"})]
+    "errors", [Discretisation(), Discretisation({"peel_stress": 0.04}, {"peel_stress": "Richardson"})]
 )
-def test_headline_table_has_the_error_of_every_figure(known):
+def test_headline_table_has_the_error_of_every_figure(errors):
     metrics = {"critical_joint": {"value": "A1", "unit": ""}, "peel_stress": {"value": 6e7, "unit": "Pa"}}
-    table = headline(metrics, known, {"effects": {}}, {"dns": {"metrics": metrics, **result()}})
+    table = headline(metrics, errors, {"effects": {}}, {"dns": {"metrics": metrics, **result()}})
     assert [row[1] for row in table["rows"]] == ["A1", "60 MPa"]
-    assert [row[2] for row in table["rows"]] == ["–", known.text("peel_stress")]
-    assert ("accuracy measures it" in table["note"]) is not bool(known.errors)
+    assert [row[2] for row in table["rows"]] == ["–", errors.text("peel_stress")]
+    assert ("accuracy measures it" in table["note"]) is not bool(errors.errors)

@@ -1,4 +1,4 @@
-"""Materials of a structure: own ones and those of the library, impossible ones refused by key, value and range."""
+"""Materials of a structure: user-defined and library materials; impossible ones are rejected by key."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ def test_a_layer_takes_nine_constants_or_a_solder_that_yields():
 
 def test_constants_of_plasticity_are_shown_in_the_units_of_users():
     law = 'materials.cover.plasticity={ A = "20 MPa", C = 0.1, reference_rate = "0.001 s^-1" }'
-    shown = display_values(read_case(STRUCTURE, ["dynamics.solver=explicit", law]))
-    assert shown["materials.cover.plasticity.A"] == "20 MPa"
-    assert shown["materials.cover.plasticity.reference_rate"] == "0.001 s^-1"
-    assert shown["materials.cover.temperature"] == "25 degC"
+    values = display_values(read_case(STRUCTURE, ["dynamics.solver=explicit", law]))
+    assert values["materials.cover.plasticity.A"] == "20 MPa"
+    assert values["materials.cover.plasticity.reference_rate"] == "0.001 s^-1"
+    assert values["materials.cover.temperature"] == "25 degC"

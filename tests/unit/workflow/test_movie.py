@@ -9,7 +9,7 @@ from reflowshock.workflow.report.scene import Field, Group, Scene
 
 
 def test_a_scene_as_a_gif(tmp_path):
-    """Each frame shows its own state; what is looked at stays in the middle, however far all of it moves."""
+    """Each frame shows its own state; the focal point stays in the middle, however far all of it moves."""
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     moved = np.stack([np.zeros_like(points), points * [0.0, 0.0, 0.5] + [0.0, 0.0, 50.0]])
     values = {"stress": np.array([[0.0] * 4, [1.0] * 4])}

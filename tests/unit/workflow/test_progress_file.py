@@ -22,9 +22,9 @@ def test_a_bar_is_seen_from_elsewhere(tmp_path, monkeypatch):
         assert read_progress(tmp_path).share == 0.0
         assert read_progress(tmp_path).left is None
         bar(0.25, "shock, first half")
-    found = read_progress(tmp_path)
-    assert (found.what, found.share) == ("shock, first half", 0.25)
-    assert found.left == pytest.approx(3.0 * found.seconds)
+    progress = read_progress(tmp_path)
+    assert (progress.what, progress.share) == ("shock, first half", 0.25)
+    assert progress.left == pytest.approx(3.0 * progress.seconds)
 
 
 def test_it_is_not_written_more_often_than_looked_at(tmp_path):

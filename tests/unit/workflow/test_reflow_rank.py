@@ -33,9 +33,9 @@ def test_a_job_arrives_as_it_was_sent(tmp_path, work):
     path = tmp_path / f"A1{JOB}"
     write_data(path, {}, JOBS[work])
     assert find(name_of(work)) is work
-    found = read_data(path, records_of(work))
-    assert found == JOBS[work]
-    assert repr(found) == repr(JOBS[work])  # a checkpoint belongs to what this says
+    received = read_data(path, records_of(work))
+    assert received == JOBS[work]
+    assert repr(received) == repr(JOBS[work])  # a checkpoint belongs to what this says
 
 
 def test_results_arrive_as_they_were_sent(tmp_path):
@@ -53,14 +53,14 @@ def test_results_arrive_as_they_were_sent(tmp_path):
         verdict="ok",
     )
     write_data(tmp_path / "shape", {}, Done((shape, True)))
-    found, continued = read_data(tmp_path / "shape", records_of(reflow_pool._solve)).value
+    received, continued = read_data(tmp_path / "shape", records_of(reflow_pool._solve)).value
     assert continued is True
-    assert (found.verdict, repr(found.metrics)) == (shape.verdict, repr(shape.metrics))
-    np.testing.assert_array_equal(found.points, points)
-    np.testing.assert_array_equal(found.history["binding"], shape.history["binding"])
-    np.testing.assert_array_equal(found.rings[1], shape.rings[1])
-    np.testing.assert_array_equal(found.snapshots[0].triangles, triangles)
-    assert found.triangles.dtype == np.int32
+    assert (received.verdict, repr(received.metrics)) == (shape.verdict, repr(shape.metrics))
+    np.testing.assert_array_equal(received.points, points)
+    np.testing.assert_array_equal(received.history["binding"], shape.history["binding"])
+    np.testing.assert_array_equal(received.rings[1], shape.rings[1])
+    np.testing.assert_array_equal(received.snapshots[0].triangles, triangles)
+    assert received.triangles.dtype == np.int32
     write_data(tmp_path / "carried", {}, Done(Carried(np.eye(6)[:2], 7)))
     carried = read_data(tmp_path / "carried", records_of(array.carry)).value
     assert carried.steps == 7

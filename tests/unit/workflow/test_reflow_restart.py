@@ -1,4 +1,4 @@
-"""What a coupled reflow was before it was killed is taken up by the same case only."""
+"""Restart of a coupled reflow that was killed."""
 
 from types import SimpleNamespace
 

@@ -72,8 +72,8 @@ def test_joints_tell_their_verdict_and_by_what(history):
     yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
     joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
-    found = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
-    table = joint_tables.ranked_joints(yielding, joints, found)
+    verdicts = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
+    table = joint_tables.ranked_joints(yielding, joints, verdicts)
     assert table["head"][5] == "plastic work, 25 µm layer [kJ/m³]"
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert [row[1:3] for row in table["rows"]] == [["FAIL", "0.889 by peel"], ["PASS", "1.6 by peel"]]

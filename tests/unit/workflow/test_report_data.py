@@ -1,4 +1,4 @@
-"""What a report's script draws: arrays, lines, surfaces, colours; and that nothing of a case becomes code."""
+"""Data that the script of a report draws: arrays, lines, surfaces."""
 
 import base64
 import hashlib
@@ -84,22 +84,22 @@ def test_a_scene_keeps_its_first_frame_and_the_values_of_its_scale():
     record = scene["groups"][0]
     steps = decoded(data, record["values"][0]).reshape(2, 8)
     assert steps[0].min() == 1 and steps[0].max() == FINEST and not steps[1].any()
-    shown = record["displacement"]["scale"] * decoded(data, record["displacement"]["data"]).reshape(2, 8, 3)
-    assert shown == pytest.approx(1e3 * moved, abs=2e-5)  # mm
+    displacement = record["displacement"]["scale"] * decoded(data, record["displacement"]["data"]).reshape(2, 8, 3)
+    assert displacement == pytest.approx(1e3 * moved, abs=2e-5)  # mm
     assert decoded(data, record["points"]).reshape(8, 3) == pytest.approx(1e3 * points)
 
 
-@pytest.mark.parametrize(("most", "kept"), [(9, [0, 1, 2, 3, 4, 5]), (3, [0, 3, 5]), (1, [3]), (0, [3])])
-def test_of_too_many_frames_the_first_shown_one_stays(most, kept):
-    assert kept_frames(6, most, 3) == kept
+@pytest.mark.parametrize(("most", "indices"), [(9, [0, 1, 2, 3, 4, 5]), (3, [0, 3, 5]), (1, [3]), (0, [3])])
+def test_of_too_many_frames_the_first_shown_one_stays(most, indices):
+    assert kept_frames(6, most, 3) == indices
 
 
 def test_a_long_line_keeps_its_peaks():
     x = np.linspace(0.0, 1.0, 100_000)
     y = np.sin(40 * x)
     y[[31_415, 27_182]] = [9.0, -9.0]
-    kept_x, kept = thinned(x, y)
-    assert len(kept) <= MOST_POINTS and (kept.max(), kept.min()) == (9.0, -9.0)
+    kept_x, kept_y = thinned(x, y)
+    assert len(kept_y) <= MOST_POINTS and (kept_y.max(), kept_y.min()) == (9.0, -9.0)
     assert (kept_x[0], kept_x[-1]) == (0.0, 1.0) and np.all(np.diff(kept_x) > 0)
     assert thinned(x[:10], y[:10])[1] is not None and len(thinned(x[:10], y[:10])[0]) == 10
 
@@ -141,8 +141,8 @@ def test_series_of_several_ranks_are_read_as_one_body(tmp_path):
     for name, cell, ghost in (("a", 0, 0), ("b", 1, 0), ("c", 0, 1)):  # the third is a copy of the first
         corners = points[cells[cell]]
         for step in range(2):
-            told = {"points": corners, "moved": step * corners}
-            texts = {key: " ".join(map(str, value.ravel())) for key, value in told.items()}
+            fields = {"points": corners, "moved": step * corners}
+            texts = {key: " ".join(map(str, value.ravel())) for key, value in fields.items()}
             (tmp_path / f"{name}{step}.vtu").write_text(PIECE.format(ghost=ghost, part=cell, **texts))
     for step in range(2):
         pieces = "".join(f'<Piece Source="{name}{step}.vtu" />' for name in "abc")
@@ -172,10 +172,10 @@ def test_what_cooling_left_is_shown_by_part(tmp_path):
 
 
 def page_of(tmp_path, **context) -> str:
-    shown = {"case": {"title": HOSTILE, "name": "x"}, "curves": {}, "scenes": {}, "pictures": {}, "healthy": True}
+    content = {"case": {"title": HOSTILE, "name": "x"}, "curves": {}, "scenes": {}, "pictures": {}, "healthy": True}
     tables = {"parameters": {"head": ["key", "value"], "rows": [[HOSTILE, HOSTILE]]},
               "effects": {"head": ["effect"], "rows": []}, "versions": {"head": ["library"], "rows": []}}  # fmt: skip
-    write_page(tmp_path / "report.html", "report.html.j2", shown | {"tables": tables} | context)
+    write_page(tmp_path / "report.html", "report.html.j2", content | {"tables": tables} | context)
     return (tmp_path / "report.html").read_text()
 
 

@@ -171,10 +171,10 @@ def test_records_are_complete_for_what_has_run(tmp_path):
     by_ct = {"standoff": 2e-4, "contact_angle_board": 2.0, "contact_angle_package": 2.5, "given": "b4.stl"}
     (tmp_path / "surface").mkdir()
     (tmp_path / "surface/surfaces.json").write_text(json.dumps({"A4": {"standoff": 1.0}, "B4": by_ct}))
-    reflowed, given = joint_records(tmp_path)
+    reflowed, imported = joint_records(tmp_path)
     assert (reflowed["standoff"], reflowed["verdict"], reflowed["tilted"]) == (3e-4, "ok", pytest.approx(5e-3))
-    assert (given["standoff"], given["verdict"], given["shape"]) == (2e-4, "given", "B4")
-    assert given["angles"] == "114.6 / 143.2"
+    assert (imported["standoff"], imported["verdict"], imported["shape"]) == (2e-4, "given", "B4")
+    assert imported["angles"] == "114.6 / 143.2"
 
 
 def test_maps_show_what_the_joints_have():
@@ -194,8 +194,8 @@ def test_small_kinematics_are_told_where_they_matter():
         "peak_board_strain": {"value": 2.2e-3, "unit": ""},
         "deflection_over_thickness": {"value": 7.6, "unit": ""},
     }
-    told = shock.kinematics_note(metrics, "small")
-    assert "7.6 times its thickness" in told and "up to 8000 µm/m" in told and '= "auto"' in told
+    note = shock.kinematics_note(metrics, "small")
+    assert "7.6 times its thickness" in note and "up to 8000 µm/m" in note and '= "auto"' in note
     assert shock.kinematics_note(metrics, "finite") == ""
     assert shock.kinematics_note({"peak_neglected_strain": {"value": 1e-6, "unit": ""}}, "small") == ""
 
@@ -238,12 +238,12 @@ def test_residual_stress_is_ranked_by_the_worse_pad():
 @pytest.mark.parametrize(("standoff", "axis"), [([0.3e-3, 0.4e-3], "standoff [mm]"), ([0.3e-3, 0.3e-3], "time [ms]")])
 def test_the_force_of_a_moved_package_is_drawn_over_what_changes(standoff, axis):
     """Over the standoff of a pull, over time of a push aside, which has no exact force."""
-    known = standoff[0] != standoff[1]
-    exact = [2e-3 if known else np.nan] * 2
+    varies = standoff[0] != standoff[1]
+    exact = [2e-3 if varies else np.nan] * 2
     columns = {"time": [0.0, 1e-3], "standoff": standoff, "pull": [2e-3, 3e-3], "pull_exact": exact}
     chart = pull_chart({name: np.array(column) for name, column in columns.items()})
     assert chart.x.label == axis
-    assert [line.name for line in chart.series] == ["particles", "Young-Laplace"][: 1 + known]
+    assert [line.name for line in chart.series] == ["particles", "Young-Laplace"][: 1 + varies]
 
 
 @pytest.mark.parametrize(("moves", "label", "last"), [(True, "time [ms]", 3.0), (False, "step", 2.0)])

@@ -1,4 +1,4 @@
-"""A case file at other sizes: values of a scale replace those of the file, settings those of the scale."""
+"""Scales of a case file: values of a scale replace values of the file, settings replace both."""
 
 import pytest
 
@@ -78,8 +78,8 @@ def test_settings_count_more_than_the_scale(case_file):
     ],
 )  # fmt: skip
 def test_wrong_scales_are_named(case_file, text, setting, words):
-    found = lines_of(case_file(text), setting)
-    assert [word for word in words if word not in found] == []
+    messages = lines_of(case_file(text), setting)
+    assert [word for word in words if word not in messages] == []
 
 
 def test_scales_of_a_template_come_along(case_file, tmp_path, monkeypatch):
@@ -106,8 +106,8 @@ def test_a_package_without_a_shock_ends_with_its_joints(tmp_path):
     used = {key for stage in case.pipeline.stages for key in stage_inputs(case, stage)}
     assert {"solder.volume", "warpage.corner", "materials.solder.young_modulus"} <= used
     path.write_text(path.read_text() + '[shok]\nduration = "1 ms"\n')
-    found = lines_of(path)
-    assert [word for word in ("shok", "unknown key", "did you mean shock?") if word not in found] == []
+    messages = lines_of(path)
+    assert [word for word in ("shok", "unknown key", "did you mean shock?") if word not in messages] == []
 
 
 def test_with_temperatures_the_reflow_needs_the_mesh(case_file):

@@ -1,4 +1,4 @@
-"""The shock of a package in a case file: every way to give its pulse, and what is said about impossible ones."""
+"""The shock in a case file: all forms of its pulse, and messages for impossible ones."""
 
 from pathlib import Path
 
@@ -137,18 +137,18 @@ def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
     assert decided(case).shock.duration == longest_duration(case)
     with pytest.raises(ValueError, match="decided by the case"):
         _ = case.shock.decided_duration
-    given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
-    assert longest_duration(given) == given.shock.decided_duration == 2e-4
+    explicit = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
+    assert longest_duration(explicit) == explicit.shock.decided_duration == 2e-4
 
 
 @pytest.mark.parametrize(("kinematics", "measured"), [("corotational", 2.05e-3), ("small", 3.05e-3)])
 def test_expected_duration_is_that_of_the_default_case(kinematics, measured):
-    """Where its run ended, as cases/jedec_bga/README.md tells."""
+    """Duration at which its run ended, see cases/jedec_bga/README.md."""
     case = read_case(CASES / "jedec_bga" / "case.toml", [f"shock.numerics.kinematics={kinematics}"])
     assert expected_duration(case) == pytest.approx(measured, rel=0.1)
     assert expected_duration(case) < longest_duration(case)
-    given = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
-    assert expected_duration(given) == 2e-4
+    explicit = read_case(SMALL_CASE, ["shock.duration=0.2 ms"])
+    assert expected_duration(explicit) == 2e-4
 
 
 def test_what_is_fitted_to_the_board_makes_it_slower():

@@ -31,12 +31,12 @@ def predicted(*settings: str):
 
 def test_joints_that_are_not_fine_have_the_coarse_mesh():
     case = read_case(SMALL_CASE)
-    every, one = (count_elements(case.package, case.board, case.warpage, fine) for fine in (None, 1))
+    every, single_fine = (count_elements(case.package, case.board, case.warpage, fine) for fine in (None, 1))
     assert "solder_coarse" not in every
-    assert one["solder"].elements * 4 == every["solder"].elements
-    assert one["copper"].elements * 4 == every["copper"].elements
-    assert one["solder_coarse"].elements == 3 * 8
-    assert one["solder_coarse"].smallest[2] > every["solder"].smallest[2]
+    assert single_fine["solder"].elements * 4 == every["solder"].elements
+    assert single_fine["copper"].elements * 4 == every["copper"].elements
+    assert single_fine["solder_coarse"].elements == 3 * 8
+    assert single_fine["solder_coarse"].smallest[2] > every["solder"].smallest[2]
 
 
 def test_linear_elements_take_local_steps_from_the_window_down():
@@ -61,9 +61,9 @@ def test_scaled_masses_follow_the_step_of_the_others_or_a_wanted_one():
     scaled = forecast_parts(read_case(SMALL_CASE, ['shock.numerics.mass_scaled=["copper"]']))
     others = min(part.critical_step for name, part in plain.items() if name != "copper")
     assert scaled["copper"].scaled_step == others > plain["copper"].scaled_step
-    wanted = ['shock.numerics.mass_scaled=["copper"]', "shock.numerics.mass_scaled_step=6 ns"]
+    settings = ['shock.numerics.mass_scaled=["copper"]', "shock.numerics.mass_scaled_step=6 ns"]
     assert others > 6e-9
-    assert forecast_parts(read_case(SMALL_CASE, wanted))["copper"].scaled_step == pytest.approx(6e-9)
+    assert forecast_parts(read_case(SMALL_CASE, settings))["copper"].scaled_step == pytest.approx(6e-9)
 
 
 def test_one_level_is_one_ratio():

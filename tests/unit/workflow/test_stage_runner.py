@@ -1,4 +1,4 @@
-"""A product appears complete, or not at all; what a stage has used is still so when it ends."""
+"""Running a stage: a product is complete or absent, and inputs must not change while it is built."""
 
 import json
 import subprocess
@@ -100,8 +100,8 @@ def test_a_product_that_changes_while_a_stage_reads_it_is_noticed(run, product):
 def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run, product, tmp_path):
     surface = tmp_path / "A1.stl"
     surface.write_text("first")
-    given = run.case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
-    run = replace(run, case=run.case.model_copy(update={"package": given}))
+    package = run.case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
+    run = replace(run, case=run.case.model_copy(update={"package": package}))
 
     def change(run: Run, folder: Path) -> Findings:
         surface.write_text("second")
@@ -112,12 +112,12 @@ def test_a_file_of_the_case_that_changes_while_a_stage_is_at_work_is_noticed(run
 
 
 def test_a_file_of_the_case_that_changes_before_a_stage_begins_is_noticed(tmp_path):
-    """The product is named after what the file held when the command began."""
+    """The key of the product follows from the file's content when the command started."""
     surface = tmp_path / "A1.stl"
     surface.write_text("first")
     case = read_case(SMALL_CASE)
-    given = case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
-    store, point = Store(tmp_path / "run", one_run=True), Point({}, case.model_copy(update={"package": given}))
+    package = case.package.model_copy(update={"surfaces": {"A1": str(surface)}})
+    store, point = Store(tmp_path / "run", one_run=True), Point({}, case.model_copy(update={"package": package}))
     make(store, point, ("geometry",))
     surface.write_text("second")
     with pytest.raises(StageError, match=r"a file of the case.*has changed since the command"):

@@ -79,10 +79,10 @@ def study(tmp_path):
     """The folder of a study of two points, with a table of its own; one of them was also repeated for its times."""
     study = Store(tmp_path / "study")
     with locked(study.folder, "study", "pads"):
-        for one, points in ((study, (POINT, OTHER)), (study.repeated[0], (POINT,))):
+        for member, points in ((study, (POINT, OTHER)), (study.repeated[0], (POINT,))):
             for point in points:
-                make(one, point, NAMES)
-                show_products(one, point)
+                make(member, point, NAMES)
+                show_products(member, point)
         made = study.home / "work/report"
         made.mkdir(parents=True)
         (made / "results.csv").write_text("")
@@ -91,7 +91,7 @@ def study(tmp_path):
 
 
 def test_a_study_is_cleaned_as_a_whole_with_force_only(study):
-    with pytest.raises(CaseError, match=r"holds the study of pads, not the run of small.*--force"):
+    with pytest.raises(CaseError, match=r"contains the study of pads, not the run of small.*--force"):
         clean(study.folder, "small")
     assert (study.folder / "results.csv").exists()
     clean(study.folder, "small", force=True)

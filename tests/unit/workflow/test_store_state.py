@@ -117,7 +117,7 @@ def test_a_geometry_with_the_same_pads_is_not_read_by_the_reflow(done):
 def test_a_damaged_record_is_noticed(done, harm):
     point = point_of()
     (done.product(point, "reflow") / "stage.json").write_text(harm)
-    assert examine(done, point)["reflow"].damaged == ("stage.json is not as it was written",)
+    assert examine(done, point)["reflow"].damaged == ("stage.json was modified",)
     assert failed_checks(done, point, "reflow") == ["reflow: its product is missing or damaged"]
 
 

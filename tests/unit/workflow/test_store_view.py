@@ -1,4 +1,4 @@
-"""Run folders: they show products by name, and keep what is a user's."""
+"""Run folders: they show products by name and preserve files of the user."""
 
 import fcntl
 import os
@@ -110,7 +110,7 @@ def test_a_run_folder_may_be_a_link(store, tmp_path):
 
 
 def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatch):
-    """However early the program is killed, no old product is taken for a user's file."""
+    """However early the program is killed, no old product is mistaken for a user's file."""
 
     def kill(*_: object) -> None:
         raise KeyboardInterrupt
@@ -241,7 +241,7 @@ def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
 
 @pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
 def test_another_case_needs_force(store, what, name):
-    with pytest.raises(CaseError, match=r"holds the run of small.*--force"), locked(store.folder, what, name):
+    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), locked(store.folder, what, name):
         pass
     with locked(store.folder, what, name, force=True):
         pass
@@ -280,10 +280,10 @@ def test_what_the_run_folder_lacks_is_told(store):
     (store.folder / "report.html").unlink()
     (store.folder / "summary.json").unlink()
     (store.folder / "summary.json").write_text("mine")
-    told = not_as_put(store, store.folder)
-    assert sorted(line.removeprefix(f"{store.folder}/") for line in told) == [
+    differences = not_as_put(store, store.folder)
+    assert sorted(line.removeprefix(f"{store.folder}/") for line in differences) == [
         "report.html is missing",
-        "summary.json is not as it was written",
+        "summary.json was modified",
     ]
     show_products(store, POINT)
     assert not_as_put(store, store.folder) == []

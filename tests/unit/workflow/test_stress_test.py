@@ -56,9 +56,9 @@ def test_a_value_beyond_its_bound_is_a_miss(bounds):
 
 
 def test_every_combination_of_varied_values_is_a_case():
-    found = cases(vary={"length": ["1 mm", "2 mm"], "fate": ["holds", "raises"]})
-    assert [case.tried for case in found][:2] == ["length 1 mm, fate holds", "length 1 mm, fate raises"]
-    assert [case.parameters.length for case in found] == [1e-3, 1e-3, 2e-3, 2e-3]
+    combinations = cases(vary={"length": ["1 mm", "2 mm"], "fate": ["holds", "raises"]})
+    assert [case.tried for case in combinations][:2] == ["length 1 mm, fate holds", "length 1 mm, fate raises"]
+    assert [case.parameters.length for case in combinations] == [1e-3, 1e-3, 2e-3, 2e-3]
 
 
 @pytest.mark.parametrize("fate", ["raises", "is lost"])
@@ -72,12 +72,12 @@ def test_no_measure_hides_nan(monkeypatch):
     from reflowshock.cases.hard.trials import fields, motion, reflow
 
     energies = np.array([1.0, math.nan, 0.5])
-    told = {name: found.value for name, found in reflow._energy(energies).items()}
+    values = {name: metric.value for name, metric in reflow._energy(energies).items()}
     monkeypatch.setattr(fields, "force_of", lambda term, displacement: np.full_like(displacement, math.nan))
-    told["force_error"] = fields.turns(Turns(turns=1, cells=1))["force_error"]
+    values["force_error"] = fields.turns(Turns(turns=1, cells=1))["force_error"]
     monkeypatch.setattr(motion, "energies_of", lambda *_: np.outer(energies, np.ones(4)))
-    told |= motion.impact(Impact())
-    assert all(math.isnan(told[name]) for name in told if name != "plastic_share"), told
+    values |= motion.impact(Impact())
+    assert all(math.isnan(values[name]) for name in values if name != "plastic_share"), values
 
 
 @pytest.mark.long
@@ -95,7 +95,7 @@ def test_an_expected_error_is_no_miss_and_its_absence_is():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"trial": "rot"}, "did you mean rod?"),
         ({"family": "reflov"}, "did you mean reflow?"),
@@ -114,15 +114,15 @@ def test_an_expected_error_is_no_miss_and_its_absence_is():
         ({"vary": {"length": "3 mm"}}, "must be a list"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_told(changes, told):
-    assert told in refused(**changes)
+def test_what_is_wrong_in_a_file_is_told(changes, message):
+    assert message in refused(**changes)
 
 
 def test_a_run_that_cannot_be_is_told_before_it_is_tried(tmp_path):
     drop = {"case": str(HARD.parent / "sessile_drop/case.toml"), "settings": {"drop": {"volum": "1 mm^3"}}}
     run = {"family": "reflow", "title": "a run", "why": "", "trial": "run", "bounds": {"shape_error": "1 %"}}
-    for parameters, told in (({"case": "no.toml"}, "does not exist"), (drop, "did you mean drop.volume?")):
-        with pytest.raises(CaseError, match=f"parameters.*{told}"):
+    for parameters, message in (({"case": "no.toml"}, "does not exist"), (drop, "did you mean drop.volume?")):
+        with pytest.raises(CaseError, match=f"parameters.*{message}"):
             hard_cases("reflow_run", run | {"parameters": parameters}, "reflow_run.toml", tmp_path)
 
 
@@ -146,10 +146,10 @@ def rods(monkeypatch, tmp_path):
 
 
 def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
-    survived, told = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
+    survived, report = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
     assert not survived
-    assert {one["tried"]: one["message"] for one in told["fixed"]} == {
-        "fate hangs": "no answer in 4 s: taken to hang",
+    assert {record["tried"]: record["message"] for record in report["fixed"]} == {
+        "fate hangs": "no answer in 4 s: assumed to hang",
         "fate dies": "the process ended with code 3",
         "fate holds": "",
     }
@@ -172,9 +172,9 @@ def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed)
     wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all that have not left its group
-    told = process.communicate(timeout=60)[1]
-    assert (process.returncode, told.count("\n")) == (1, 1), told
-    assert "interrupted" in told
+    output = process.communicate(timeout=60)[1]
+    assert (process.returncode, output.count("\n")) == (1, 1), output
+    assert "interrupted" in output
 
 
 def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_path):
@@ -186,7 +186,7 @@ def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_pa
 
 def test_the_same_seed_draws_the_same_cases():
     file = read_random_file(HARD / "remesh_random_bodies.toml")
-    first, same, other = ([case.given for case in file.cases(20, seed)] for seed in (3, 3, 4))
+    first, same, other = ([case.table for case in file.cases(20, seed)] for seed in (3, 3, 4))
     assert first == same != other
 
 
@@ -194,9 +194,9 @@ RANDOM = {"draws": "rods", "parameters": {}, "bounds": {"width": "< 7 mm"}}
 
 
 def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods, tmp_path):
-    survived, told = rods(30, **RANDOM)
+    survived, report = rods(30, **RANDOM)
     assert not survived
-    (sample,) = told["random"]
+    (sample,) = report["random"]
     assert sample["tried"] == len(sample["cases"]) == 30
     assert 0 < sum(not case["ok"] for case in sample["cases"]) < 30
     (case,) = read_hard_cases(tmp_path / "out/counterexamples/elements_rod.toml")
@@ -207,23 +207,23 @@ def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods, tmp_p
 
 @pytest.mark.long
 def test_refusals_in_words_are_counted_and_too_many_are_a_miss(rods, tmp_path):
-    survived, told = rods(5, **RANDOM | {"draws": "refused rods"})
+    survived, report = rods(5, **RANDOM | {"draws": "refused rods"})
     assert not survived
-    assert [told["random"][0][name] for name in ("refused", "ok")] == [5, False]
+    assert [report["random"][0][name] for name in ("refused", "ok")] == [5, False]
     assert "0 missed, 1 random trials refused too many" in (tmp_path / "out/stress_test.html").read_text()
 
 
 def test_pytest_collects_the_first_case_of_each_file():
     line = [sys.executable, "-m", "pytest", "-m", "", "--collect-only", str(HARD)]
-    told = subprocess.run(line, capture_output=True, text=True, cwd=HARD.parents[1], check=True, timeout=120).stdout
+    output = subprocess.run(line, capture_output=True, text=True, cwd=HARD.parents[1], check=True, timeout=120).stdout
     fixed = [path.stem for path in HARD.glob("*.toml") if read_random_file(path) is None]
-    assert sorted(Path(line.split("::")[0]).stem for line in told.splitlines() if "::" in line) == sorted(fixed)
+    assert sorted(Path(line.split("::")[0]).stem for line in output.splitlines() if "::" in line) == sorted(fixed)
 
 
 def test_all_cases_of_the_program_can_be_read():
     files = [(path, read_random_file(path)) for path in sorted(HARD.glob("*.toml"))]
-    found = [case for path, random in files for case in (random.cases(2, 1) if random else read_hard_cases(path))]
-    assert all(case.name.split("_")[0] == case.family for case in found)
+    all_cases = [case for path, random in files for case in (random.cases(2, 1) if random else read_hard_cases(path))]
+    assert all(case.name.split("_")[0] == case.family for case in all_cases)
 
 
 @given(quantities(-30.0, 30.0, "deg"))

@@ -103,11 +103,11 @@ def test_bad_values_are_named(setting, words):
 
 def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
     case = BOARD.parents[2] / "cases" / "cantilever" / "case.toml"
-    given = "dynamics.numerics.explicit_step=1 ms"
+    setting = "dynamics.numerics.explicit_step=1 ms"
     with pytest.raises(CaseError, match=r"explicit_step = \"1 ms\": exceeds the critical step.*allowed: <= .* ns"):
-        read_case(case, [given])
+        read_case(case, [setting])
     for other in ("dynamics.solver=implicit", "dynamics.numerics.critical_step=power_iteration"):
-        read_case(case, [given, other])
+        read_case(case, [setting, other])
 
 
 def test_report_says_what_part_is_meshed():
@@ -162,9 +162,9 @@ def test_units_in_lists_and_named_tables():
     assert case.structure.layers["board"].thickness == pytest.approx(8e-4)
     assert case.structure.holes.spacing == pytest.approx((24e-3, 14e-3))
     assert list(case.structure.layers) == ["board", "cover"]
-    shown = display_values(case)
-    assert shown["structure.holes.spacing"] == "[24 mm, 14 mm]"
-    assert shown["loads.drop.peak"] == "1200 G"
+    values = display_values(case)
+    assert values["structure.holes.spacing"] == "[24 mm, 14 mm]"
+    assert values["loads.drop.peak"] == "1200 G"
 
 
 def test_a_new_case_is_equal_to_its_template(tmp_path):
@@ -215,8 +215,8 @@ def test_a_force_is_in_the_schema_the_template_and_the_plan(tmp_path):
     (tmp_path / "force.csv").write_text("time [ms], force [mN]\n0,0\n0.1,1000\n")
     (tmp_path / "case.toml").write_text(BOARD.read_text())
     poke = POKE.replace("-2 mm", "2 mm")
-    given = [f"loads.poke={{{poke},peak='2 kN',duration='0.1 ms'}}", f"loads.push={{{poke},table='force.csv'}}"]
-    case = read_case(tmp_path / "case.toml", given)
+    settings = [f"loads.poke={{{poke},peak='2 kN',duration='0.1 ms'}}", f"loads.push={{{poke},table='force.csv'}}"]
+    case = read_case(tmp_path / "case.toml", settings)
     assert case.loads["poke"].peak == 2000.0
     assert forecast_structure(case).effects["point_force"] == {"on": True, "why": "loads.poke, loads.push"}
     again = tmp_path / "again.toml"
@@ -228,7 +228,7 @@ def test_a_force_is_in_the_schema_the_template_and_the_plan(tmp_path):
         read_case(tmp_path / "case.toml", [f"loads.poke={{{poke},peak='1e4 kN',duration='0.1 ms'}}"])
     (tmp_path / "force.csv").write_text("time [ms], force [G]\n0,0\n0.1,1\n")
     with pytest.raises(CaseError, match="needs its unit in brackets, one of N, mN, kN"):
-        read_case(tmp_path / "case.toml", given)
+        read_case(tmp_path / "case.toml", settings)
 
 
 @pytest.mark.parametrize(

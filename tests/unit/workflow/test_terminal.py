@@ -1,4 +1,4 @@
-"""What is printed is text: no markup of others, no control character, no sequence in a file or a pipe."""
+"""Terminal output is plain text: markup in messages is not interpreted."""
 
 import ast
 import io
@@ -19,8 +19,8 @@ WORKFLOW = Path(terminal.__file__).parent
 
 
 @pytest.fixture
-def shown():
-    """A terminal of 120 columns, and what it has written."""
+def console_output():
+    """A terminal of 120 columns, and its output."""
     console = Terminal(file=io.StringIO(), width=120)
 
     def written() -> str:
@@ -39,15 +39,15 @@ def table_of(text: str) -> Table:
 
 
 @pytest.mark.parametrize("what", [NASTY, styled("{}", NASTY), table_of(NASTY)], ids=["text", "styled", "table"])
-def test_text_is_shown_as_it_is(shown, what):
-    console, written = shown
+def test_text_is_shown_as_it_is(console_output, what):
+    console, written = console_output
     console.print(what)
     assert written().count(SHOWN) == (4 if isinstance(what, Table) else 1)
     assert "\x1b" not in written()
 
 
-def test_a_text_of_rich_obeys_nothing_either(shown):
-    console, written = shown
+def test_a_text_of_rich_obeys_nothing_either(console_output):
+    console, written = console_output
     console.print(Text("\x1b[31mred"))
     assert written() == "\\x1b[31mred\n"
 
@@ -61,9 +61,9 @@ def test_surrogates_can_be_written():
 
 
 def test_own_words_have_a_style_and_values_take_it():
-    told = styled("[bold]{}[/] of {}", "[red]x", "{}")
-    assert told.plain == "[red]x of {}"
-    assert [(span.start, span.end, str(span.style)) for span in told.spans] == [(0, 6, "bold")]
+    styled_text = styled("[bold]{}[/] of {}", "[red]x", "{}")
+    assert styled_text.plain == "[red]x of {}"
+    assert [(span.start, span.end, str(span.style)) for span in styled_text.spans] == [(0, 6, "bold")]
 
 
 def test_a_value_for_each_place():
@@ -71,8 +71,8 @@ def test_a_value_for_each_place():
         styled("{} {}", 1)
 
 
-def test_descriptions_of_progress_are_text(shown, monkeypatch):
-    console, written = shown
+def test_descriptions_of_progress_are_text(console_output, monkeypatch):
+    console, written = console_output
     monkeypatch.setattr("reflowshock.workflow.process.terminal.console", console)
     with progress_bar(NASTY) as bar:
         bar(0.5, NASTY)
@@ -117,7 +117,7 @@ def test_markup_is_read_in_constants_alone():
         calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "styled"]
         styled_ones = {id(node) for call in calls for node in ast.walk(call.args[0])}
         assert not [call for call in calls if any(isinstance(node, ast.JoinedStr) for node in ast.walk(call.args[0]))]
-        found = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
-        loose = [node.value for node in found if MARKUP.search(node.value) and id(node) not in styled_ones]
+        constants = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+        loose = [node.value for node in constants if MARKUP.search(node.value) and id(node) not in styled_ones]
         assert not loose, path
         assert "from_markup" not in path.read_text(encoding="utf-8"), path

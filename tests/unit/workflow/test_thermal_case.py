@@ -1,4 +1,4 @@
-"""The reflow's temperatures in a case file, how materials expand, and what is said about impossible values."""
+"""Temperatures in a case file, thermal expansion of materials, and messages for impossible values."""
 
 import tomllib
 
@@ -54,11 +54,11 @@ def test_the_package_is_lowest_in_a_load_step():
 
 def test_the_papers_course_of_temperatures():
     case = read(*PAPER, *MOVED)
-    thermal, shown = case.thermal, display_values(case)
+    thermal, values = case.thermal, display_values(case)
     assert thermal.melting == thermal.reference == pytest.approx(298.15)
     assert [thermal.corner(t) for t in (298.15, 385.65, 473.15)] == pytest.approx([0.0, -0.5e-4, -1e-4])
-    assert (shown["thermal.peak"], shown["thermal.corner_displacement"]) == ("200 degC", "-0.1 mm")
-    assert shown["materials.board.thermal_expansion_out_of_plane"] == "84 ppm/K"
+    assert (values["thermal.peak"], values["thermal.corner_displacement"]) == ("200 degC", "-0.1 mm")
+    assert values["materials.board.thermal_expansion_out_of_plane"] == "84 ppm/K"
 
 
 def test_a_material_expands_as_it_says():

@@ -90,8 +90,8 @@ def test_the_ideal_ratio_counts_element_updates():
     dns = {"step": 10e-9, "elements": {"dns": 1000}}
     assert ideal_ratio({}, dns) is None
     assert ideal_ratio(COUPLING, dns) == pytest.approx((600 / 8 + 300 / 2 + 100) / 1000)
-    one = {"levels": [{"step": 15.0, "elements": 75}, {"step": 1.0, "elements": 25}]}
-    assert ideal_ratio(one, {"step": 1.0, "elements": {"dns": 100}}) == pytest.approx(0.25 + 0.75 / 15)
+    model = {"levels": [{"step": 15.0, "elements": 75}, {"step": 1.0, "elements": 25}]}
+    assert ideal_ratio(model, {"step": 1.0, "elements": {"dns": 100}}) == pytest.approx(0.25 + 0.75 / 15)
 
 
 def test_coupling_and_comparison_become_metrics(tmp_path):

@@ -21,49 +21,49 @@ LIFE = {"measure": "peel_stress", "constant": 5120.0, "exponent": 3.0, "scatter"
 
 
 def judged(life=None, coarse=(), history=HISTORY, **limits):
-    given = {name: {"limit": limit, "source": "a test"} for name, limit in limits.items()}
-    failure = Failure.model_validate(given | ({} if life is None else {"life": life}))
+    limits_with_source = {name: {"limit": limit, "source": "a test"} for name, limit in limits.items()}
+    failure = Failure.model_validate(limits_with_source | ({} if life is None else {"life": life}))
     return verdict_of(failure, history, "A1", coarse)
 
 
 def test_without_a_limit_there_is_no_verdict():
-    found = judged()
-    assert (found["design"], found["joint"]) == (NO_LIMIT, "A1")
-    assert found["joints"]["A2"] == {
+    verdict = judged()
+    assert (verdict["design"], verdict["joint"]) == (NO_LIMIT, "A1")
+    assert verdict["joints"]["A2"] == {
         "criterion": "peel_stress", "value": 8e6, "limit": None, "margin": None, "verdict": NO_LIMIT
     }  # fmt: skip
-    assert answer(found, None) == "A1: peel 6 MPa, NO LIMIT; discretisation not known, run reflowshock accuracy"
+    assert answer(verdict, None) == "A1: peel 6 MPa, NO LIMIT; discretisation not known, run reflowshock accuracy"
 
 
 def test_tension_counts_at_either_pad_and_any_time_and_compression_does_not():
-    found = judged(peel_stress=7e6)
-    assert {name: joint["value"] for name, joint in found["joints"].items()} == {"A1": 6e6, "A2": 8e6}
-    assert [joint["verdict"] for joint in found["joints"].values()] == [PASS, FAIL]
-    assert (found["design"], found["joint"]) == (FAIL, "A2")
-    assert answer(found, 0.04) == "A2: peel 8 MPa of 7 (margin 0.88), FAIL; discretisation ±4 %"
+    verdict = judged(peel_stress=7e6)
+    assert {name: joint["value"] for name, joint in verdict["joints"].items()} == {"A1": 6e6, "A2": 8e6}
+    assert [joint["verdict"] for joint in verdict["joints"].values()] == [PASS, FAIL]
+    assert (verdict["design"], verdict["joint"]) == (FAIL, "A2")
+    assert answer(verdict, 0.04) == "A2: peel 8 MPa of 7 (margin 0.88), FAIL; discretisation ±4 %"
 
 
 def test_a_limit_that_is_just_met_holds():
-    found = judged(peel_stress=8e6)
-    assert (found["design"], found["joints"]["A2"]["margin"]) == (PASS, 1.0)
+    verdict = judged(peel_stress=8e6)
+    assert (verdict["design"], verdict["joints"]["A2"]["margin"]) == (PASS, 1.0)
 
 
 def test_the_criterion_of_least_margin_decides():
-    found = judged(peel_stress=16e6, layer_von_mises=30e6, layer_plastic_work=2.5e3)["joints"]
-    assert {name: joint["criterion"] for name, joint in found.items()} == dict.fromkeys(
+    joint_verdicts = judged(peel_stress=16e6, layer_von_mises=30e6, layer_plastic_work=2.5e3)["joints"]
+    assert {name: joint["criterion"] for name, joint in joint_verdicts.items()} == dict.fromkeys(
         ("A1", "A2"), "layer_plastic_work"
     )
-    assert [joint["margin"] for joint in found.values()] == pytest.approx([2.5 / 3.0, 2.5 / 4.0])
-    assert found["A1"]["source"] == "a test"
+    assert [joint["margin"] for joint in joint_verdicts.values()] == pytest.approx([2.5 / 3.0, 2.5 / 4.0])
+    assert joint_verdicts["A1"]["source"] == "a test"
 
 
 def test_a_joint_that_is_only_pressed_holds_without_a_margin():
     pressed = {name: 0.0 - np.abs(values) if "peel" in name else values for name, values in HISTORY.items()}
-    found = judged(history=pressed, peel_stress=1e6)
-    assert found["joints"]["A1"] == {
+    verdict = judged(history=pressed, peel_stress=1e6)
+    assert verdict["joints"]["A1"] == {
         "criterion": "peel_stress", "value": 0.0, "limit": 1e6, "margin": None, "verdict": PASS, "source": "a test"
     }  # fmt: skip
-    assert answer(found, None).startswith("A1: peel 0 MPa of 1, PASS;")
+    assert answer(verdict, None).startswith("A1: peel 0 MPa of 1, PASS;")
 
 
 def test_joints_that_fail_are_named_the_worst_first():
@@ -79,9 +79,9 @@ def test_values_of_coarse_joints_are_marked():
 
 
 def test_life_is_that_of_the_joint_that_fails_first_with_its_scatter():
-    found = judged(life=LIFE)
-    assert found["life"] == LIFE_OF_A2
-    assert "NO LIMIT; life of A2 10 drops (5 to 20); discretisation" in answer(found, None)
+    verdict = judged(life=LIFE)
+    assert verdict["life"] == LIFE_OF_A2
+    assert "NO LIMIT; life of A2 10 drops (5 to 20); discretisation" in answer(verdict, None)
 
 
 LIFE_OF_A2 = {

@@ -1,4 +1,4 @@
-"""Joints that are bridged or open: told in the records, the checks and the report, and never meshed."""
+"""Joints that are bridged or open: reported in records, checks and the report."""
 
 import json
 from types import SimpleNamespace
@@ -47,23 +47,23 @@ def test_joints_with_an_account_of_their_energy_are_judged_by_it(records):
     for record in records.values():
         record["metrics"] |= {name: {"value": value, "unit": ""} for name, value in moved.items()}
     records["A4"]["metrics"] |= {"at_rest": {"value": 0.0}, "time_at_rest": {"value": float("nan")}}
-    found = findings.of_reflow(records, {})
-    assert found.health["joint_energy_imbalance_max"]["ok"] and found.health["joint_particles_lost"]["ok"]
-    assert (found.metrics["joints_at_rest"]["value"], found.metrics["joint_time_at_rest_max"]["value"]) == (3, 2e-3)
-    assert found.metrics["joint_smoothing_loss_max"]["value"] == 0.01
-    assert found.health["joints_in_motion"]["value"] == 1 and not found.health["joints_in_motion"]["ok"]
+    result = findings.of_reflow(records, {})
+    assert result.health["joint_energy_imbalance_max"]["ok"] and result.health["joint_particles_lost"]["ok"]
+    assert (result.metrics["joints_at_rest"]["value"], result.metrics["joint_time_at_rest_max"]["value"]) == (3, 2e-3)
+    assert result.metrics["joint_smoothing_loss_max"]["value"] == 0.01
+    assert result.health["joints_in_motion"]["value"] == 1 and not result.health["joints_in_motion"]["ok"]
     records["A1"]["metrics"] |= {"energy_imbalance": {"value": -0.03}, "particles_lost": {"value": 1.0}}
-    found = findings.of_reflow(records, {})
-    assert not found.health["joint_energy_imbalance_max"]["ok"] and not found.health["joint_particles_lost"]["ok"]
+    result = findings.of_reflow(records, {})
+    assert not result.health["joint_energy_imbalance_max"]["ok"] and not result.health["joint_particles_lost"]["ok"]
 
 
 def test_joints_that_were_carried_have_no_time_to_rest_and_no_losses(records):
     moved = {"energy_imbalance": 1e-3, "particles_lost": 0.0, "at_rest": 1.0, "steps": 80.0}
     for record in records.values():
         record["metrics"] |= {name: {"value": value, "unit": ""} for name, value in moved.items()}
-    found = findings.of_reflow(records, {})
-    assert found.health["joint_energy_imbalance_max"]["ok"] and found.metrics["joint_steps_max"]["value"] == 80
-    assert [name for name in found.metrics if "loss" in name or "time" in name] == []
+    result = findings.of_reflow(records, {})
+    assert result.health["joint_energy_imbalance_max"]["ok"] and result.metrics["joint_steps_max"]["value"] == 80
+    assert [name for name in result.metrics if "loss" in name or "time" in name] == []
 
 
 def test_the_decay_of_a_swing_is_judged_to_ten_per_cent_whatever_the_scheme():
@@ -80,8 +80,8 @@ def test_widths_are_judged_to_one_per_cent_and_counted(records):
     records["A1"]["metrics"]["width_error"]["value"] = 0.011
     assert not findings.of_reflow(records, {}).health["joint_width_error_max"]["ok"]
     records["A1"]["metrics"]["width_reference_error"] = {"value": 3e-3, "unit": ""}
-    found = findings.of_reflow(records, {})
-    assert found.metrics["joints_compared_in_width"]["value"] == 2 and found.health["joint_width_error_max"]["ok"]
+    result = findings.of_reflow(records, {})
+    assert result.metrics["joints_compared_in_width"]["value"] == 2 and result.health["joint_width_error_max"]["ok"]
 
 
 def test_a_joint_that_failed_says_how():

@@ -1,9 +1,9 @@
-"""How often a surface winds round points: by solid angles; for the nodes of a grid by its crossings above them, summed.
+"""Winding numbers of a closed triangulated surface: at points by solid angles, at grid nodes by ray casting.
 
-The grid is an array, or has no bounds: `Windings` keeps the crossings alone, whatever lies between parts of a surface.
-
-The winding number does not ask which triangle is nearest. So it holds where a surface is folded, or sheets of it have
-crossed, as they do for some steps where a narrow groove closes; there the nearest sheet may face the wrong way.
+The winding number of a node is the sum of the signed crossings of the surface with the vertical ray above it. It does
+not depend on the nearest triangle, so it stays correct where the surface is folded or sheets of it have crossed, as
+they do for some steps where a narrow groove closes. `on_grid` fills an array; `WindingNumbers` stores only the
+crossings on a grid without bounds.
 """
 
 from dataclasses import dataclass
@@ -17,11 +17,11 @@ from reflowshock.particles.core.cells import uncounted
 
 
 @uncounted
-def _passes(points, a, b, x, y):
-    """Whether an edge from a to b, seen from above, passes x, y on the side of larger x: up (1), down (-1) or not (0).
+def _edge_side(points, a, b, x, y):
+    """Return 1 or -1 if the edge a-b, seen from above, crosses y to the right of x (upwards or downwards), else 0.
 
-    Of its ends one is above y and one is not. So what is exactly on an edge, or on a vertex however many triangles meet
-    there, is as what is just beside it. Both triangles at an edge get the same answer, but for its sign.
+    An edge crosses y if one end is above y and the other is not, so a ray through an edge or a vertex counts once. Both
+    triangles of an edge get the same answer with opposite signs.
     """
     if (points[a, 1] <= y) == (points[b, 1] <= y):
         return 0
@@ -31,13 +31,13 @@ def _passes(points, a, b, x, y):
 
 
 @uncounted
-def _crossing(points, a, b, c, place):
-    """Whether the vertical through x, y leaves a body through a triangle (1), enters (-1) or misses it (0); where.
+def _crossing(points, a, b, c, column):
+    """Return 1, -1 or 0 if the vertical at (x, y) leaves the body through a triangle, enters or misses; and the height.
 
-    Never above or below the triangle, where rounding would put it: seen from above, a steep one has hardly an area.
+    The height is limited to that of the triangle: a steep one has hardly any area seen from above, so rounding matters.
     """
-    x, y = place
-    sign = _passes(points, a, b, x, y) + _passes(points, b, c, x, y) + _passes(points, c, a, x, y)
+    x, y = column
+    sign = _edge_side(points, a, b, x, y) + _edge_side(points, b, c, x, y) + _edge_side(points, c, a, x, y)
     if sign == 0:
         return 0, 0.0
     ax, ay, az = points[a, 0], points[a, 1], points[a, 2]
@@ -53,16 +53,24 @@ def _crossing(points, a, b, c, place):
 
 @uncounted
 def _nodes_across(points, corners, axis, origin, spacing):
-    """First and last node along an axis that a triangle may reach, the last one excluded."""
-    one, two, three = points[corners[0], axis], points[corners[1], axis], points[corners[2], axis]
-    first, last = (min(one, two, three) - origin[axis]) / spacing, (max(one, two, three) - origin[axis]) / spacing
+    """Return the range of nodes along an axis that a triangle may reach, its end excluded."""
+    a, b, c = points[corners[0], axis], points[corners[1], axis], points[corners[2], axis]
+    first, last = (min(a, b, c) - origin[axis]) / spacing, (max(a, b, c) - origin[axis]) / spacing
     return floor(first), ceil(last) + 1
 
 
 @njit(cache=True)
-def on_grid(points, triangles, origin, spacing, found):
-    """Add the windings round the nodes of a grid to what is found, an array of its counts."""
-    last_x, last_y, last_z = found.shape[0] - 1, found.shape[1] - 1, found.shape[2] - 1
+def on_grid(points, triangles, origin, spacing, numbers):
+    """Compute the winding numbers of a surface at the nodes of a grid.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        origin: Position of the first node, shape (3,) [m].
+        spacing: Distance between nodes [m].
+        numbers: Zeros, shape (i, j, k), to which the winding numbers are added.
+    """
+    last_x, last_y, last_z = numbers.shape[0] - 1, numbers.shape[1] - 1, numbers.shape[2] - 1
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         columns = _nodes_across(points, (a, b, c), 0, origin, spacing)
@@ -73,18 +81,18 @@ def on_grid(points, triangles, origin, spacing, found):
                 sign, height = _crossing(points, a, b, c, (x, y))
                 below = min(last_z, ceil((height - origin[2]) / spacing) - 1)
                 if sign != 0 and below >= 0:
-                    found[column, row, below] += sign
+                    numbers[column, row, below] += sign
     for column in range(last_x + 1):
         for row in range(last_y + 1):
             for level in range(last_z - 1, -1, -1):
-                found[column, row, level] += found[column, row, level + 1]
+                numbers[column, row, level] += numbers[column, row, level + 1]
 
 
 @njit(cache=True)
 def _crossings(points, triangles, grid, keys, signs):
-    """Write which node each crossing is above and its sign, as far as there is room; return how many there are.
+    """Write the node below each crossing and its sign, as far as there is room; return the number of crossings.
 
-    ``grid``: origin `(3,)`, spacing, and nodes along y and z: numbers of nodes grow downwards, then from column to
+    ``grid``: Origin (3,), spacing, and nodes along y and z. Numbers of nodes grow downwards, then from column to
     column.
     """
     origin, spacing, rows, levels = grid
@@ -104,15 +112,15 @@ def _crossings(points, triangles, grid, keys, signs):
 
 
 @dataclass(frozen=True, slots=True)
-class Windings:
-    """How often a surface winds round the nodes of a grid without bounds.
+class WindingNumbers:
+    """Winding numbers of a surface at the nodes of a grid without bounds.
 
     Attributes:
-        origin: a node below and beside all of the surface `(3,)` [m].
-        spacing: of the nodes [m].
-        shape: nodes along y and z beside the surface.
-        keys: `(k,)` nodes below which the number changes, downwards, column after column.
-        numbers: `(k,)` from each of them down to the next of its column.
+        origin: Node below all vertices along each axis, shape (3,) [m].
+        spacing: Distance between nodes [m].
+        shape: Number of nodes along y and z that cover the surface.
+        keys: Nodes from which downwards the winding number changes, column after column, shape (k,).
+        numbers: Winding number from each of these nodes down to the next one of its column, shape (k,).
     """
 
     origin: Floats
@@ -122,48 +130,54 @@ class Windings:
     numbers: Indices
 
     @classmethod
-    def of(cls, points: Floats, triangles: Indices, spacing: float) -> "Windings":
-        """Find those of a surface of points `(n, 3)` [m] and triangles `(t, 3)`."""
+    def of(cls, points: Floats, triangles: Indices, spacing: float) -> "WindingNumbers":
+        """Compute the winding numbers of a closed surface.
+
+        Args:
+            points: Vertices, shape (n, 3) [m].
+            triangles: Outward oriented triangles, shape (t, 3).
+            spacing: Distance between nodes [m].
+        """
         low, high = points.min(axis=0), points.max(axis=0)
         origin = low - 1.5 * spacing
-        _, rows, levels = (int(one) for one in np.ceil((high - origin) / spacing) + 2.0)
+        _, rows, levels = (int(count) for count in np.ceil((high - origin) / spacing) + 2.0)
         grid, none = (origin, spacing, rows, levels), np.empty(0, np.int64)
         keys = np.empty(_crossings(points, triangles, grid, none, none), np.int64)
         signs = np.empty_like(keys)
         _crossings(points, triangles, grid, keys, signs)
         order = np.argsort(keys, kind="stable")
         keys, total = keys[order], np.cumsum(signs[order])
-        first = np.searchsorted(keys, keys // levels * levels)  # of its column
+        first = np.searchsorted(keys, keys // levels * levels)  # the first key of its column
         numbers = total - np.append(0, total)[first]
         last = np.append(keys[1:] != keys[:-1], np.ones(len(keys[:1]), bool))
         return cls(origin, spacing, (rows, levels), keys[last], numbers[last])
 
     @property
     def bounds(self) -> tuple[int, int]:
-        """The least and the largest of all."""
+        """Least and largest winding number."""
         return int(self.numbers.min(initial=0)), int(self.numbers.max(initial=0))
 
-    def about(self, places: Floats) -> Indices:
-        """Return those of the nodes next to places `(n, 3)` [m], `(n,)`."""
+    def at(self, points: Floats) -> Indices:
+        """Return the winding numbers of the nodes nearest to points (n, 3) [m], shape (n,)."""
         if not len(self.keys):
-            return np.zeros(len(places), np.int64)
-        (rows, levels), (column, row, level) = self.shape, np.rint((places - self.origin) / self.spacing).astype(int).T
-        beside = (column < 0) | (row < 0) | (row >= rows) | (level >= levels)
+            return np.zeros(len(points), np.int64)
+        (rows, levels), (column, row, level) = self.shape, np.rint((points - self.origin) / self.spacing).astype(int).T
+        is_outside = (column < 0) | (row < 0) | (row >= rows) | (level >= levels)
         key = (column * rows + row + 1) * levels - 1 - np.maximum(level, 0)
-        at = np.searchsorted(self.keys, key, side="right") - 1
-        found = ~beside & (at >= 0) & (self.keys[at] // levels == key // levels)
-        return np.where(found, self.numbers[at], 0)
+        above = np.searchsorted(self.keys, key, side="right") - 1
+        is_below_crossing = ~is_outside & (above >= 0) & (self.keys[above] // levels == key // levels)
+        return np.where(is_below_crossing, self.numbers[above], 0)
 
 
 @njit(cache=True, parallel=True)
-def winding_numbers(points, corners):
-    """Turns of a surface around each point, `(n,)`: 1 inside, 0 outside, up to rounding.
+def at_points(points, corners):
+    """Return the winding number of a surface at each point, shape (n,): 1 inside, 0 outside, up to rounding.
 
-    Solid angles of triangles after van Oosterom & Strackee (1983).
+    It is the sum of the solid angles of the triangles over 4 pi (van Oosterom & Strackee 1983).
 
     Args:
-        points: `(n, 3)` [m].
-        corners: `(t, 3, 3)` of the triangles, outward oriented [m].
+        points: Points, shape (n, 3) [m].
+        corners: Corners of the outward oriented triangles, shape (t, 3, 3) [m].
     """
     result = np.zeros(points.shape[0])
     for i in prange(points.shape[0]):

@@ -1,4 +1,4 @@
-"""Rows of a long table, each kept as soon as it is there: a run that was broken off goes on where it was."""
+"""Table rows that are stored as soon as they are computed, so that an interrupted run continues."""
 
 import hashlib
 import json
@@ -9,32 +9,32 @@ from typing import Any
 import reflowshock.cases.hard.trials
 import reflowshock.fem
 
-SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # of what is measured
+SOURCES = (reflowshock.fem, reflowshock.cases.hard.trials)  # code whose changes invalidate stored rows
 
 
-class KeptRows:
-    """A file of JSON lines, a row each; rows of other sources or parameters stay there, but do not count."""
+class StoredRows:
+    """File of JSON lines with one row each; rows of other sources or parameters are ignored."""
 
     def __init__(self, path: Path, parameters: object) -> None:
-        """Read the rows of these parameters by the present sources; what a killed run left half written goes."""
+        """Read the valid rows of a file and remove an incomplete last line."""
         self._path, self._key = path, digest_of(parameters)
         path.parent.mkdir(parents=True, exist_ok=True)
         whole = path.read_text(encoding="utf-8").rpartition("\n")[0] if path.exists() else ""
         path.write_text(f"{whole}\n" if whole else "", encoding="utf-8")
         rows = [json.loads(line) for line in whole.splitlines()]
-        self._rows = {row["name"]: row["found"] for row in rows if row["key"] == self._key}
+        self._rows = {row["name"]: row["value"] for row in rows if row["key"] == self._key}
 
-    def found(self, name: str, compute: Callable[[], Any]) -> Any:
-        """Return what is kept under a name, or else compute it and keep it."""
+    def get(self, name: str, compute: Callable[[], Any]) -> Any:
+        """Return the row of a name, computed and stored if it is missing."""
         if name not in self._rows:
             self._rows[name] = compute()
             with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": self._key, "name": name, "found": self._rows[name]}) + "\n")
+                file.write(json.dumps({"key": self._key, "name": name, "value": self._rows[name]}) + "\n")
         return self._rows[name]
 
 
 def digest_of(parameters: object) -> str:
-    """Return a name for parameters and all sources of what is measured."""
+    """Return a digest of the parameters and of all measured source files."""
     digest = hashlib.sha256(repr(parameters).encode())
     for package in SOURCES:
         for path in sorted(Path(package.__path__[0]).rglob("*.py")):
