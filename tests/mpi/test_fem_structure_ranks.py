@@ -99,4 +99,4 @@ def test_error_ends_both_ranks(tmp_path, changes, message):
 def test_more_ranks_than_elements(tmp_path):
     done = run_program(write_structure(tmp_path, strip_mesh((2, 1, 1)), watch={}), 4)
     assert done.returncode == 1
-    assert "a rank has no element of the mesh: take fewer ranks" in done.stderr
+    assert "a rank has no element of the mesh; use fewer ranks" in done.stderr

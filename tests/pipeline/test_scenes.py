@@ -78,7 +78,7 @@ def test_a_drop_in_a_plane_from_case_file_to_report(tmp_path):
     assert metrics["max_width"] == pytest.approx(2.0 * radius, rel=1e-3)
     assert metrics["volume"] == pytest.approx(1e-9, rel=1e-12)
     assert metrics["particles_lost"] == 0
-    assert "distance from the middle [mm]" in (tmp_path / "report.html").read_text()
+    assert "distance from the centre [mm]" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

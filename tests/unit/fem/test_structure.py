@@ -45,7 +45,7 @@ def test_program_reads_its_input_and_writes_all_products(tmp_path, capsys):
     assert result["model"]["elements"] == 48
     assert result["effects"]["input_g"] == {"on": True, "why": "loads.drop"}
     assert not result["effects"]["plasticity"]["on"]
-    assert "leaves out strains of up to" in result["effects"]["finite_rotation"]["why"]
+    assert "neglects strains of up to" in result["effects"]["finite_rotation"]["why"]
     assert result["metrics"]["peak_neglected_strain@board"]["value"] > 0.0
     assert (tmp_path / "out" / "structure.pvd").exists()
     with np.load(tmp_path / "out" / "history.npz") as history:

@@ -57,11 +57,11 @@ def test_own_materials_go_before_those_of_the_library():
         ({"structure": layered("FR4") | {"layers": {}}, "supports": {}}, "structure.layers: the structure has no"),
         (
             {"structure": layered("FR4", element="tetrahedron", formulation="one_point"), "supports": {}},
-            "structure.formulation = one_point: is a choice for hexahedra",
+            "structure.formulation = one_point: applies to hexahedra",
         ),
         ({"supports": {"foot": {"on": "zmin", "hold": ["x"]}}}, "supports.foot.on = zmin: no such facet set"),
         ({"supports": {"foot": {"on": "zmin", "hold": ["x"]}}}, "did you mean z_min?"),
-        ({"supports": {"foot": {"on": "z_min", "hold": []}}}, "supports.foot.hold = []: holds nothing"),
+        ({"supports": {"foot": {"on": "z_min", "hold": []}}}, "supports.foot.hold = []: fixes no component"),
         ({"loads": {"push": {"kind": "pressure", "on": "top", "peak": 1e6}}}, "loads.push.on = top"),
         ({"loads": {"push": {"kind": "pressure", "on": "z_max", "peak": 1e6}}}, "loads.push.duration: is missing"),
         ({"loads": {"drop": {"kind": "input_g"}}}, "loads.drop: is given by nothing; allowed: exactly one of"),
@@ -79,7 +79,7 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         (
             {"loads": {"poke": POKE | {"at": [0.02, 0.0, 2e-3]}}},
-            "loads.poke.at = (0.02, 0, 0.002) m: lies 0.001 m outside the meshed body; the nearest point of it is"
+            "loads.poke.at = (0.02, 0, 0.002) m: lies 0.001 m outside the meshed body; its nearest point is"
             " (0.02, 0, 0.001) m",
         ),
         (
@@ -98,24 +98,24 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         (
             {"supports": {"foot": {"on": "z_min", "hold": ["z"]}}, "loads": {"drop": SHAKEN}},
-            "loads.drop.method = large_mass: needs a support that it can shake: one that holds x, y, z",
+            "loads.drop.method = large_mass: needs a support that it can move: one that holds x, y, z",
         ),
         (
             {"supports": {"holes": HELD, "foot": {"on": "z_min", "hold": ["z"]}}, "loads": {"drop": SHAKEN}},
             "supports.foot.hold = [z]: would stay in place along z while the large mass of loads.drop moves",
         ),
-        ({"loads": {"drop": SHAKEN, "again": SHAKEN}}, "loads.again.method = large_mass: is already that of loads."),
+        ({"loads": {"drop": SHAKEN, "again": SHAKEN}}, "loads.again.method = large_mass: is already the method of loads."),
         (
             {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "damping": {"mass_coefficient": 10.0}}},
-            "loads.drop.method = large_mass: does not go with mass-proportional damping",
+            "loads.drop.method = large_mass: cannot be combined with mass-proportional damping",
         ),
         (
             {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "initial_velocity": [0.0, 0.0, 1.0]}},
-            "loads.drop.method = large_mass: does not go with initial_velocity",
+            "loads.drop.method = large_mass: cannot be combined with initial_velocity",
         ),
         (
             {"loads": {"drop": SHAKEN, "pull": {"kind": "motion", "on": "x_max", "component": "z", "table": "v.csv"}}},
-            "loads.drop.method = large_mass: does not go with loads.pull",
+            "loads.drop.method = large_mass: cannot be combined with loads.pull",
         ),
         (
             {"loads": {"drop": {"kind": "input_g", "service_condition": "B", "direction": [1.0, 0.0, 1.0]}}},
@@ -153,7 +153,7 @@ def test_own_materials_go_before_those_of_the_library():
         ({"loads": {}}, "loads: nothing moves the structure"),
         (
             {"watch": {"centre": {"at": [0.0, 0.0, 4e-3]}}},
-            "watch.centre.at = (0, 0, 0.004) m: lies 0.003 m outside the meshed body; the nearest point of it is"
+            "watch.centre.at = (0, 0, 0.004) m: lies 0.003 m outside the meshed body; its nearest point is"
             " (0, 0, 0.001) m",
         ),
         ({"watch": {"left": {"at": [-0.01, 0.0, 0.0]}}}, "allowed: (0, -0.0385, 0) m to (0.066, 0.0385, 0.001) m"),
@@ -166,11 +166,11 @@ def test_own_materials_go_before_those_of_the_library():
         ({"dynamics": {"duration": 1e-3, "damping": {"mass_ratio": 0.01}}}, "dynamics.damping.frequency: is missing"),
         (
             {"dynamics": {"duration": 1e-3, "kinematics": "finite", "damping": {"stiffness_coefficient": 1e-9}}},
-            "dynamics.damping.stiffness_coefficient: needs a constant stiffness, dynamics.kinematics = finite",
+            "dynamics.damping.stiffness_coefficient: needs a constant stiffness, but dynamics.kinematics = finite",
         ),
         ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["copper"]}}}, "mass_scaled = copper: no such"),
-        ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["board"]}}}, "leaves no layer to take the step"),
-        ({"dynamics": {"duration": 1e-3, "solver": "both", "numerics": {"mass_scaled": ["board"]}}}, "serves explicit"),
+        ({"dynamics": {"duration": 1e-3, "numerics": {"mass_scaled": ["board"]}}}, "leaves no layer that defines the time step"),
+        ({"dynamics": {"duration": 1e-3, "solver": "both", "numerics": {"mass_scaled": ["board"]}}}, "applies to explicit"),
         ({"dynamics": {"duration": 1e-5, "numerics": {"implicit_step": 1e-3}}}, "implicit_step = 0.001 s: is too long"),
     ],
 )  # fmt: skip

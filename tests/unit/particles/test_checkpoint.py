@@ -111,7 +111,7 @@ def test_a_truncated_file_is_ignored_with_a_message(tmp_path, caplog, share):
     path.write_bytes(content[: int(share * len(content))])
     checkpoint = Checkpoint(path, ("inputs",))
     assert checkpoint.read() is None
-    assert "broken off" in caplog.text
+    assert "is truncated" in caplog.text
     assert not checkpoint.continued
 
 

@@ -143,7 +143,7 @@ def test_partitions_and_jobs_of_a_folder(tmp_path, monkeypatch):
     with pytest.raises(CaseError, match="asks for 70 MPI ranks, but the Slurm partition long has 64 cores"):
         checks.check_slurm(Profile(tmp_path), [case("bga_drop", "shock.ranks.total=70")])
     program(tmp_path, "sinfo", "pass")
-    with pytest.raises(CaseError, match="no partition"):
+    with pytest.raises(CaseError, match="no Slurm partition"):
         checks.check_slurm(Profile(tmp_path), [])
     program(tmp_path, "sinfo", "raise SystemExit('sinfo: error: no controller')")
     with pytest.raises(queue.NoAnswer, match="no controller"):

@@ -46,7 +46,7 @@ def test_more_critical_joints_than_joints_are_refused():
 
 
 def test_levels_are_refused_where_the_scheme_has_none():
-    with pytest.raises(CaseError, match=r"levels = 2: does not go with scheme = impulse; allowed: auto"):
+    with pytest.raises(CaseError, match=r"levels = 2: cannot be combined with scheme = impulse; allowed: auto"):
         read_case(SMALL_CASE, ["shock.coupling.scheme=impulse", "shock.coupling.levels=2"])
 
 

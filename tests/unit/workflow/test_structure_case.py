@@ -78,7 +78,7 @@ BAD_VALUES = {
     "unknown solver": ("dynamics.solver=implict", ["dynamics.solver", "did you mean implicit?"]),
     "too many ranks": ("dynamics.ranks=4096", ["dynamics.ranks", "4096 MPI ranks", "--oversubscribe"]),
     "other case": ("structure.layers.cover.material=fr4", ["did you mean FR4?"]),
-    "no support": ("supports={}", ["loads.drop.method", "needs a support that the table shakes"]),
+    "no support": ("supports={}", ["loads.drop.method", "needs a support that moves with the table"]),
     "too many steps": ("dynamics.duration=1e300 s", ["dynamics.duration", "would take more than 1e+10 explicit steps"]),
     "damped too much": (
         "dynamics.damping={stiffness_ratio=0.9,frequency='1e-6 Hz'}",

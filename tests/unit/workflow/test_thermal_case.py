@@ -85,7 +85,7 @@ FAULTS = {
     ),
     "liquid in the end": (['thermal.final="0.5 kK"'], ["thermal.final", "<= 217 degC, the solidification"]),
     "no temperature": (['thermal.peak="3 mm"'], ["is a length; expected a temperature"]),
-    "floats and is moved": (MOVED[1:], ["thermal.corner_displacement", "does not go with package = floating"]),
+    "floats and is moved": (MOVED[1:], ["thermal.corner_displacement", "cannot be combined with package = floating"]),
     "moved nowhere": (MOVED[:1], ["thermal.corner_displacement: is missing"]),
     "name": (["thermal.corner_displacment=1"], ["did you mean thermal.corner_displacement?"]),
     "crushed": (
