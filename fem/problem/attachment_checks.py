@@ -87,7 +87,9 @@ def _elastic(problem: StructureProblem) -> Iterator[Problem]:
             yield Problem(f"loads.{name}.method", message, "large_mass", "direct")
     attached = key or next((f"masses.{name}" for name in problem.masses), None)
     if attached and problem.dynamics.coupling is not None:
-        yield Problem(attached, "requires a single model, but dynamics.coupling makes two", None, "no dynamics.coupling")
+        yield Problem(
+            attached, "requires a single model, but dynamics.coupling makes two", None, "no dynamics.coupling"
+        )
 
 
 def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:

@@ -38,7 +38,9 @@ class Ranks(Parameters):
     @classmethod
     def _ranks_for_each(cls, value: str, info: ValidationInfo) -> str:
         if value == "disjoint" and info.data.get("total", 2) < 2:
-            raise PydanticCustomError("inadmissible", "needs at least one rank for each model", {"allowed": "auto, shared"})
+            raise PydanticCustomError(
+                "inadmissible", "needs at least one rank for each model", {"allowed": "auto, shared"}
+            )
         return value
 
     @field_validator("macro")

@@ -262,7 +262,9 @@ def _fine(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Proble
     if layers and set(coupling.fine) >= set(layers):
         yield Problem(f"{COUPLING}.fine", "leaves no layer to the macro model", list(coupling.fine), "fewer layers")
     if problem.structure.element != "hexahedron":
-        yield Problem(COUPLING, f"couples hexahedra, but the element is {problem.structure.element}", None, "hexahedron")
+        yield Problem(
+            COUPLING, f"couples hexahedra, but the element is {problem.structure.element}", None, "hexahedron"
+        )
 
 
 def _scheme(coupling: LayerCoupling, problem: StructureProblem) -> Iterator[Problem]:
@@ -293,7 +295,9 @@ def _one_model(problem: StructureProblem) -> Iterator[Problem]:
     """Yield parameters that require a single model."""
     dynamics = problem.dynamics
     if dynamics.solver == "implicit":
-        yield Problem("dynamics.solver", "does not support coupling", "implicit", "explicit or both, or no dynamics.coupling")
+        yield Problem(
+            "dynamics.solver", "does not support coupling", "implicit", "explicit or both, or no dynamics.coupling"
+        )
     if (
         dynamics.modes
         and dynamics.solver not in ("both", "dns")

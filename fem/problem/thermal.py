@@ -78,7 +78,9 @@ class Thermal(Parameters):
     def _moves_the_package(cls, value: float | None, info: ValidationInfo) -> float | None:
         package = info.data.get("package")
         if package == "floating" and value is not None:
-            raise PydanticCustomError("inadmissible", "cannot be combined with package = floating", {"allowed": "moved"})
+            raise PydanticCustomError(
+                "inadmissible", "cannot be combined with package = floating", {"allowed": "moved"}
+            )
         if package == "moved" and value is None:
             message = "is missing: the displacement of the die's corner with package = moved"
             raise PydanticCustomError("inadmissible", message, {"allowed": 'any length, e.g. "-0.1 mm"'})
