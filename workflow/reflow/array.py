@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What a file of a joint belongs to: the first of the joints that are alike, the exchange, the place."""
+    """Origin of a joint's file: first joint of the group, number of the exchange, geometry."""
 
     name: str
     number: int
@@ -32,7 +32,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """Joints that are alike, where an exchange has left them: who, the file of now, and that of their first reflow."""
+    """Group of equal joints after an exchange, with its present file and the file of its first reflow."""
 
     group: Alike
     now: Source
@@ -41,7 +41,7 @@ class Left:
 
 @dataclass(frozen=True, slots=True)
 class CarriedReflow:
-    """A joint that is carried on: from which file to which; the first reflow has none to begin from."""
+    """Reflow of a joint from one file to the next; the first reflow starts without a file."""
 
     files: Path
     solder: Solder
@@ -65,14 +65,14 @@ def records() -> tuple[type, ...]:
 
 
 class JointArray:
-    """The joints, `coupling.Joints`. Those that are alike stay one as long as their places are.
+    """Joints of an array (`coupling.Joints`); equal joints stay one group while their geometries are equal.
 
     Attributes:
-        left: where the last exchange has left them; a run that continues sets it to what it kept.
+        left: Groups after the last exchange; a restarted run sets it to the stored groups.
     """
 
     def __init__(self, solder: Solder, files: Path, pool: JointPool, progress: Callable[[Shares], None]) -> None:
-        """Begin without any joint.
+        """Start without joints.
 
         Args:
             solder: of one joint.
@@ -128,7 +128,7 @@ def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
 
 
 def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShape":
-    """Return the shape of one joint, in a process of the pool; what it begins from is its first reflow."""
+    """Return the shape of one joint, in a process of the pool, starting from its first reflow."""
     from reflowshock.particles.scenes.carried_joint import carried_shape
 
     assert job.before is not None

@@ -1,4 +1,4 @@
-"""What is between board and package when the solder is liquid: a structure that bends, or rigid plates, and why."""
+"""Choice of the structure around liquid solder: elastic board and package, or rigid plates, with the reason."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext

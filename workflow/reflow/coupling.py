@@ -1,12 +1,12 @@
-"""Solder and structure: wrenches and motions of the pads are exchanged until each load step is in balance.
+"""Staggered coupling of solder and structure: wrenches and pad motions are exchanged until each load step balances.
 
-In a load step, W are the wrenches that bend the structure, q the rigid motions of a package that floats:
+In a load step, W are the wrenches that bend the structure, q the rigid motions of a floating package:
 
     pads = structure(temperature, corner, W, q),     W' = joints(pads)
 
-The structure is so much stiffer than surface tension that W <- W' contracts by 1e-4 or so; q follows by Newton's
-method from what weight and W' leave out of balance. Both residuals are over the pull of surface tension, pi a gamma a
-joint. In one way only, nothing bends under W, and only q is to be found.
+The structure is so much stiffer than surface tension that W <- W' contracts by about 1e-4; Newton's method finds q from
+the residual of weight and W'. Both residuals are divided by the pull of surface tension, pi a gamma per joint. One-way
+coupling neglects bending under W and solves for q only.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -49,12 +49,12 @@ class Joints(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What is small: forces over the pull of surface tension.
+    """Scales of the residuals: the pull of surface tension.
 
     Attributes:
-        pull: `(joints, 2, 6)` pi a gamma, and times the pad's radius a for moments [N, N m].
-        rigid: `(k,)` the pull of all joints along each rigid motion [N, N m].
-        tolerance: of both residuals.
+        pull: pi a gamma, times the pad's radius a for moments, shape (joints, 2, 6) [N, N m].
+        rigid: Pull of all joints along each rigid motion, shape (k,) [N, N m].
+        tolerance: Tolerance of both residuals.
     """
 
     pull: Floats
@@ -168,7 +168,7 @@ class Coupling:
                 )
 
     def _exchange(self, coupled: Coupled) -> Exchange:
-        """Ask the joints; note what they left, and where to try next."""
+        """Compute the joints' wrenches, record the residuals, and choose the next trial."""
         assert coupled.state is not None
         answer = self._answer(coupled.state.pad_motion, len(coupled.exchanges))
         change = np.abs(answer - coupled.wrenches) / self.scale.pull
@@ -213,7 +213,7 @@ def placed(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[st
 
 
 def scale_of(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidModes", tolerance: float) -> Scale:
-    """Return what is small: forces over pi a gamma, moments over that times the pad's radius a."""
+    """Return the scales of the residuals: pi a gamma for forces, times the pad's radius a for moments."""
     radii = np.array([(geometry.radius_board, geometry.radius_package) for geometry in geometries])
     force = np.pi * radii * solder.surface_tension
     pull = np.repeat(np.stack((force, force * radii), axis=-1), 3, axis=-1)
@@ -223,12 +223,12 @@ def scale_of(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "Rigi
 
 
 def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidModes") -> Coupled:
-    """Return where the coupling begins: without wrenches, a package that floats at the height that bears it.
+    """Return the initial state of the coupling: no wrenches, a floating package at its equilibrium height.
 
     Args:
-        geometries: of the joints between the pads as they would be without solder.
-        solder: of one joint.
-        modes: free rigid motions of the package.
+        geometries: Geometries of the joints between the pads of the structure without solder.
+        solder: Solder of one joint.
+        modes: Free rigid motions of the package.
     """
     from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 
@@ -245,9 +245,9 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
 
 
 def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> float:
-    """Return the gap [m] nearest to the given one at which a coaxial joint bears a load [N]; this one where none does.
+    """Return the nearest gap [m] at which a coaxial joint supports a load [N], or the present gap if there is no such gap.
 
-    A higher joint must bear less, or the height does not last.
+    The force must decrease with the height, otherwise the equilibrium is unstable.
     """
     from scipy.optimize import brentq
 

@@ -1,4 +1,4 @@
-"""Load steps of a reflow that is coupled with board and package, and what it would be like before it runs."""
+"""Load steps of a reflow coupled with board and package, and their prediction before a run."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from itertools import groupby
 
 @dataclass(frozen=True, slots=True)
 class LoadStep:
-    """What acts on board and package besides the solder: temperature [K], displacement of the die's corner [m]."""
+    """Loads on board and package other than solder: temperature [K], displacement of the die's corner [m]."""
 
     temperature: float
     corner: float
@@ -27,8 +27,8 @@ class LoadStep:
 def load_steps(thermal: Thermal) -> list[LoadStep]:
     """Return the load steps with liquid solder, in order; in the last one its shape freezes.
 
-    Those of the heating divide the way from the reference to the peak evenly; cooling takes the same ones backwards.
-    Melting and solidification are load steps of their own.
+    Heating divides the range from the reference to the peak into equal steps; cooling takes the same steps in reverse.
+    Melting and solidification are separate load steps.
     """
     rise = (thermal.peak - thermal.reference) / thermal.steps
     way = [thermal.reference + rise * number for number in range(thermal.steps)] if rise > 0.0 else []
@@ -38,19 +38,20 @@ def load_steps(thermal: Thermal) -> list[LoadStep]:
     return [LoadStep(value, thermal.corner(value)) for value in temperatures]
 
 
-# Measured with the structures of tests/verification/test_workflow_coupling.py: a package that floats is sought by
-# three or four exchanges a load step, forces that bend need two, and one way none beyond the first.
+# Measured with the structures of tests/verification/test_workflow_coupling.py: a floating package needs
+# three or four exchanges per load step, two-way coupling two, and one-way coupling one.
 EXCHANGES_TO_FLOAT, EXCHANGES_TO_BEND, EXCHANGES_ONE_WAY = 4, 2, 1
 
 
 @dataclass(frozen=True, slots=True)
 class HeatedForecast:
-    """What is predicted.
+    """Predicted load steps and exchanges.
 
     Attributes:
-        effects: effect -> {"on", "why"}.
-        steps: load steps with liquid solder.
-        exchanges: between solder and structure, over all load steps; each costs about a reflow of all joints.
+        effects: Decision by effect: {"on", "why"}.
+        steps: Load steps with liquid solder.
+        exchanges: Number of exchanges between solder and structure over all load steps; each costs about a reflow of
+            all joints.
     """
 
     effects: dict

@@ -31,18 +31,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Heated:
-    """What a coupled reflow found.
+    """Result of a coupled reflow.
 
     Attributes:
-        geometries: joint name -> where its shape froze.
-        groups: joints that are alike.
-        shapes: name of the first of them -> its shape.
-        coupled: how it came about.
-        steps: the load steps.
-        structure: products of board and package, by name in `structure.npz`.
-        effects: what was decided of temperature and plates.
-        metrics, health: of the coupling, as in `summary.json`.
-        continued: from which exchange a run continued, in words.
+        geometries: Geometry by joint name when the solder froze.
+        groups: Groups of equal joints.
+        shapes: Shape by name of the first joint of a group.
+        coupled: Final state of the coupling.
+        steps: Load steps.
+        structure: Arrays of board and package by name in `structure.npz`.
+        effects: Decisions on temperature and plates.
+        metrics: Metrics of the coupling, as in `summary.json`.
+        health: Health checks of the coupling, as in `summary.json`.
+        continued: Description of the exchange from which a run continued.
     """
 
     geometries: "dict[str, JointGeometry]"
@@ -123,14 +124,14 @@ def _nothing(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
 
 
 def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
-    """All that a coupled reflow depends on: case, pads, and the sources of what is saved of it."""
+    """Return all inputs of a coupled reflow: case, pads, and a digest of the sources of its saved state."""
     folders = (Path(__file__).parent, Path(statics.__file__).parent)
     sources = digest_of_files(*(path for folder in folders for path in sorted(folder.glob("*.py"))))
     return case.package, case.board, case.warpage, case.solder, case.materials, case.thermal, pads, sources
 
 
 def _records() -> tuple[type, ...]:
-    """What the file of a coupling consists of."""
+    """Return the record types of the file of a coupling."""
     from reflowshock.fem.statics.state import HeatedState
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.orientation import Orientation
@@ -161,15 +162,15 @@ class Saved:
 
 
 class Telling:
-    """What the terminal shows: load step, temperature, exchange, residual, and which joints are under way."""
+    """Progress on the terminal: load step, temperature, exchange, residual, and joints in progress."""
 
     def __init__(self, bar: ProgressBar, steps: list[LoadStep]) -> None:
-        """Begin at the first load step."""
+        """Start at the first load step."""
         self._bar, self._steps, self._done, self._number = bar, steps, 0, 0
         self._residual = ""
 
     def joints(self, shares: Shares) -> None:
-        """Show how far the joints of an exchange are."""
+        """Show the progress of the joints of an exchange."""
         step = self._steps[min(self._done, len(self._steps) - 1)]
         finished = sum(share >= 1.0 for share in shares.values())
         busy = [f"{name} {share:.0%}" for name, share in shares.items() if 0.0 < share < 1.0]
@@ -180,7 +181,7 @@ class Telling:
         )
 
     def exchange(self, exchange: Exchange) -> None:
-        """Note what an exchange left."""
+        """Record the residual of an exchange."""
         if exchange.load_step != self._done:
             self._done, self._number = exchange.load_step, 0
         self._number += 1

@@ -52,7 +52,7 @@ class Alike:
 
     @property
     def name(self) -> str:
-        """Name of the first joint, which is that of their shape."""
+        """Name of the first joint, under which the shape is stored."""
         return next(iter(self.members))
 
 

@@ -1,6 +1,6 @@
-"""What one MPI rank does: it takes jobs from a folder, until none is left or one fails; see `ranks.py`.
+"""One MPI rank: takes jobs from a folder until none is left or one fails; see `ranks.py`.
 
-Jobs and what they gave are files of data. Which function does them stands on the command line, in no file.
+Jobs and results are data files. The command line names the function that runs them; no file does.
 """
 
 import json
@@ -20,14 +20,14 @@ PAUSE = 0.2  # seconds between two words of the progress
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a job gave: a value, or in words why there is none."""
+    """Result of a job: a value, or the message of its error."""
 
     value: Any = None
     error: str = ""
 
 
 class Voice:
-    """Tells the launcher how far a joint is, a line at a time and not too often."""
+    """Reporter of a joint's progress to the launcher, one line at a time and rate-limited."""
 
     def __init__(self, name: str) -> None:
         """Begin with the next word."""

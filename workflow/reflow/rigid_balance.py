@@ -33,13 +33,13 @@ class RigidBalance:
 
     @classmethod
     def start(cls, names: tuple[str, ...], pad_motion: Floats, joints: Floats, largest: float) -> "RigidBalance":
-        """Begin from the joints' stiffness.
+        """Start from the joints' stiffness.
 
         Args:
-            names: of the motions; turns begin with "turn".
-            pad_motion: `(k, joints, 2, 6)` what a unit of each does to the pads.
-            joints: `(joints, 6, 6)` derivative of the wrench on the package's pad by its motion.
-            largest: longest motion in one exchange [m].
+            names: Names of the motions; rotations begin with "turn".
+            pad_motion: Motion of the pads per unit of each rigid motion, shape (k, joints, 2, 6).
+            joints: Derivative of the wrench on the package's pad by its motion, shape (joints, 6, 6).
+            largest: Longest motion in one exchange [m].
         """
         package = pad_motion[:, :, 1]
         arms = np.sqrt((package[..., :3] ** 2).sum(axis=-1).mean(axis=1))  # of turns [m/rad]; of shifts 1

@@ -28,12 +28,12 @@ class Reflowed:
     """Joints at rest.
 
     Attributes:
-        pads: the table as solidified.
-        geometries: joint name -> geometry.
-        groups: joints that are alike.
-        shapes: name of the first of them -> its shape.
-        found: what is reported of them besides their shapes.
-        structure: what `structure.npz` holds; nothing between rigid plates at rest.
+        pads: Pad table at solidification.
+        geometries: Geometry by joint name.
+        groups: Groups of equal joints.
+        shapes: Shape by name of the first joint of a group.
+        found: Metrics and health checks, without the shapes.
+        structure: Arrays of `structure.npz`; empty between rigid plates at rest.
     """
 
     pads: "list[PadSite]"
