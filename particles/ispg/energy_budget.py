@@ -9,7 +9,7 @@ from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.wall_forces import StepSolution, WallForces
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.one_leg import OneLeg
-from reflowshock.particles.surface.contact_line import FrictionLine
+from reflowshock.particles.surface.hysteresis import FrictionLine
 
 
 @dataclass(frozen=True, slots=True)

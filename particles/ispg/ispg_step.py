@@ -50,7 +50,7 @@ from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.steps.backward_difference import Base
 from reflowshock.particles.steps.step_solver import Motion, SolverTraits
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
-from reflowshock.particles.surface.contact_line import FrictionLine
+from reflowshock.particles.surface.hysteresis import FrictionLine
 
 SUPPORT = 1.5
 # Age, in steps, of the velocity that predicts the forces: with newer ones, modes that resist less than their stiffness

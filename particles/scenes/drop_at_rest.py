@@ -22,7 +22,8 @@ from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
-from reflowshock.particles.surface.contact_line import ContactLine, FrictionLine, HystereticLine
+from reflowshock.particles.surface.contact_line import ContactLine
+from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine
 from reflowshock.particles.surface.profile import width
 
 ANGLE_OF_CUBE = 0.5 * np.pi

@@ -1,8 +1,7 @@
-"""Contact lines on walls: pinning at the edges of pads (Gibbs' condition) and contact-angle hysteresis.
+"""Contact lines on walls with pads: pinning at the edges of pads (Gibbs' condition).
 
-Each vertex is pinned at the edge of a pad, free on a pad, or free on the solder mask between pads. On a uniform wall
-with hysteresis a line advances at one contact angle, recedes at a smaller one, and rests in between. Contact angles do
-not depend on the speed of the line.
+Each vertex is pinned at the edge of a pad, free on a pad, or free on the solder mask between pads. Contact
+angles do not depend on the speed of the line.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,12 +14,10 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import equal_area_radius
 from reflowshock.particles.core.plate import Pad
-from reflowshock.particles.core.surface_measure import ahead, behind, ring_area_gradient
+from reflowshock.particles.core.surface_measure import ahead, behind
 from reflowshock.particles.core.symmetry import share, unit, whole_points
 
 PINNED, ON_PAD, ON_MASK = 0, 1, 2
-# States of a line with hysteresis.
-RECEDING, ADVANCING = ON_PAD, ON_MASK
 # Difference of the cosine beyond which a pinned vertex is released.
 RELEASE_MARGIN = 0.02
 # Distance from an edge, in spacings, within which a vertex is near it.
@@ -149,7 +146,7 @@ class ContactLine:
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
         offset = local - self._centres[pad]
-        area, beyond = _sectors(local).sum(), _sectors(offset)
+        area, beyond = sectors(local).sum(), sectors(offset)
         if self.has_edge:
             turns = np.array([_turns(local - centre).sum() for centre in self._centres])
             area -= 0.5 * self._square @ turns
@@ -294,7 +291,7 @@ class ContactLine:
         return offset, np.linalg.norm(offset, axis=1)
 
 
-def _sectors(local: Floats) -> Floats:
+def sectors(local: Floats) -> Floats:
     """Return the areas of the triangles of the origin and each segment of a closed line (k, 2), shape (k,) [m^2]."""
     x, y = local.T
     return 0.5 * (x * ahead(y) - y * ahead(x))
@@ -310,123 +307,10 @@ def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
 def _turns(local: Floats) -> Floats:
     """Return the angle that each segment of a closed line (k, 2) subtends at the origin, shape (k,) [rad]."""
     after = ahead(local)
-    return np.arctan2(2.0 * _sectors(local), (local * after).sum(axis=1))
+    return np.arctan2(2.0 * sectors(local), (local * after).sum(axis=1))
 
 
 def _turns_gradient(local: Floats, weight: Floats) -> Floats:
     """Return the gradient of the weighted sum of `_turns`, with weights (k,), shape (k, 2) [1/m]."""
     around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
     return (behind(weight) - weight)[:, None] * around
-
-
-class HystereticLine(ContactLine):
-    """Contact line on a uniform wall with contact-angle hysteresis.
-
-    A vertex is pinned while receding angle < contact angle < advancing angle. Beyond that it moves under the force of
-    the exceeded angle, and is pinned again as soon as the liquid carries it the other way.
-    """
-
-    def __init__(self, wall: int, receding_angle: float, advancing_angle: float, local: Floats) -> None:
-        """Pin each vertex at its position.
-
-        Args:
-            wall: Index of the contact line and of its plate.
-            receding_angle: Largest contact angle at which the line recedes [rad].
-            advancing_angle: Smallest contact angle at which the line advances [rad].
-            local: Vertices in the frame of the plate, shape (k, 2) or (k, 3) [m].
-        """
-        super().__init__(
-            wall, (Pad((0.0, 0.0), np.inf, receding_angle),), advancing_angle, local, np.array([len(local)])
-        )
-        self.state[:], self._mean_cosine = PINNED, 0.5 * float(np.cos(receding_angle) + np.cos(advancing_angle))
-
-    @property
-    def has_energy(self) -> bool:
-        """False: the force of a line with hysteresis includes friction."""
-        return False
-
-    @property
-    def has_events(self) -> bool:
-        """True: vertices are pinned and released."""
-        return True
-
-    def cosine_area_gradient(self, body: Body) -> Floats:
-        """Return the force on the vertices over the surface tension, shape (k, 3) [m].
-
-        It is the cosine at each vertex times the gradient of the wetted area.
-        """
-        return self.cosine()[:, None] * self._area_gradient(body)
-
-    def _level(self, body: Body) -> float:
-        """Return the wetted area times the mean of both cosines [m^2]; friction acts symmetrically about that mean."""
-        points, _ = whole_points(body.cloud, body.points, self.wall)
-        return self._mean_cosine * float(_sectors(body.plates[self.wall].local(points)[:, :2]).sum())
-
-    def _area_gradient(self, body: Body) -> Floats:
-        """Return the gradient of the wetted area with respect to the vertices of the line, shape (k, 3) [m]."""
-        ring, (points, index) = body.cloud.rings[self.wall], whole_points(body.cloud, body.points, self.wall)
-        whole = ring_area_gradient(points, np.arange(len(index), dtype=np.int32))[: len(ring)]
-        return share(body.cloud)[ring][:, None] * whole
-
-    def update(self, body: Body, load: Floats, coefficient: float) -> None:
-        """Pin vertices that have reversed their motion; release those whose angle exceeds one of the two.
-
-        Args:
-            body: Liquid body.
-            load: As for `ContactLine.contact_cosine`.
-            coefficient: Surface tension [N/m].
-        """
-        outward, _ = self.outward(body)
-        speed = (body.velocity[body.cloud.rings[self.wall]] * outward).sum(axis=1)
-        has_reversed = ((self.state == ADVANCING) & (speed < 0.0)) | ((self.state == RECEDING) & (speed > 0.0))
-        self.state[has_reversed] = PINNED
-        cosine, is_pinned = self.contact_cosine(body, load, coefficient), self.state == PINNED
-        self.state[is_pinned & (cosine > self._pad_cosine[0] + RELEASE_MARGIN)] = RECEDING
-        self.state[is_pinned & (cosine < self._mask_cosine - RELEASE_MARGIN)] = ADVANCING
-
-
-class FrictionLine(HystereticLine):
-    """Contact line with hysteresis in a flow with inertia, whose friction is solved with the time step.
-
-    Coulomb's law holds at each vertex: while the vertex is pinned, the wall pulls with gamma cos(theta) a unit length,
-    where theta between both angles is the one that balances the other forces. A moving vertex has the force of one of
-    the angles, against its motion. Which vertices are pinned is found with the velocities of the step
-    (`update_states`), so friction never adds energy.
-    """
-
-    @property
-    def has_events(self) -> bool:
-        """False: vertices are pinned and released within the solution of a step."""
-        return False
-
-    def friction(self, body: Body) -> Floats:
-        """Return the friction force on the moving vertices over the surface tension, shape (k, 3) [m]."""
-        beyond = np.where(self.state == PINNED, 0.0, self.cosine() - self._mean_cosine)
-        return beyond[:, None] * self._area_gradient(body)
-
-    def friction_power(self, body: Body, velocity: Floats) -> float:
-        """Return the power dissipated by friction at velocities (n, 3) [m/s] over the surface tension [m^2/s]."""
-        return -float((self.friction(body) * velocity[body.cloud.rings[self.wall]]).sum())
-
-    def update_states(self, body: Body, velocity: Floats, needed: Floats, releases: bool) -> bool:
-        """Pin vertices that have reversed their motion; release those that the wall cannot hold.
-
-        Args:
-            body: Liquid body for which the forces of the step were computed.
-            velocity: Velocities at the end of the step, shape (n, 3) [m/s].
-            needed: Force that keeps the pinned vertices in place, over the surface tension, shape (n, 3) [m].
-            releases: Whether vertices may be released.
-
-        Returns:
-            Whether any state has changed, so that the step has to be solved again.
-        """
-        ring, across = body.cloud.rings[self.wall], self._area_gradient(body)
-        speed, state, is_pinned = (velocity[ring] * across).sum(axis=1), self.state.copy(), self.state == PINNED
-        state[((state == ADVANCING) & (speed < 0.0)) | ((state == RECEDING) & (speed > 0.0))] = PINNED
-        if releases:
-            cosine = (needed[ring] * across).sum(axis=1) / (across**2).sum(axis=1)
-            state[is_pinned & (cosine > self._pad_cosine[0])] = RECEDING
-            state[is_pinned & (cosine < self._mask_cosine)] = ADVANCING
-        changed = bool((state != self.state).any())
-        self.state = state
-        return changed

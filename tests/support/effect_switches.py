@@ -43,7 +43,7 @@ ELSEWHERE_OFF = {
     "shear_dependent_viscosity": f"{RHEOLOGY}::test_shear_dependence_acts_where_it_is_given_and_viscosity_acts",
     "droplet_tension": f"{DROPLETS}::test_effects_that_are_off_do_nothing",
     "droplet_gravity": f"{DROPLETS}::test_effects_that_are_off_do_nothing",
-    "freezing": f"{FREEZING}::test_light_cures_what_does_not_freeze",
+    "freezing": f"{FREEZING}::test_light_cures_drops_that_do_not_freeze",
 }
 ELSEWHERE_ON = {
     "flow_viscosity": f"{FLOWS}::test_neglected_viscosity_changes_nothing",
@@ -51,7 +51,7 @@ ELSEWHERE_ON = {
     "shear_dependent_viscosity": f"{RHEOLOGY}::test_an_exponent_of_one_computes_what_constant_viscosity_does",
     "droplet_tension": f"{DROPLETS}::test_small_tension_changes_little",
     "droplet_gravity": f"{DROPLETS}::test_small_weight_changes_little",
-    "freezing": f"{FREEZING}::test_little_freezing_does_little",
+    "freezing": f"{FREEZING}::test_slow_freezing_changes_little",
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
     "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
     "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",

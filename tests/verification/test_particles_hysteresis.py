@@ -13,7 +13,8 @@ from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
 from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
-from reflowshock.particles.surface.contact_line import PINNED, FrictionLine, HystereticLine
+from reflowshock.particles.surface.contact_line import PINNED
+from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine
 from tests.support.level_sets import cap_radius
 
 RECEDING, ADVANCING = np.radians(60.0), np.radians(110.0)

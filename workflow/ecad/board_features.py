@@ -87,7 +87,7 @@ def _can_be_meshed(chosen: list[Hole], hole: Hole, board: Layout, package: Packa
     """Return whether a hole can be meshed with the chosen ones; a board that may turn about them is accepted."""
     trial = Board.model_validate(board_table(board, thickness, [*chosen, hole]))
     hole_problems = [p for p in problems(package, trial, Warpage()) if p.key.startswith("board.holes")]
-    return all("turn about" in problem.message for problem in hole_problems)
+    return all("rotate about" in problem.message for problem in hole_problems)
 
 
 def lumped_masses(board: Layout, package: str, thickness: float) -> tuple[list[Mass], list[str]]:

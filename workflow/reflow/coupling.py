@@ -245,7 +245,7 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
 
 
 def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> float:
-    """Return the nearest gap [m] at which a coaxial joint supports a load [N], or the present gap if there is no such gap.
+    """Return the nearest gap [m] at which a coaxial joint supports a load [N], or else the present gap.
 
     The force must decrease with the height, otherwise the equilibrium is unstable.
     """

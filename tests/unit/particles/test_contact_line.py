@@ -11,15 +11,8 @@ from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.scenes.metrics import verdict
 from reflowshock.particles.steps.descent import StepStart
-from reflowshock.particles.surface.contact_line import (
-    ADVANCING,
-    ON_MASK,
-    ON_PAD,
-    PINNED,
-    RECEDING,
-    ContactLine,
-    FrictionLine,
-)
+from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, ContactLine
+from reflowshock.particles.surface.hysteresis import ADVANCING, RECEDING, FrictionLine
 
 PAD, MASK = np.radians(5.0), np.radians(148.0)
 

@@ -19,7 +19,8 @@ from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.relaxation import Relaxation
 from reflowshock.particles.steps.step_solver import SolverTraits
 from reflowshock.particles.steps.time_step import TimeStep
-from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine, HystereticLine
+from reflowshock.particles.surface.contact_line import ON_PAD, PINNED, ContactLine
+from reflowshock.particles.surface.hysteresis import HystereticLine
 
 RADII, GAP = (0.75, 1.46), 1.0
 TENSION = (SurfaceTension(2.0),)

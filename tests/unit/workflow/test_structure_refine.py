@@ -44,7 +44,7 @@ def test_one_model_in_place_of_two():
 def test_one_model_without_two_is_the_explicit_solver():
     with pytest.raises(CaseError, match="solver") as caught:
         read_case(ONE_SCALE, ["dynamics.solver=dns"])
-    assert "one model instead of two" in caught.value.lines()[0]
+    assert "replaces two coupled models" in caught.value.lines()[0]
 
 
 @pytest.mark.parametrize("name", ["two_scale_bar", "bar_wave"])
