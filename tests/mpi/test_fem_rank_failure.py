@@ -110,7 +110,7 @@ def errors_of(directory: Path, checkpoints: Path, what: str, where: str) -> str:
         ("SIGKILL", r"error: rank 1 \((macro|meso)\) has died, all ranks are ended in window 2"),
         (
             "SIGSTOP",
-            r"rank 0 \((macro|meso)\): in window 21 it has waited [2-9] s for values of the interface .* rank 1",
+            r"rank 0 \((macro|meso)\): in window 21 it has waited [2-9] s for interface values from rank 1",
         ),
     ],
 )

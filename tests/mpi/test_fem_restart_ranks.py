@@ -43,7 +43,7 @@ def go(changes, name, checkpoints=None, windows=10**9):
     request = json.loads((folder / "input.json").read_text()) | changes["input"]
     request = INPUT.validate_python(request | {"output": folder / name, "checkpoints": checkpoints})
     try:
-        (run if isinstance(request, RunInput) else run_structure)(comm, request)
+        (run_package if isinstance(request, RunInput) else run_structure)(comm, request)
     except Killed:
         pass
     return folder / name

@@ -133,7 +133,7 @@ def test_package_and_board_at_rest_on_the_table_feel_the_table():
 
 def test_too_few_samples():
     assert is_sampled(TIME, LowPass()) and not is_sampled(TIME[::10], LowPass())
-    with pytest.raises(ValueError, match="1000 samples a second are too few for a filter with CFC 1000"):
+    with pytest.raises(ValueError, match="1000 samples per second are too few for a filter with CFC 1000"):
         low_passed(np.zeros(100), 1e-3, LowPass())
 
 

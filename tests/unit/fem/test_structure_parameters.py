@@ -148,7 +148,7 @@ def test_own_materials_go_before_those_of_the_library():
         (
             {"supports": {"end": {"on": "y_max", "hold": ["x", "y", "z"]}}}
             | {"loads": {"drop": {"kind": "input_g", "service_condition": "B", "method": "large_mass"}}},
-            "cannot move supports.end: a plane of symmetry holds nodes of it in space where x_min and y_max meet",
+            "cannot move supports.end: a plane of symmetry fixes nodes of it in space where x_min and y_max meet",
         ),
         ({"loads": {}}, "loads: nothing moves the structure"),
         (
@@ -160,7 +160,7 @@ def test_own_materials_go_before_those_of_the_library():
         (
             {"materials": {"tin": YIELDING}, "structure": layered("tin"), "supports": {}}
             | {"dynamics": {"duration": 1e-3, "solver": "both"}},
-            "structure.layers.board.material = tin: yields, the solver both is linear",
+            "structure.layers.board.material = tin: yields, but the solver both is linear",
         ),
         ({"dynamics": {"duration": 1e-3, "solver": "implicit", "kinematics": "finite"}}, "dynamics.kinematics = fin"),
         ({"dynamics": {"duration": 1e-3, "damping": {"mass_ratio": 0.01}}}, "dynamics.damping.frequency: is missing"),

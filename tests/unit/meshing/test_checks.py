@@ -73,7 +73,7 @@ def places(*pairs, diameter=2.0):
         (
             {"symmetry": "quarter", "centre": (0.0, 0.0), "length": 40 * MM, "width": 30 * MM},
             "board.holes.at",
-            "mirror",
+            "symmetric",
         ),
         ({"centre": (13 * MM, 0.0)}, "board.centre", "reaches beyond the board along its length within 12.5 mm"),
     ],
