@@ -82,7 +82,7 @@ class LargeMass(Load):
             moved: Mass [kg] of all models; without it the model is alone.
 
         Raises:
-            LoadError: There is no such node, or one is held or tied.
+            LoadError: A node does not exist, or is held or tied.
         """
         local = body.local.locate(nodes)
         local = local[local >= 0]

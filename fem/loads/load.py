@@ -123,7 +123,7 @@ class Load:
         """Subtract from a copy of ``motion.force`` what ``add`` added last."""
 
     def release(self, force: NDArray[np.float64]) -> None:
-        """Subtract from a copy of ``motion.force`` what a support puts into it."""
+        """Subtract the force of a support from a copy of ``motion.force``."""
 
     def collect(self, motion: Loaded) -> None:
         """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
@@ -268,7 +268,7 @@ class FineSupports(Load):
             self.work += 0.5 * motion.step * factor * float(power)
 
     def _acting(self) -> Iterator[tuple[float, NodalPattern]]:
-        """Yield the accelerations that some nodes bear, with their patterns."""
+        """Yield the accelerations of nodes with supports, with their patterns."""
         for factor, pattern in zip(self._factor, self.patterns, strict=True):
             if factor and len(pattern[0]):
                 yield float(factor), pattern
@@ -276,7 +276,7 @@ class FineSupports(Load):
 
 @dataclass
 class PrescribedVelocity(Load):
-    """One velocity component of some nodes follows a pulse; its work is that of the reaction.
+    """One velocity component of some nodes follows a pulse; its work is the work of the reaction.
 
     Attributes:
         nodes: ``(k,)`` local nodes.

@@ -19,7 +19,7 @@ from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, Tabulated
 MOST_LINES = 1_500_000
 LONGEST = 60  # characters of a cell in an error
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# Of each quantity its units, the SI unit first.
+# Units of each quantity, the SI unit first.
 QUANTITIES: dict[str, dict[str, float]] = {
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "G": STANDARD_GRAVITY, "g": STANDARD_GRAVITY},
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},

@@ -138,5 +138,5 @@ def in_mm(length: float) -> str:
 
 
 def given(case: "BoardDropCase") -> dict:
-    """Return what is fitted as the package fem reads it."""
+    """Return the fittings in the input format of the package fem."""
     return case.model_dump(mode="json", include=set(BoardFittings.model_fields))

@@ -64,7 +64,7 @@ def shape_effect(real: float, identical: float) -> float | None:
 
 
 def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str) -> Findings:
-    """Add what real shapes change in the critical joint's peak peel stress to what a shock has found.
+    """Add what real shapes change in the critical joint's peak peel stress to the result of a shock.
 
     Args:
         found: metrics, health and effects of the shock with the real joints.

@@ -110,7 +110,7 @@ class ShockForecast:
 
     @property
     def ratio(self) -> float:
-        """Wall time of the two-scale run over that of a DNS of the same duration."""
+        """Ratio of the wall times of the two-scale run and a DNS of the same duration."""
         return self.two_scale * self.dns_share / self.dns
 
 

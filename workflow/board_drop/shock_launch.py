@@ -83,7 +83,7 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
-    """Return what the package fem reads as input of a run, but for its folders and natural modes."""
+    """Return the input of a run of the package fem, but for its folders and natural modes."""
     case = decided(run.case)
     shock = case.shock.model_copy(update={"coupling": coupling, "modes": 0})
     return {

@@ -72,7 +72,7 @@ def _life(life: Life, history: Arrays) -> dict:
 
 
 def answer(verdict: dict, error: float | None) -> str:
-    """Say what the verdict is, in one line.
+    """Return the verdict in one line.
 
     Args:
         verdict: ``verdict_of``.
@@ -120,7 +120,7 @@ def _text(value: float, unit: str) -> tuple[str, str]:
 
 
 def limits_table(failure: Failure) -> dict | None:
-    """Return the limits and the law of life with their sources; None where there are none."""
+    """Return the limits and the law of life with their sources; None without limits."""
     rows = [
         [name.replace("_", " "), quantity({"value": limit.limit, "unit": MEASURES[name].unit}), limit.source]
         for name, limit in failure.limits.items()

@@ -215,7 +215,7 @@ def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal:
 
 
 def final_exchanges(coupled: Coupled) -> list[Exchange]:
-    """The last exchange of each load step."""
+    """Return the last exchange of each load step."""
     return list({exchange.load_step: exchange for exchange in coupled.exchanges}.values())
 
 

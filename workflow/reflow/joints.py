@@ -161,7 +161,7 @@ def bridge_shapes(
 
 
 def _relaxing(solder: Solder) -> Solder:
-    """The solder without motion, by the default scheme."""
+    """Return the solder without inertia, with the default scheme."""
     numerics = solder.numerics.model_copy(update={"scheme": "energy"})
     effects = solder.effects.model_copy(update={"inertia": "off", "viscosity": "off"})
     return solder.model_copy(update={"numerics": numerics, "effects": effects})

@@ -161,9 +161,9 @@ def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
         ({"coupling": {"placement": "disjoint"}}, "dynamics.coupling.placement", "one rank for each"),
         ({"coupling": {"macro_ranks": 1}}, "dynamics.coupling.macro_ranks", "applies only to placement"),
         ({"solver": "implicit"}, "dynamics.solver", "does not support coupling"),
-        ({"modes": 2}, "dynamics.modes", "one model"),
+        ({"modes": 2}, "dynamics.modes", "single model"),
         ({"kinematics": "finite", "coupling": {"scheme": "local_steps"}}, "dynamics.coupling.scheme", "elastic"),
-        ({"numerics": {"explicit_step": 1e-9}}, "dynamics.numerics.explicit_step", "one model"),
+        ({"numerics": {"explicit_step": 1e-9}}, "dynamics.numerics.explicit_step", "single model"),
     ],
 )
 def test_what_two_models_cannot_do_is_said_before_anything_is_computed(tmp_path, changes, key, words):
