@@ -85,5 +85,5 @@ def test_interrupted_run_continues_to_the_same_bits(whole, tmp_path, monkeypatch
 def test_implicit_solver_refuses_what_yields(tmp_path):
     from reflowshock.fem.problem.structure_checks import check
 
-    with pytest.raises(ValueError, match="yields, the solver implicit is linear"):
+    with pytest.raises(ValueError, match="yields, but the solver implicit is linear"):
         check(structure_input(tmp_path, **(PULLED | {"dynamics": {"duration": 1e-4, "solver": "implicit"}})))
