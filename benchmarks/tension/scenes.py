@@ -200,7 +200,7 @@ def stretched(simulation: Simulation) -> Simulation:
     for axis in range(3):
         fields[axis][:] *= factors[axis]
     if hasattr(simulation.surface, "points"):
-        simulation.surface.points *= factors
+        simulation.surface.mesh.points *= factors
     return Simulation(fields, simulation.fluids, simulation.law, simulation.surface)
 
 

@@ -158,7 +158,7 @@ def swing(across, viscosity, stretch=1.05, periods=2.5):
     fields, surface, radius = start.fields, start.surface, 0.5 * scene.diameter
     for axis, factor in ((fields.x, stretch**-0.5), (fields.y, stretch**-0.5), (fields.z, stretch)):
         axis *= factor
-    surface.points *= [stretch**-0.5, stretch**-0.5, stretch]
+    surface.mesh.points *= [stretch**-0.5, stretch**-0.5, stretch]
     simulation = Simulation(fields, start.fluids, start.law, surface)
     frequency = rayleigh_frequency(2, radius, scene.density, scene.surface_tension)
     rows = []

@@ -1,11 +1,10 @@
 """Rows of the tables of the scheme ispg: the program accepts each of them, and takes that scheme."""
 
-import json
-
 import pytest
 
 from benchmarks import ispg_tables
 from benchmarks.ispg_tables import ROOT, TABLES
+from benchmarks.support import results
 from reflowshock.workflow.pipeline.reader import read_case
 
 
@@ -21,7 +20,7 @@ def test_rows_are_accepted(table):
 def test_rows_are_computed_once(tmp_path, monkeypatch):
     """A row that is refused is stored as such."""
     asked, refused = [], ispg_tables.drop(16, 60)
-    monkeypatch.setattr(ispg_tables, "RESULTS", tmp_path / "tables.json")
+    monkeypatch.setattr(results, "FOLDER", tmp_path)
     monkeypatch.setattr(ispg_tables, "TABLES", {"drops": [refused], "free": []})
     monkeypatch.setattr(ispg_tables, "warm", lambda: asked.append("warm"))
     for arguments in ([], ["drops"], ["drops", "--again"]):
@@ -30,5 +29,5 @@ def test_rows_are_computed_once(tmp_path, monkeypatch):
     assert asked == ["warm"] * 2
     assert (
         "16 particles along an edge"
-        in json.loads((tmp_path / "tables.json").read_text())["drops"][refused.name]["error"]
+        in results.read_figures(ispg_tables.NAME)["drops"][refused.name]["error"]
     )
