@@ -101,7 +101,7 @@ def effect(case: BoardDropCase) -> dict:
     if thermal is None:
         return {}
     cooling = f": cooling by {thermal.solidification - thermal.final:.4g} K"
-    wanted = ResidualStress.wanted(thermal, f"{cooling}; an upper bound: solder relaxes at room temperature")
+    wanted = ResidualStress.by_setting(thermal, f"{cooling}; an upper bound: solder relaxes at room temperature")
     return {ResidualStress.name: wanted}
 
 
