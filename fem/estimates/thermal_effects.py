@@ -220,12 +220,12 @@ class ResidualStress(Effect[Heated]):
     toggle = Toggle("thermal.effects.residual_stress", "on", "off")
 
     def decide(self, heated: Heated) -> Decision:
-        """Decide by the setting of the case."""
-        return self.by_setting(heated.thermal)
+        """Return the setting of the case."""
+        return self.setting(heated.thermal)
 
     @staticmethod
-    def by_setting(thermal: Thermal, of_cooling: str = "") -> Decision:
-        """Decide by the setting of the case; if the effect is on, ``of_cooling`` is appended to the reason."""
+    def setting(thermal: Thermal, of_cooling: str = "") -> Decision:
+        """Return the setting of the case; ``of_cooling`` is added to the reason where the effect is on."""
         on = thermal.effects.residual_stress == "on"
         why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
         return decision(on, why + of_cooling if on else why)
