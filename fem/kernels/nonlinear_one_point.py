@@ -122,7 +122,7 @@ def write_hourglass_energy(w, slip, energy):
 
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
-    """Return the largest hourglass stress [Pa] of a section from its yield stress and its von Mises stress at centre."""
+    """Return the largest hourglass stress [Pa] of a section, given its yield stress and von Mises stress [Pa]."""
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 
 
