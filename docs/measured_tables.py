@@ -18,8 +18,8 @@ LONGEST_LIST = 60  # rows of a table; longer lists are data, not tables
 def benchmark_tables() -> Iterator[str]:
     """Yield a section for each stored benchmark: purpose, conditions and figures."""
     yield from ("# Results of benchmarks", "")
-    yield "The last measurement of each script in [benchmarks](../../benchmarks/README.md). The load is the number of"
-    yield from ("processes that want a core, averaged over five minutes, at the start and the end.", "")
+    yield "The last measurement of each script in [benchmarks](../../benchmarks/README.md). The load is the mean"
+    yield from ("number of runnable processes over five minutes, at the start and the end.", "")
     for path in sorted((ROOT / "benchmarks/results").glob("*.json")):
         stored = json.loads(path.read_text())
         yield from (f"## {path.stem}", "", f"*{_conditions(stored['conditions'])}*", "")
