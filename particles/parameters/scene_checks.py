@@ -1,7 +1,8 @@
 """Checks of the parameters of drop scenes in combination; loads neither numba nor PETSc."""
 
+from collections.abc import Callable
 from math import degrees, pi, radians
-from typing import Protocol
+from typing import Any, Protocol
 
 from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
@@ -51,16 +52,9 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
     if asked != "auto":
         return solder, ""
     ispg = changed(solder, "numerics.scheme", "ispg")
-    if isinstance(scene, Drop):
-        feature = _unverified_drop(scene, solder)
-        alone = scene.section != "none" or scene.speed is not None
-    elif isinstance(scene, Joint):
-        feature = unverified_joint(scene, solder)
-        alone = scene.path is not None and scene.path.speed is not None
-    else:
-        feature, alone = _unverified_pair(scene, solder), False
-    if alone:
+    if scene.needs_ispg:
         return ispg, "no other scheme computes it"
+    feature = UNVERIFIED_FEATURES[type(scene)](scene, solder)
     return (ispg, "with inertia it costs less than tetrahedra") if feature is None else (solder, f"not ISPG: {feature}")
 
 
@@ -228,6 +222,14 @@ def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
     weight = acting_weight(solder, decide_drop(solder, is_free=False))
     rest = [sessile_meridian(v, pair.contact_angle, solder.surface_tension, weight) for v in pair.volumes]
     return 0.5 * sum(edges), max(0.5 * sum(edges), 0.5 * sum(drop.max_width for drop in rest))
+
+
+# Function that returns the unverified feature of each kind of scene.
+UNVERIFIED_FEATURES: dict[type, Callable[[Any, Solder], str | None]] = {
+    Drop: _unverified_drop,
+    Joint: unverified_joint,
+    Drops: _unverified_pair,
+}
 
 
 def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:

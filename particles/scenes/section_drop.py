@@ -13,7 +13,7 @@ from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, SurfaceTension
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.scenes.reflow import build_physics
+from reflowshock.particles.scenes.flow_setup import build_physics
 from reflowshock.particles.section.forces import PolylineTension, PolylineWeight, PolylineWetting
 from reflowshock.particles.section.polyline import Polyline
 from reflowshock.particles.section.section import Section, block
