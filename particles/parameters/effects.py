@@ -127,7 +127,7 @@ class GravityEffect(LiquidEffect):
     number = f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma"
     threshold = NEGLIGIBLE_SHAPE_CHANGE
     influence = f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)"
-    place = "reflowshock.particles.physics.forces.Gravity"
+    implementation = "reflowshock.particles.physics.forces.Gravity"
     switch = "solder.effects.gravity (of a scene: gravity) = auto, on, off"
     source = "Bashforth & Adams 1883, heights of sessile drops"
     is_measured = True
@@ -168,7 +168,7 @@ class InertiaEffect(MotionEffect):
     adds = "rho Dv/Dt"
     number = "T / max(sqrt(rho L^3 / gamma), rho L^2 / (5 mu)), process over slowest time"
     influence = "exp(-T / slowest time): what is left of the motion"
-    place = "reflowshock.particles.physics.operators.Inertia"
+    implementation = "reflowshock.particles.physics.operators.Inertia"
     switch = "solder.effects.inertia = auto, on, off"
     source = "Lamb 1932, art. 355, decay of mode 2"
 
@@ -184,7 +184,7 @@ class ViscosityEffect(MotionEffect):
     adds = "-div(2 mu D(v))"
     number = "as inertia; Oh = mu / sqrt(rho gamma L) is given"
     influence = "exp(-T / slowest time): at rest it does nothing"
-    place = "reflowshock.particles.physics.operators.Viscosity"
+    implementation = "reflowshock.particles.physics.operators.Viscosity"
     switch = "solder.effects.viscosity = auto, on, off"
     source = "Lamb 1932, art. 355"
 
@@ -211,7 +211,7 @@ class SurfaceTensionEffect(LiquidEffect):
     threshold = LARGEST_BOND
     acts = "below"
     influence = "1 / sqrt(1 + Bo) of the shape: the capillary length over the size"
-    place = "reflowshock.particles.physics.forces.SurfaceTension"
+    implementation = "reflowshock.particles.physics.forces.SurfaceTension"
     switch = "solder.effects.surface_tension = auto, on, off"
     source = "de Gennes, Brochard-Wyart & Quere 2004, 2.1"
 
@@ -231,7 +231,7 @@ class WallAdhesionEffect(LiquidEffect):
     threshold = LARGEST_BOND
     acts = "below"
     influence = "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg"
-    place = "reflowshock.particles.physics.forces.Wetting"
+    implementation = "reflowshock.particles.physics.forces.Wetting"
     switch = "solder.effects.wall_adhesion = auto, on, off"
     source = "Young 1805; Brakke 1992"
 

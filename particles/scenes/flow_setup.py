@@ -48,7 +48,7 @@ def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[Contact
     physics = Physics((), (Mass(solder.density),), (), (), lines)
     for effect in LIQUID_EFFECTS:
         if effects[effect.name]:
-            acting: type[Acting] = resolve_name(effect.place)
+            acting: type[Acting] = resolve_name(effect.implementation)
             physics = acting.added_to(physics, solder)
     return physics
 
