@@ -140,8 +140,8 @@ class ContactLine:
         """Return the integral for the line around the whole body up to a constant [m^2].
 
         A segment next to a pinned vertex has the cosine of its free end. A segment between pinned vertices has none; if
-        they are not evenly spaced, its area differs from the area at its part of the edge, so the formula jumps when one of
-        them is released.
+        they are not evenly spaced, its area differs from the area at its part of the edge, so the formula jumps when
+        one of them is released.
         """
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
