@@ -79,10 +79,11 @@ def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
     return sum((effect.weight(solder) for effect in acting(switched(effects))), 0.0)
 
 
-def asymmetric_effects(effects: Mapping[str, bool]) -> list[LiquidEffect]:
-    """Return the effects that are on and break the axis and the planes of symmetry of a drop.
+def asymmetric_effect(effects: Mapping[str, Decision]) -> LiquidEffect | None:
+    """Return the first effect that is on and breaks the axis and the planes of symmetry of a drop; None without one."""
+    return next((effect for effect in acting(switched(effects)) if not effect.is_axisymmetric), None)
 
-    Args:
-        effects: Name -> on or off; missing effects are off.
-    """
-    return [effect for effect in acting(effects) if not effect.is_axisymmetric]
+
+def reference_weight(solder: Solder, effects: Mapping[str, Decision]) -> float | None:
+    """Return the specific weight of the Young-Laplace reference [N/m^3]; None if the shapes are not axisymmetric."""
+    return None if asymmetric_effect(effects) else acting_weight(solder, effects)

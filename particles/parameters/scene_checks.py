@@ -245,7 +245,7 @@ def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     """Find enabled effects that need a wall in a scene without one."""
     if not scene.is_free:
         return []
-    switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
+    switches = {effect.key: getattr(solder.effects, effect.name) for effect in LIQUID_EFFECTS if effect.needs_wall}
     message = "without a contact angle the scene has no wall: a free drop falls as a whole"
     return [Problem(key, message, switch, "auto, off") for key, switch in switches.items() if switch == "on"]
 

@@ -75,6 +75,7 @@ class Physics:
         motions: Motions of the moving plates.
         frictions: Operators on the velocities relative to the plates.
         holds: Further constraints that pin particles to their plates.
+        is_axisymmetric: Whether the effects keep the axis of a drop.
     """
 
     forces: Sequence[Force]
@@ -85,6 +86,7 @@ class Physics:
     motions: Sequence[PlateMotion] = ()
     frictions: Sequence[Operator] = ()
     holds: Sequence[Hold] = ()
+    is_axisymmetric: bool = True
 
     def force(self, body: Body) -> Floats:
         """Return the sum of the forces, shape (n, 3) [N]."""
@@ -117,7 +119,7 @@ class Physics:
 
 
 class Acting(Protocol):
-    """Class that implements an effect; ``place`` in ``parameters/effects.py`` names it."""
+    """Class that implements an effect; ``LiquidEffect.place`` names it."""
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:

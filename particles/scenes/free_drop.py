@@ -16,6 +16,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import sphere_cloud
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.parameters.effects import decide_oscillation, switched
 from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics
@@ -37,7 +38,6 @@ METRICS = (
     "particles",
     "particle_steps_per_second",
 )
-EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
 # Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
 SETTLING_STEP, SETTLING_STEPS = 3.0, 10
@@ -185,7 +185,8 @@ def _radius(solder: Solder) -> float:
 
 def _physics(solder: Solder) -> Physics:
     """Build the physics of a free drop."""
-    return build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
+    effects = switched(decide_oscillation(solder))
+    return build_physics(solder, effects | {"viscosity": solder.effects.viscosity != "off"}, ())
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:

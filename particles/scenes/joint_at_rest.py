@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
+from reflowshock.particles.parameters.effects import Decision, decide_effects, reference_weight
 from reflowshock.particles.parameters.scenes import FloatingPackage, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
@@ -59,7 +59,7 @@ def joint_to_rest(
     Raises: as `solve_joint`.
     """
     effects = decide_effects(joint.geometry, solder)
-    weight = acting_weight(solder, effects)
+    weight = reference_weight(solder, effects)
     if joint.path is not None:
         shapes = _along(joint, solder, progress, checkpoints)
         geometries = [joint.geometry, *joint.places][: len(shapes)]
@@ -107,7 +107,7 @@ def _along(
     return shapes
 
 
-def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float) -> JointShape:
+def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float | None) -> JointShape:
     """Add `pull_exact` [N] to the history: what a way up or down takes by Young and Laplace, else nan."""
     if "standoff" not in shape.history:
         return shape
@@ -121,7 +121,7 @@ def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: fl
     return replace(shape, history=shape.history | {"pull_exact": pull})
 
 
-def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> Metrics:
+def _balance(joint: Joint, solder: Solder, weight: float | None, shape: JointShape) -> Metrics:
     """Errors of a package that floats free to lift: of its force against the load, of its height against Young-Laplace.
 
     The force's error is over pi gamma times the smaller pad's radius.
@@ -138,7 +138,7 @@ def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> 
     return balance
 
 
-def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) -> float:
+def collapse_height(joint: Joint, solder: Solder, weight: float | None, near: float) -> float:
     """Standoff [m] at which the Young-Laplace joint carries the load, near a guess; nan if none exists."""
     load = joint.package.load if joint.package else 0.0
 

@@ -41,7 +41,7 @@ class StepMethod:
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
     """Return whether an effect acts that a liquid at rest does not feel: inertia or viscosity."""
-    return any(effects[name] for name in AT_REST)
+    return any(effects.get(name, False) for name in AT_REST)
 
 
 # The first method whose scheme is selected and that computes the effects is taken.
