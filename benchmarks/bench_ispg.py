@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.support import results
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 
 NAME = "ispg"
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": True, "viscosity": True}

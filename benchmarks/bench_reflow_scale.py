@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.support import results
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 
 NAME = "reflow_scale"

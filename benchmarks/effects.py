@@ -20,7 +20,7 @@ from reflowshock.materials.parameters import Material
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 from reflowshock.workflow.effects.table import MEASURED
 
 CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3

@@ -26,8 +26,8 @@ from reflowshock.particles.parameters.scenes import PROPERTIES, Drop, Drops, Flu
 from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import start_clouds
+from reflowshock.particles.scenes.flow_setup import start_flow
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild
-from reflowshock.particles.scenes.reflow import start_flow
 from reflowshock.particles.sph_flows.droplet import solve_droplet
 from reflowshock.particles.surface.profile import section_areas
 

@@ -81,7 +81,8 @@ def _overflows(geometry: JointGeometry, solder: Solder) -> bool:
 
 def _tilt_problems(joint: Joint) -> list[Problem]:
     """Find a tilted pad whose edge is less than a spacing above the lower plate."""
-    for key, geometry in (("joint.tilt", joint.geometry), *(("joint.path", target) for target in joint.places)):
+    targets = [("joint.path", target) for target in joint.path_geometries]
+    for key, geometry in (("joint.tilt", joint.geometry), *targets):
         drop, tilt, room = joint.pad_top * sin(abs(geometry.tilt[1])), geometry.tilt[1], geometry.gap - joint.spacing
         if tilt and drop >= room:
             message = f"the edge of the upper pad is {mm(drop)} lower than its centre, in a gap of {mm(geometry.gap)}"
@@ -95,10 +96,10 @@ def _path_problems(joint: Joint) -> list[Problem]:
     if joint.package is not None:
         message = "a package floats or is moved, not both"
         return [Problem("joint.path", message, None, "joint.package or joint.path")]
-    if joint.places[-1] == joint.geometry:
+    if joint.path_geometries[-1] == joint.geometry:
         message = "the path ends where it starts"
         return [Problem("joint.path", message, None, "another standoff, offset or tilt")]
-    end, lowest = joint.places[-1], checks.SPACINGS_IN_GAP * joint.spacing
+    end, lowest = joint.path_geometries[-1], checks.SPACINGS_IN_GAP * joint.spacing
     if end.gap < (1.0 - ROUNDING) * lowest:
         message = f"too low for particles {mm(joint.spacing)} apart"
         return [Problem("joint.path.standoff", message, mm(end.gap), f">= {mm(lowest)}")]
@@ -163,9 +164,9 @@ def _speed_problems(joint: Joint, path: PackagePath, solder: Solder) -> list[Pro
         message = f"a package is moved at a speed ({mm_per_s(speed)}) by the scheme ispg alone"
         return [Problem("solder.numerics.scheme", message, solder.numerics.scheme, "ispg")]
     if path.steps is not None:
-        message = "at a speed a package goes all the way in one go"
+        message = "with a speed the package moves without stops"
         return [Problem("joint.path.steps", message, path.steps, "joint.path.steps or joint.path.speed")]
-    slowest = joint.way / solder.process_time
+    slowest = joint.path_length / solder.process_time
     fastest = sqrt(solder.surface_tension / (solder.density * max(joint.pad_bottom, joint.pad_top)))
     if not slowest < speed <= fastest:
         message = "it must end within solder.process_time, at a Weber number of its pad below 1"

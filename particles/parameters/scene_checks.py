@@ -1,12 +1,13 @@
 """Checks of the parameters of drop scenes in combination; loads neither numba nor PETSc."""
 
+from collections.abc import Callable
 from math import degrees, pi, radians
-from typing import Protocol
+from typing import Any, Protocol
 
 from reflowshock.parameters import changed
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
-from reflowshock.particles.parameters.effects import acting_weight, decide_drop
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, acting_weight, asymmetric_effect, decide_drop
 from reflowshock.particles.parameters.joint_checks import unverified_joint
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
@@ -51,16 +52,9 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
     if asked != "auto":
         return solder, ""
     ispg = changed(solder, "numerics.scheme", "ispg")
-    if isinstance(scene, Drop):
-        feature = _unverified_drop(scene, solder)
-        alone = scene.section != "none" or scene.speed is not None
-    elif isinstance(scene, Joint):
-        feature = unverified_joint(scene, solder)
-        alone = scene.path is not None and scene.path.speed is not None
-    else:
-        feature, alone = _unverified_pair(scene, solder), False
-    if alone:
+    if scene.needs_ispg:
         return ispg, "no other scheme computes it"
+    feature = UNVERIFIED_FEATURES[type(scene)](scene, solder)
     return (ispg, "with inertia it costs less than tetrahedra") if feature is None else (solder, f"not ISPG: {feature}")
 
 
@@ -70,6 +64,7 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     problems = problems or checks.ispg_problems(solder, _unverified_drop(drop, solder))
     problems = problems or _impact_problems(drop, solder)
     problems = problems or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    problems = problems or _asymmetry_problems(drop, solder)
     return problems or _wall_problems(drop) or free_problems(drop, solder)
 
 
@@ -230,6 +225,14 @@ def _distances(pair: Drops, solder: Solder) -> tuple[float, float]:
     return 0.5 * sum(edges), max(0.5 * sum(edges), 0.5 * sum(drop.max_width for drop in rest))
 
 
+# Function that returns the unverified feature of each kind of scene.
+UNVERIFIED_FEATURES: dict[type, Callable[[Any, Solder], str | None]] = {
+    Drop: _unverified_drop,
+    Joint: unverified_joint,
+    Drops: _unverified_pair,
+}
+
+
 def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
     """Find a liquid so viscous that a drop of it returns to the sphere without oscillation."""
     decay = lamb_decay_rate(2, scene.radius, solder.density, solder.viscosity)
@@ -277,6 +280,18 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
             "symmetry needs a drop that relaxes to rest, without inertia or viscosity, or the scheme ispg; not gripc"
         )
         return [Problem(key, message, drop.symmetry, "none")]
+    return []
+
+
+def _asymmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find an effect that breaks the symmetry by which a drop is computed in part or in section."""
+    effects = decide_drop(solder, drop.is_free)
+    if (effect := asymmetric_effect(effects)) is None:
+        return []
+    for key, value in (("drop.symmetry", drop.symmetry), ("drop.section", drop.section)):
+        if value != "none":
+            message = f"{effect.name.replace('_', ' ')} breaks this symmetry: {effects[effect.name]['why']}"
+            return [Problem(key, message, value, f'none, or {effect.key} = "off"')]
     return []
 
 

@@ -14,11 +14,11 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import (
     FlowEffects,
     FlowNumerics,
+    Process,
     Solder,
     SolderEffects,
     SolderNumerics,
     Switch,
-    Walls,
 )
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency
 from reflowshock.quantity import Quantity
@@ -139,6 +139,11 @@ class Drop(Parameters):
         return self.contact_angle is None and self.hysteresis is None
 
     @property
+    def needs_ispg(self) -> bool:
+        """Whether only the scheme ispg computes the drop: in section, or striking a wall."""
+        return self.section != "none" or self.speed is not None
+
+    @property
     def contact_angles(self) -> dict[str, float]:
         """Contact angles of pad and mask under the names of ``Solder`` [rad]."""
         if self.contact_angle is None:
@@ -168,14 +173,14 @@ class Joint(Parameters):
     @property
     def geometry(self) -> JointGeometry:
         """Gap, pad radii, offset and tilt for the solver."""
-        return self.place(self.standoff, self.offset, self.tilt)
+        return self.geometry_at(self.standoff, self.offset, self.tilt)
 
-    def place(self, standoff: float, offset: float, tilt: float) -> JointGeometry:
+    def geometry_at(self, standoff: float, offset: float, tilt: float) -> JointGeometry:
         """Return the geometry for another standoff [m], offset [m] and tilt [rad] of the upper pad."""
         return JointGeometry(standoff, self.pad_bottom, self.pad_top, (offset, 0.0), (0.0, tilt))
 
     @property
-    def places(self) -> list[JointGeometry]:
+    def path_geometries(self) -> list[JointGeometry]:
         """Geometries after each step of the path, a single one with a speed; empty without a path."""
         if self.path is None:
             return []
@@ -184,14 +189,19 @@ class Joint(Parameters):
         ranges = [(a, a if b is None else b) for a, b in zip(start, target, strict=True)]
         steps = self.path.steps or (DEFAULT_PLACES if self.path.speed is None else 1)
         shares = [number / steps for number in range(1, steps + 1)]
-        return [self.place(*(a + share * (b - a) for a, b in ranges)) for share in shares]
+        return [self.geometry_at(*(a + share * (b - a) for a, b in ranges)) for share in shares]
 
     @property
-    def way(self) -> float:
+    def needs_ispg(self) -> bool:
+        """Whether only the scheme ispg computes the joint: with a package that moves at a speed."""
+        return self.path is not None and self.path.speed is not None
+
+    @property
+    def path_length(self) -> float:
         """Length of the path [m], with rotations measured at the edge of the upper pad; zero without a path."""
-        if not self.places:
+        if not self.path_geometries:
             return 0.0
-        end = self.places[-1]
+        end = self.path_geometries[-1]
         turn = self.pad_top * (end.tilt[1] - self.tilt)
         return math.hypot(end.gap - self.standoff, end.offset[0] - self.offset, turn)
 
@@ -238,15 +248,13 @@ class Liquid(Parameters):
         return PROPERTIES[self.parameters] | overrides
 
 
-class Fluid(Liquid, Walls):
+class Fluid(Liquid, Process):
     """Molten solder with a named set of properties, whose values can be overridden individually.
 
     The set physical is SAC solder; the set paper has the values of Hu et al., with 10 times the surface tension and
     100 times the viscosity.
     """
 
-    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
-    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
     effects: FlowEffects = FlowEffects()
     numerics: FlowNumerics = FlowNumerics()
 
@@ -264,10 +272,7 @@ class Fluid(Liquid, Walls):
             del numerics["scheme"]
         return Solder(
             volume=scene.volume,
-            gravity=self.gravity,
-            process_time=self.process_time,
-            wall=self.wall,
-            slip_length=self.slip_length,
+            **{name: getattr(self, name) for name in Process.model_fields},
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
             numerics=SolderNumerics(spacing=scene.resolution, **numerics),
             **scene.contact_angles,
@@ -287,6 +292,11 @@ class Drops(Parameters):
     merge: bool = True
     contact_angle: Annotated[float | None, Quantity("deg")] = Field(None, gt=0, lt=PI)
     spacing: Annotated[float, Quantity("mm")] = Field(1.0e-4, gt=0)
+
+    @property
+    def needs_ispg(self) -> bool:
+        """Whether only the scheme ispg computes the drops: False."""
+        return False
 
     @property
     def volumes(self) -> tuple[float, float]:

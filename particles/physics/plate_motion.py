@@ -3,7 +3,7 @@
 A twist is the velocity of the origin of a plate and its angular velocity, shape (6,) [m/s, rad/s].
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -33,6 +33,9 @@ class PlateMotion(Protocol):
 
     def given(self, plate: Plate, time_step: float) -> Floats:
         """Return the prescribed twist over the next time step [s], shape (6,) [m/s, rad/s]."""
+
+    def after_split(self, wall: int) -> "PlateMotion | None":
+        """Return the motion after the body has split, with a new index of the plate; None if the plate stops."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +68,10 @@ class Travel:
         """Return the twist towards the target, shape (6,) [m/s, rad/s]."""
         return plate.motion_to(self.target) / max(time_step, self.duration(plate))
 
+    def after_split(self, wall: int) -> "Travel":
+        """Return the same motion with a new index of the plate: the plate carries its drop to the target."""
+        return replace(self, wall=wall)
+
     def duration(self, plate: Plate) -> float:
         """Return the time to reach the target [s]."""
         path = plate.motion_to(self.target) * np.repeat((1.0, self.lever), 3)
@@ -88,3 +95,7 @@ class Floating:
     def given(self, _plate: Plate, _time_step: float) -> Floats:
         """Return the prescribed twist, which is zero, shape (6,) [m/s, rad/s]."""
         return np.zeros(6)
+
+    def after_split(self, _wall: int) -> None:
+        """Return None: the plate stops, since no solder carries it."""
+        return

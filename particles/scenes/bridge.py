@@ -18,9 +18,10 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.drops import run_drops
+from reflowshock.particles.scenes.flow_setup import pad_lines, start_flow, stop_rule
 from reflowshock.particles.scenes.metrics import bridge_metrics
 from reflowshock.particles.scenes.rebuild import rebuild
-from reflowshock.particles.scenes.reflow import collect_shape, pad_lines, start_flow, stop_rule
+from reflowshock.particles.scenes.reflow import collect_shape
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import run_to_rest
 from reflowshock.particles.steps.shape import JointShape, Snapshot

@@ -15,8 +15,9 @@ from reflowshock.particles.parameters.effects import Decision, decide_drop, refe
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sessile_section, sphere_meridian
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
-from reflowshock.particles.scenes.reflow import collect_shape, contact_line, start_flow, stop_rule
+from reflowshock.particles.scenes.reflow import collect_shape
 from reflowshock.particles.scenes.section_drop import start_section
 from reflowshock.particles.section.section import Section
 from reflowshock.particles.steps.flow import LiquidFlow

@@ -21,8 +21,8 @@ from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.flow_setup import build_physics
 from reflowshock.particles.scenes.metrics import Metrics
-from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import FLOW_RECORDS
 from reflowshock.particles.steps.inertial_step import InertialFlow, InertialStep
 from reflowshock.particles.steps.shape import JointShape, Snapshot

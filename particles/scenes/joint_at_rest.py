@@ -62,7 +62,7 @@ def joint_to_rest(
     weight = reference_weight(solder, effects)
     if joint.path is not None:
         shapes = _along(joint, solder, progress, checkpoints)
-        geometries = [joint.geometry, *joint.places][: len(shapes)]
+        geometries = [joint.geometry, *joint.path_geometries][: len(shapes)]
         references = [reference_meridian(geometry, solder, weight) for geometry in geometries]
         places = [_record(*place) for place in zip(geometries, shapes, references, strict=True)]
         shape = replace(shapes[-1], metrics=shapes[-1].metrics | _worst(shapes))
@@ -79,7 +79,7 @@ def joint_to_rest(
         return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
     shape = settle_joint(joint.geometry, solder, (floating(joint.package),), progress, first)
     balance = _balance(joint, solder, weight, shape)
-    end = joint.place(shape.metrics["standoff"][0], 0.0, 0.0)
+    end = joint.geometry_at(shape.metrics["standoff"][0], 0.0, 0.0)
     reference = reference_meridian(end, solder, weight) if "collapse_height_error" in balance else None
     shape = replace(shape, metrics=shape.metrics | balance)
     return JointAtRest(with_shape_error(shape, solder, reference), effects, reference, [])
@@ -100,10 +100,10 @@ def _along(
     """Return the joint at rest at the start and after each step of the path, until the neck breaks."""
     shapes = []
     speed = joint.path.speed if joint.path else None
-    for shape in follow_path(joint.geometry, solder, joint.places, checkpoints, speed):
+    for shape in follow_path(joint.geometry, solder, joint.path_geometries, checkpoints, speed):
         shapes.append(shape)
         if progress is not None:
-            progress(len(shapes) / (1 + len(joint.places)))
+            progress(len(shapes) / (1 + len(joint.path_geometries)))
     return shapes
 
 
@@ -111,7 +111,7 @@ def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: fl
     """Add `pull_exact` [N] to the history: what a way up or down takes by Young and Laplace, else nan."""
     if "standoff" not in shape.history:
         return shape
-    standoff, way = shape.history["standoff"], np.sign(joint.places[-1].gap - joint.standoff)
+    standoff, way = shape.history["standoff"], np.sign(joint.path_geometries[-1].gap - joint.standoff)
     pull = np.full_like(standoff, np.nan)
     if way:
         knots = np.linspace(standoff.min(), standoff.max(), KNOTS)
@@ -143,7 +143,7 @@ def collapse_height(joint: Joint, solder: Solder, weight: float | None, near: fl
     load = joint.package.load if joint.package else 0.0
 
     def excess(standoff: float) -> float:
-        meridian = reference_meridian(joint.place(standoff, 0.0, 0.0), solder, weight)
+        meridian = reference_meridian(joint.geometry_at(standoff, 0.0, 0.0), solder, weight)
         return float("nan") if meridian is None else meridian.axial_force - load
 
     low, high = (1.0 - BRACKET) * near, (1.0 + BRACKET) * near

@@ -1,4 +1,4 @@
-"""A joint whose package floats on the solder, or is moved: slowly from place to place, or at a speed."""
+"""Joint whose package moves: it floats on the solder, or follows a path slowly or at a speed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -10,12 +10,12 @@ from reflowshock.particles.core.plate import joint_plates, placed_geometry
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import PlateMotion, Travel
 from reflowshock.particles.scenes.metrics import Metrics
-from reflowshock.particles.scenes.reflow import joint_shape, parted, start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 
-SPACINGS_IN_A_STEP = 0.2
+SPACINGS_PER_STEP = 0.2
 ALIGNED = 0.01  # of a radius, and rad
 
 
@@ -26,25 +26,32 @@ def settle_joint(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> JointShape:
-    """Let a joint come to rest with plates that move: its metrics are those of where the plates end, and that place.
+    """Compute a joint at rest between plates that move.
 
     Args:
-        geometry: where the plates start.
-        solder: volume, fluid and process; the rigid motion of a floating plate is soft, so that a
-            `time_step_limit` of 100 is five times faster than one of 20.
-        motions: of the plates that do not rest.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        geometry: Initial position of the plates.
+        solder: Volume, fluid, process and numerics; a floating plate makes the rigid motion soft, so that a
+            ``time_step_limit`` of 100 is five times faster than one of 20.
+        motions: Motions of the plates that do not rest.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
-    Raises: as `solve_joint`.
+    Returns:
+        Shape at rest; its metrics refer to the final position of the plates and include its offset [m] and tilt [deg].
+
+    Raises:
+        TooLittleSolder: No cone of the volume spans the gap.
+        NotAtRest: The solder is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
-    flow, rule = start_joint(geometry, solder)
-    flow.physics = replace(flow.physics, motions=motions)
-    run = run_to_rest(flow, rule, progress, checkpoint=checkpoint)
-    placed = placed_geometry(geometry, flow.body.plates)
-    shape = joint_shape(_aligned(placed), solder, flow, run)
-    place = {"offset": (hypot(*placed.offset), "m"), "tilt": (degrees(hypot(*placed.tilt)), "deg")}
-    return replace(shape, metrics=shape.metrics | place)
+    joint = LiquidJoint(geometry, solder)
+    flow = joint.start()
+    flow.set_plate_motions(motions)
+    run = run_to_rest(flow, joint.stop_rule(flow), progress, checkpoint=checkpoint)
+    final = placed_geometry(geometry, flow.body.plates)
+    shape = LiquidJoint(_aligned(final), solder).shape(flow, run)
+    position = {"offset": (hypot(*final.offset), "m"), "tilt": (degrees(hypot(*final.tilt)), "deg")}
+    return replace(shape, metrics=shape.metrics | position)
 
 
 def _aligned(geometry: JointGeometry) -> JointGeometry:
@@ -61,59 +68,70 @@ def follow_path(
     checkpoints: Callable[[int], Checkpoint] | None = None,
     speed: float | None = None,
 ) -> Iterator[JointShape]:
-    """Move the package along a path and yield the joint at rest, at the start and in each place.
+    """Move the package along a path and yield the joint at rest, at the start and at each target.
 
-    The path ends early where the neck ruptures. In the quasi-static mode the speed between the places has no meaning,
-    the plate goes a fifth of a spacing in the longest time step. With inertia it has, and where the neck breaks the
-    package takes its part of the solder along to where it goes; both parts come to rest there.
+    The path ends early if the neck ruptures. Without inertia the speed has no meaning; the plate moves by a fifth of a
+    spacing in the longest time step. With inertia, a package whose joint breaks carries its part of the solder to the
+    target, and both parts come to rest there.
 
     Args:
-        geometry: where the joint reflows.
-        solder: volume, fluid and numerics; `max_steps` holds for each place.
-        path: places of the package (gap, offset and tilt) one after the other.
-        checkpoints: gives the checkpoint of each place by its number, that of the start is 0.
-        speed: of the package where inertia acts [m/s].
+        geometry: Initial geometry of the joint.
+        solder: Volume, fluid and numerics; ``max_steps`` applies to each part of the path.
+        path: Geometries of the joint at the targets, in order.
+        checkpoints: Function of the number of a target (0 for the start) that returns its checkpoint.
+        speed: Speed of the package with inertia [m/s].
 
-    Raises: as `solve_joint`.
+    Raises:
+        TooLittleSolder: No cone of the volume spans the initial gap.
+        NotAtRest: The solder is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
-    flow, rule = start_joint(geometry, solder)
-    for number, place in enumerate((geometry, *path)):
-        motion, begun = travel(place, flow, speed), flow.time
+    start = LiquidJoint(geometry, solder)
+    flow = start.start()
+    rule = start.stop_rule(flow)
+    for number, target in enumerate((geometry, *path)):
+        motion, start_time = travel(target, flow, speed), flow.time
         steps = ceil(motion.duration(flow.body.plates[1]) / flow.time_step.largest)
-        flow.physics = replace(flow.physics, motions=(motion,))
+        flow.set_plate_motions((motion,))
         checkpoint = checkpoints(number) if checkpoints else None
-        last = replace(rule, max_steps=flow.steps + steps + rule.max_steps, end_time=begun + rule.end_time)
+        last = replace(rule, max_steps=flow.steps + steps + rule.max_steps, end_time=start_time + rule.end_time)
         run = run_to_rest(flow, last, checkpoint=checkpoint)
         if run.ruptured:
-            time, there = flow.time - begun, placed_geometry(place, flow.body.plates)
-            yield _broken(joint_shape(there, solder, flow, run), place, solder, flow, time)
+            broken = LiquidJoint(placed_geometry(target, flow.body.plates), solder).shape(flow, run)
+            yield _broken_shape(LiquidJoint(target, solder), broken, flow, flow.time - start_time)
             return
-        yield joint_shape(place, solder, flow, run)
+        yield LiquidJoint(target, solder).shape(flow, run)
 
 
-def _broken(joint: JointShape, place: JointGeometry, solder: Solder, flow: LiquidFlow, time: float) -> JointShape:
-    """Return a joint that broke on its path, with the standoff at break; with inertia, as the two drops.
+def _broken_shape(target: LiquidJoint, broken: JointShape, flow: LiquidFlow, time: float) -> JointShape:
+    """Return a joint that broke on its path, with the standoff at break; with inertia, as the two drops at rest.
 
     Args:
-        joint: when it broke.
-        place: to which the package goes on with inertia.
-        solder: volume, fluid and numerics.
-        flow: of the joint.
-        time: that it was on the way [s].
+        target: Joint at the target, to which the package moves on with inertia.
+        broken: Shape of the joint at break.
+        flow: Flow of the joint at break.
+        time: Time from the last target to the break [s].
     """
-    found: Metrics = {"standoff_at_break": joint.metrics["standoff"]}
+    standoff = broken.metrics["standoff"]
+    metrics: Metrics = {"standoff_at_break": standoff}
     if not flow.physics.momenta:
-        return replace(joint, metrics=joint.metrics | found)
-    shape = parted(place, solder, flow, joint)
-    found |= {
+        return replace(broken, metrics=broken.metrics | metrics)
+    shape = target.split(flow, broken)
+    metrics |= {
         "time_at_break": (time, "s"),
-        "standoff": (place.gap, "m") if shape is not joint else joint.metrics["standoff"],
+        "standoff": (target.geometry.gap, "m") if shape is not broken else standoff,
     }
-    return replace(shape, metrics=shape.metrics | found)
+    return replace(shape, metrics=shape.metrics | metrics)
 
 
-def travel(place: JointGeometry, flow: LiquidFlow, speed: float | None = None) -> Travel:
-    """Motion of a package to a place; without a speed [m/s] a fifth of a spacing in the longest time step."""
+def travel(target: JointGeometry, flow: LiquidFlow, speed: float | None = None) -> Travel:
+    """Return the straight motion of a package to a target.
+
+    Args:
+        target: Geometry of the joint at the target.
+        flow: Flow of the joint.
+        speed: Speed of the package [m/s]; None for a fifth of a spacing in the longest time step.
+    """
     if speed is None:
-        speed = SPACINGS_IN_A_STEP * flow.body.cloud.spacing / flow.time_step.largest
-    return Travel(1, joint_plates(place)[1], speed, lever=place.radius_package)
+        speed = SPACINGS_PER_STEP * flow.body.cloud.spacing / flow.time_step.largest
+    return Travel(1, joint_plates(target)[1], speed, lever=target.radius_package)

@@ -9,7 +9,7 @@ import numpy as np
 
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.scenes.reflow import build_physics
+from reflowshock.particles.scenes.flow_setup import build_physics
 from reflowshock.particles.section.polyline import Polyline
 from reflowshock.particles.section.section import Section, block
 from reflowshock.particles.section.section_step import SectionFlow, SectionStep

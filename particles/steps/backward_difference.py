@@ -130,6 +130,10 @@ class SteppedMotion:
         """Return the twist at the end of the step, shape (6,) [m/s, rad/s]."""
         return (self.whole * self.motion.given(plate, self.whole) - self.carried) / time_step
 
+    def after_split(self, wall: int) -> PlateMotion | None:
+        """Return the motion of the plate after the body has split."""
+        return self.motion.after_split(wall)
+
 
 def stepped(physics: Physics, velocity: Floats, carried: dict[int, Floats], time_step: float) -> Physics:
     """Return the effects as the equivalent backward Euler step from predicted positions uses them.

@@ -5,7 +5,7 @@ volume along its gradient; shift the interior particles. Each part has its own m
 step with no more energy than before (``descent.py``).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -17,6 +17,7 @@ from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.physics.plate_motion import PlateMotion
 from reflowshock.particles.steps.descent import MeshSmoothing, StepStart, correct_volume, highest_energy, smooth_surface
 from reflowshock.particles.steps.interior_shift import interior_shift
 from reflowshock.particles.steps.shape import Snapshot
@@ -108,6 +109,20 @@ class LiquidFlow:
             line.restore(state)
         self.solver.restore(saved["solver"])
         self.neighbours.restore(saved["neighbours"])
+
+    def set_plate_motions(self, motions: Sequence[PlateMotion]) -> None:
+        """Set the motions of the plates for the following steps; plates without a motion rest."""
+        self.physics = replace(self.physics, motions=motions)
+
+    def motions_after_split(self, side: float) -> tuple[PlateMotion, ...]:
+        """Return the motions that the plate of a drop continues after the body has split.
+
+        Args:
+            side: Side of the drop's plate, as ``Plate.side``.
+        """
+        plates = self.body.plates
+        motions = [m.after_split(0) for m in self.physics.motions if plates[m.wall].side == side]
+        return tuple(motion for motion in motions if motion is not None)
 
     def step(self) -> StepRecord:
         """Advance one time step.

@@ -10,7 +10,8 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import slide
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian
-from reflowshock.particles.scenes.reflow import contact_line, solve_joint, start_flow, stop_rule
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
+from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop
 

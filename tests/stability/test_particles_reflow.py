@@ -6,7 +6,7 @@ import pytest
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.scenes.metrics import reference_drop
-from reflowshock.particles.scenes.reflow import joint_shape, solve_joint, start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop
 
@@ -96,13 +96,15 @@ def test_inertia_never_gains_energy(properties):
     numerics = SolderNumerics(spacing=1e-4, time_step_limit=5)
     solder = Solder(volume=BALL, numerics=numerics, effects=SolderEffects(inertia="on"), **values)
     geometry = JointGeometry(0.31e-3, RADIUS, RADIUS)
-    flow, rule = start_joint(geometry, solder)
+    joint = LiquidJoint(geometry, solder)
+    flow = joint.start()
+    rule = joint.stop_rule(flow)
     total = [flow.physics.energy(flow.body)]
 
     def add(_fraction):
         total.append(flow.physics.energy(flow.body) + flow.solver.kinetic_energy(flow.body))
 
-    shape = joint_shape(geometry, solder, flow, run_to_rest(flow, rule, add))
+    shape = joint.shape(flow, run_to_rest(flow, rule, add))
     check(shape, "ok")
     assert np.diff(total).max() < 1e-6 * total[0]
     energy = shape.history["energy"]

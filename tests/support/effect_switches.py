@@ -24,7 +24,7 @@ from reflowshock.materials.parameters import Material
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 
 __all__ = ["DOWN", "BodyAcceleration", "HalfSine", "motion_of"]

@@ -11,7 +11,8 @@ from reflowshock.particles.core.plate import Pad, Plate
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.bridge import solve_bridge
 from reflowshock.particles.scenes.drops import run_drops
-from reflowshock.particles.scenes.reflow import pad_lines, solve_joint, start_flow, stop_rule
+from reflowshock.particles.scenes.flow_setup import pad_lines, start_flow, stop_rule
+from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.surface.profile import fit_profile
 
 MM = 1e-3

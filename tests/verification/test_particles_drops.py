@@ -10,7 +10,7 @@ from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.surface_measure import centre_of_volume
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.drops import OverlappingDrops, run_drops
-from reflowshock.particles.scenes.reflow import contact_line, start_flow, stop_rule
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
 from reflowshock.particles.surface.cloud_level_set import cloud_from_level_set
 from reflowshock.particles.surface.profile import fit_profile
 from tests.support.level_sets import ball, cap_radius, grid_around_ball

@@ -15,7 +15,7 @@ from reflowshock.particles.ispg.stencils import DegenerateStencil
 from reflowshock.particles.parameters.effects import decide, drop_numbers, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.young_laplace import sessile_meridian
-from reflowshock.particles.scenes.reflow import build_physics, contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import build_physics, contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.time_step import StepCollapsed, TimeStep, capillary_limit
 from tests.support.drops import solve_drop

@@ -5,8 +5,8 @@ import pytest
 
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency, viscous_oscillation
+from reflowshock.particles.scenes.flow_setup import build_physics
 from reflowshock.particles.scenes.free_drop import fit_oscillation
-from reflowshock.particles.scenes.reflow import build_physics
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.inertial_step import InertialStep
 from reflowshock.particles.steps.time_step import TimeStep

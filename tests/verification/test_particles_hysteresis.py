@@ -10,8 +10,8 @@ from reflowshock.particles.core.surface_measure import ring_area
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
+from reflowshock.particles.scenes.flow_setup import start_flow, stop_rule
 from reflowshock.particles.scenes.metrics import ledger
-from reflowshock.particles.scenes.reflow import start_flow, stop_rule
 from reflowshock.particles.steps.rest import run_to_rest
 from reflowshock.particles.surface.contact_line import PINNED
 from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine

@@ -13,7 +13,7 @@ from reflowshock.particles.physics.plate_motion import Travel
 from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
 from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.moving_joint import follow_path
-from reflowshock.particles.scenes.reflow import solve_joint, start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.descent import is_driven
 from reflowshock.particles.steps.rest import run_to_rest
 
@@ -54,7 +54,9 @@ def place(standoff, offset=0.0, degrees=0.0):
 
 def test_work_of_slow_plates_equals_the_surface_energy():
     """From 0.35 to 0.365 mm at 1 % of the wave speed the work equals the energy change, and the force its slope."""
-    flow, rule = start_joint(START, solder())
+    joint = LiquidJoint(START, solder())
+    flow = joint.start()
+    rule = joint.stop_rule(flow)
     run_to_rest(flow, rule)
     end, plates = place(0.365e-3), flow.body.plates
     before, plate_work = flow.physics.energy(flow.body), flow.solver.state.losses.plates

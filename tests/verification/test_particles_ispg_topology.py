@@ -10,8 +10,9 @@ from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
 from reflowshock.particles.reference.young_laplace import pad_meridian
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import pair_to_rest, start_clouds
+from reflowshock.particles.scenes.flow_setup import start_flow
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild
-from reflowshock.particles.scenes.reflow import solve_joint, start_flow
+from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.surface.profile import section_areas
 
 RADIUS = 0.5e-3

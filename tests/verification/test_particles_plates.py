@@ -11,7 +11,7 @@ from reflowshock.particles.physics.physics import plate_wrench
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, Floating
 from reflowshock.particles.reference.young_laplace import joint_meridian
 from reflowshock.particles.scenes.moving_joint import settle_joint
-from reflowshock.particles.scenes.reflow import solve_joint, start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.rest import run_to_rest
 
 RADIUS, GAMMA = 0.24e-3, 0.4985
@@ -26,7 +26,9 @@ def weightless(volume, spacing):
 
 def at_rest(geometry, volume=BALL, spacing=7e-5):
     """Return body, energy, and force and moment on the package at rest."""
-    flow, rule = start_joint(geometry, weightless(volume, spacing))
+    joint = LiquidJoint(geometry, weightless(volume, spacing))
+    flow = joint.start()
+    rule = joint.stop_rule(flow)
     run = run_to_rest(flow, rule)
     others = [force for force in flow.physics.forces if not isinstance(force, Wetting)]
     return flow.body, run.records[-1].energy, plate_wrench(flow.body, others, 1)

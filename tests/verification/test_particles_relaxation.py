@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 
 EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "inertia": False, "viscosity": False}

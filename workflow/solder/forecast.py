@@ -71,11 +71,11 @@ def _forecast_joint(case: JointCase) -> SolderForecast:
 
     geometry, solder = case.joint.geometry, case.molten
     particles = particle_count(solder, geometry)
-    seconds = (1 + len(case.joint.places)) * reflow_seconds(solder, geometry)
+    seconds = (1 + len(case.joint.path_geometries)) * reflow_seconds(solder, geometry)
     forecast, path = _towards_rest(case, decide_effects(geometry, solder), particles, seconds), case.joint.path
     if path is None or path.speed is None:
         return forecast
-    moving = ispg_seconds(particles, ceil(case.joint.way / path.speed / forecast.largest_step))
+    moving = ispg_seconds(particles, ceil(case.joint.path_length / path.speed / forecast.largest_step))
     return replace(forecast, seconds={"reflow": 2.0 * forecast.seconds["reflow"] + moving})  # at rest before and after
 
 

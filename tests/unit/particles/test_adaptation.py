@@ -18,8 +18,8 @@ from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow
 from reflowshock.particles.scenes.metrics import particles_lost
-from reflowshock.particles.scenes.reflow import contact_line, start_flow
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.time_step import TimeStep
 from reflowshock.particles.surface.cloud_level_set import boundary_loops

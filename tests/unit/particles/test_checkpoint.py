@@ -26,7 +26,8 @@ import os, sys
 from pathlib import Path
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.scenes.reflow import JointGeometry, solve_joint
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.scenes.reflow import solve_joint
 
 joint, solder, steps = JointGeometry(*map(float, sys.argv[2:5])), Solder.model_validate_json(sys.argv[5]), []
 

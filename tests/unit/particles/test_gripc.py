@@ -17,7 +17,7 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.physics.plate_motion import PlateMotion
-from reflowshock.particles.scenes.reflow import start_flow
+from reflowshock.particles.scenes.flow_setup import start_flow
 from reflowshock.particles.steps.rest import SchemeUnstable, StopRule, run_to_rest
 from reflowshock.particles.surface.contact_line import ContactLine
 

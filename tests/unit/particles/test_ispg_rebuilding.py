@@ -15,9 +15,10 @@ from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes import rebuild as rebuild_module
+from reflowshock.particles.scenes.flow_setup import pad_lines, start_flow
 from reflowshock.particles.scenes.metrics import ledger
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild, split_to_rest, touch
-from reflowshock.particles.scenes.reflow import pad_lines, start_flow, start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
 from reflowshock.particles.steps.time_step import TimeStep
@@ -134,7 +135,9 @@ def test_a_detached_joint_keeps_volume_centre_and_energy_budget(monkeypatch):
     fluid = {"surface_tension": 4.985, "viscosity": 0.227, "effects": effects}
     solder = Solder(volume=0.0724e-9, numerics=SolderNumerics(scheme="ispg", spacing=8e-5), **fluid)
     geometry = JointGeometry(0.7e-3, radius, radius)
-    flow, rule = start_joint(geometry, solder)
+    joint = LiquidJoint(geometry, solder)
+    flow = joint.start()
+    rule = joint.stop_rule(flow)
     for _ in range(3):
         flow.step()
     acting = switched(decide_effects(geometry, solder))

@@ -14,7 +14,7 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import NoSlip
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.scenes.reflow import start_joint
+from reflowshock.particles.scenes.reflow import LiquidJoint
 
 ALONG_WALL = [0, 1, 5]  # two translations and the rotation that a frictionless wall admits
 
@@ -63,5 +63,5 @@ def test_under_fast_strain_the_whole_force_acts(body):
 @pytest.mark.parametrize(("offset", "turns"), [(0.0, True), (7e-5, False)])
 def test_round_edges_about_the_axis_do_not_turn_a_body(offset, turns):
     geometry, solder = JointGeometry(0.35e-3, 0.24e-3, 0.24e-3, (offset, 0.0)), Solder(volume=7.2e-11)
-    flow, _ = start_joint(geometry, solder)
+    flow = LiquidJoint(geometry, solder).start()
     assert edges_are_coaxial(flow.body, flow.physics) == turns

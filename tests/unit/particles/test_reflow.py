@@ -3,7 +3,8 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.scenes.reflow import build_physics, solve_joint
+from reflowshock.particles.scenes.flow_setup import build_physics
+from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.rest import NotAtRest
 
 JOINT = JointGeometry(0.31e-3, 0.24e-3, 0.24e-3)

@@ -10,7 +10,7 @@ from reflowshock.particles.core.cloud import sphere_cloud
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.reference.drop_oscillation import cap_frequency, rayleigh_frequency
-from reflowshock.particles.scenes.reflow import start_flow, stop_rule
+from reflowshock.particles.scenes.flow_setup import start_flow, stop_rule
 from reflowshock.particles.steps.flow import StepRecord
 from reflowshock.particles.steps.rest import CALM_STEPS, NotAtRest, Run, StopRule, is_calm, is_lasting, run_to_rest
 

@@ -19,9 +19,10 @@ from reflowshock.particles.scenes.carried_joint import carried_shape, carry_join
 from reflowshock.particles.scenes.drop_at_rest import flow_to_rest
 from reflowshock.particles.scenes.drop_pair import pair_to_rest
 from reflowshock.particles.scenes.drops import run_drops
+from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
 from reflowshock.particles.scenes.free_drop import solve_free_drop
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
-from reflowshock.particles.scenes.reflow import contact_line, start_flow, start_joint, stop_rule
+from reflowshock.particles.scenes.reflow import LiquidJoint
 from reflowshock.particles.steps.rest import RECORDS, NotAtRest
 
 RADIUS = 0.24e-3
@@ -244,7 +245,7 @@ def start_drop(scheme, limit):
 @pytest.mark.parametrize(
     "begin",
     [
-        lambda: start_joint(JOINT, SOLDER)[0],
+        lambda: LiquidJoint(JOINT, SOLDER).start(),
         lambda: start_drop("energy", 20),
         lambda: start_drop("ispg", 2.0),
         lambda: start_drop("gripc", 0.5),

@@ -10,7 +10,7 @@ from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.symmetry import cut, on_plane, share, whole_points
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.scenes.reflow import build_physics, contact_line, start_flow
+from reflowshock.particles.scenes.flow_setup import build_physics, contact_line, start_flow
 
 SOLDER = Solder(volume=1e-9, pad_contact_angle=np.radians(60.0), numerics=SolderNumerics(spacing=1e-4))
 ON = {"surface_tension": True, "gravity": True, "wall_adhesion": True, "viscosity": False, "inertia": False}
