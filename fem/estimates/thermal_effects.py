@@ -204,12 +204,12 @@ class ResidualStress(Effect[Heated]):
     toggle = Toggle("thermal.effects.residual_stress", "on", "off")
 
     def decide(self, heated: Heated) -> Decision:
-        """As the case says."""
-        return self.wanted(heated.thermal)
+        """Return the setting of the case."""
+        return self.setting(heated.thermal)
 
     @staticmethod
-    def wanted(thermal: Thermal, of_cooling: str = "") -> Decision:
-        """As the case says, with a word on the cooling where there is a shock."""
+    def setting(thermal: Thermal, of_cooling: str = "") -> Decision:
+        """Return the setting of the case; ``of_cooling`` is added to the reason where the effect is on."""
         on = thermal.effects.residual_stress == "on"
         why = f"thermal.effects.residual_stress = {thermal.effects.residual_stress}"
         return decision(on, why + of_cooling if on else why)

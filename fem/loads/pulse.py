@@ -135,6 +135,16 @@ class Tabulated:
         object.__setattr__(self, "_integrals", integrals)
         object.__setattr__(self, "_doubles", np.concatenate([[0.0], np.cumsum(within)]))
 
+    @property
+    def duration(self) -> float:
+        """Last time of the table [s]."""
+        return float(self.times[-1])
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute value, in the unit of the load."""
+        return float(np.abs(self.values).max())
+
     def value(self, time: float) -> float:
         """Return the value at a time [s]."""
         return float(np.interp(time, self.times, self.values, left=0.0, right=0.0))

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from reflowshock.effect import Decision
 from reflowshock.fem.estimates.drop_effects import WeightEffect
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, HalfSine, Pulse, Tabulated, service_condition
@@ -34,8 +32,7 @@ def shock_pulse(shock: Shock) -> ShockPulse:
         PulseError: A table cannot be read.
     """
     pulse, source = input_pulse(shock)
-    peak = float(np.abs(pulse.values).max()) if isinstance(pulse, Tabulated) else pulse.peak
-    return ShockPulse(pulse, source, WeightEffect.beside(shock.gravity, peak, STANDARD_GRAVITY))
+    return ShockPulse(pulse, source, WeightEffect.beside(shock.gravity, pulse.peak, STANDARD_GRAVITY))
 
 
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:

@@ -25,12 +25,14 @@ class Pulsed(Parameters):
         quantity: Physical quantity of the values, a key of ``fem.loads.pulse_table.QUANTITIES``.
         alternatives: Keys of which exactly one set defines the pulse, as text for messages.
         has_default_peak: Whether the load is complete without a peak or a table.
+        is_base_excitation: Whether the load is the acceleration of the supports.
     """
 
     effect: ClassVar[str]
     quantity: ClassVar[str]
     alternatives: ClassVar[str] = "peak, or table"
     has_default_peak: ClassVar[bool] = False
+    is_base_excitation: ClassVar[bool] = False
     pulse: Literal["half_sine", "haversine", "constant"] = "half_sine"
     duration: Annotated[float | None, Quantity("ms")] = Field(None, gt=0)
     table: str | None = None
@@ -52,6 +54,11 @@ class Pulsed(Parameters):
         """Whether a large mass at the supports applies the load."""
         return False
 
+    @property
+    def facet_set(self) -> str | None:
+        """Name of the facet set that the load acts on; None for loads on the body or at a point."""
+        return None
+
 
 class OnBody(Pulsed):
     """Base of loads on the whole body along ``direction``."""
@@ -64,11 +71,21 @@ class OnNodes(Pulsed):
 
     on: str
 
+    @property
+    def facet_set(self) -> str:
+        """Name of the facet set that the load acts on."""
+        return self.on
+
 
 class OnAreas(Pulsed):
     """Base of loads per area on a facet set."""
 
     on: str
+
+    @property
+    def facet_set(self) -> str:
+        """Name of the facet set that the load acts on."""
+        return self.on
 
 
 class AtPoint(Pulsed):
@@ -86,6 +103,7 @@ class InputG(OnBody):
     """
 
     effect: ClassVar = "input_g"
+    is_base_excitation: ClassVar[bool] = True
     quantity: ClassVar = "acceleration"
     kind: Literal["input_g"] = "input_g"
     service_condition: ServiceCondition | None = None

@@ -12,9 +12,9 @@ from reflowshock.problem import Problem
 
 LEAST_ROOM = 1.1  # least ratio of a column's side and the diameter of its pad
 ROUNDING = 1.0e-9
-SMALLEST_INSET = 0.75  # of a hole's diameter: leaves a quarter of it as a wall between hole and edge
-WIDE_HOLE = 0.25  # of a side of the board: with a wider hole the message names the hole instead of the board
-SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # of a hole's diameter: from the edge to its block's end
+SMALLEST_INSET = 0.75  # hole diameters from its axis to the edge, so that a quarter of a diameter remains as wall
+WIDE_HOLE = 0.25  # share of a side of the board; for a wider hole the message names the hole instead of the board
+SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # hole diameters from the edge to the end of its block
 
 
 def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
@@ -32,11 +32,31 @@ def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
         *_pad("package.package_pad", package.package_pad, package),
         *_layers(package, board),
         *_which_holes(board),
-        *(_hole_places(package, board) if board.holes.at or any(board.centre) else _holes(package, board)),
+        *_free_rotation(board),
+        *hole_problems(package, board),
         *_gaps(package, board, warpage),
         *_numerics(board),
         *_imprint(package),
     ]
+
+
+def hole_problems(package: Package, board: Board) -> Iterator[Problem]:
+    """Yield problems of mounting holes that cannot be meshed: beyond the board, near the package or each other."""
+    return _hole_places(package, board) if _has_positions(board) else _holes(package, board)
+
+
+def _has_positions(board: Board) -> bool:
+    """Return whether holes are at given positions, or at insets of a board that is not centred on the package."""
+    return bool(board.holes.at) or any(board.centre)
+
+
+def _free_rotation(board: Board) -> Iterator[Problem]:
+    """Check that a board with holes at positions cannot rotate about the only one."""
+    if not _has_positions(board) or not board.hole_places:
+        return
+    if not any(places[-1] > places[0] for places in board.hole_lines):
+        message = "a board with one hole could rotate about it"
+        yield Problem("board.holes.at", message, str(len(board.holes.at)), ">= 2 positions")
 
 
 def _array(package: Package) -> Iterator[Problem]:
@@ -110,12 +130,12 @@ def _holes(package: Package, board: Board) -> Iterator[Problem]:
     diameter, x, y = board.holes.diameter, board.holes.inset_x, board.holes.inset_y
     if x is None or y is None:
         return
-    for axis, side, inset, other in (("x", "length", x, y), ("y", "width", y, x)):
+    for axis, side, inset, inset_across in (("x", "length", x, y), ("y", "width", y, x)):
         whole = getattr(board, side)
-        room = 0.5 * whole - _taken_by_package(getattr(package.substrate, side), board)
+        room = 0.5 * whole - _half_of_package(getattr(package.substrate, side), board)
         missing = SMALLEST_ROOM * diameter - room
         # A block grows with its inset, until the inset along the other axis, or the hole, limits it.
-        largest = max(room - 0.5 * square_around(diameter, other), room / (1.0 + 0.5 * WIDEST_SQUARE))
+        largest = max(room - 0.5 * square_around(diameter, inset_across), room / (1.0 + 0.5 * WIDEST_SQUARE))
         key, allowed = f"board.holes.inset_{axis}", f"{_mm(SMALLEST_INSET * diameter)} to {_mm(largest)}"
         if missing > 0.0:
             yield _no_room(side, whole + 2.0 * missing, room, board)
@@ -153,12 +173,10 @@ def _hole_places(package: Package, board: Board) -> Iterator[Problem]:
     key, least = "board.holes.at", SMALLEST_INSET * board.holes.diameter
     if not board.hole_places:
         return
-    if not any(places[-1] > places[0] for places in board.hole_lines):
-        yield Problem(key, "a board with one hole could rotate about it", str(len(board.holes.at)), ">= 2 positions")
     sides = (package.substrate.length, package.substrate.width)
     square = hole_square(board)
     for axis, (side, (low, high), lines) in enumerate(zip(sides, board.ends, board.hole_lines, strict=True)):
-        beyond = _taken_by_package(side, board) + 0.5 * max(square, 2.0 * least)
+        beyond = _half_of_package(side, board) + 0.5 * max(square, 2.0 * least)
         for position in lines:
             inside = f"{_mm(low + least)} to {_mm(-beyond)} and {_mm(beyond)} to {_mm(high - least)}"
             if not low + least <= position <= high - least:
@@ -190,14 +208,14 @@ def _no_room(side: str, needed: float, room: float, board: Board) -> Problem:
     return Problem(f"board.{side}", message, _mm(whole), board_at_least)
 
 
-def _taken_by_package(side: float, board: Board) -> float:
+def _half_of_package(side: float, board: Board) -> float:
     """Return half the width of the board's strip that package, patch and one more element occupy [m]."""
     size, margin = board.numerics.element_size, board.numerics.patch_margin
     return 0.5 * side * (1.0 + (margin + 1) / uniform(0.0, 0.5 * side, size).cells)
 
 
 def _gaps(package: Package, board: Board, warpage: Warpage) -> Iterator[Problem]:
-    """Check that the warped package stays above the board, and its pads above those of the board."""
+    """Check that the warped package does not touch the board, nor its pads the pads of the board."""
     sites = pad_table(package, board, Warpage())
     unit = Warpage(corner=1.0)
     over_joints = max((float(lift(package, unit, site.x, site.y)) for site in sites), default=0.0)

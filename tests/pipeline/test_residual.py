@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.board_drop.shock_cooling import with_initial_stress
 from reflowshock.workflow.board_drop.stages import shock
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Findings, Run
@@ -60,7 +60,7 @@ def continues_from_the_same_cooling(run_folder: Path) -> None:
     written, request = cooling_file.stat().st_mtime_ns, json.loads((run_folder / "shock/dns/input.json").read_text())
     again = run_folder / "again"
     again.mkdir()
-    request = begun(Run(run_folder, read_case(SMALL_CASE, COOLED), 2), again, request)
+    request = with_initial_stress(Run(run_folder, read_case(SMALL_CASE, COOLED), 2), again, request)
     assert Path(request["cooling"]).read_bytes() == cooling_file.read_bytes()
     assert cooling_file.stat().st_mtime_ns == written
 

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from reflowshock.materials.roles import Materials
     from reflowshock.workflow.package.case import BoardDropCase
 
-SHARE = 4.0 / math.pi  # of the base's acceleration in the first mode of a pinned beam, at its middle
-# Of ``expected_duration``, as cases/jedec_bga swings: its period, 3.7 ms (280 Hz is measured on such boards), over that
-# of a pinned beam; and c: held at four holes it stretches little.
-HELD, STRETCH = 0.58, 0.6
-HALF_SPACE = 0.3  # Poisson's ratio of laminates under a pad
+SHARE = 4.0 / math.pi  # share of the base's acceleration that drives the middle of a pinned beam in its first mode
+# From cases/jedec_bga: ratio of its period, 3.7 ms (280 Hz is measured on such boards), to the period of a pinned beam;
+# and c of ``expected_duration``, which is small because the board is supported at four holes only.
+PERIOD_RATIO, STRETCH = 0.58, 0.6
+LAMINATE_POISSON = 0.3  # Poisson's ratio of laminates under a pad
 SAMPLES, SAMPLES_A_PERIOD = 1000, 100
-MOST_PERIODS = 1000  # periods of the response; no pulse of a drop lasts longer
+MOST_PERIODS = 1000  # longest response in periods; pulses of drops are shorter
 
 
 def expected_deflection(case: "BoardDropCase") -> Deflection:
@@ -45,24 +45,29 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
 
 
 def expected_duration(case: "BoardDropCase") -> float:
-    """Return the expected duration of a shock [s]; if it is ``auto``, until half a swing after the first peak.
+    """Return the expected duration of a shock [s]: the duration of the case, or the time of settling for ``auto``.
 
-    After a pulse t the board swings as if pushed at t / 2: it is out at t / 2 + T / 4 and back at t / 2 + T / 2, half a
-    swing. Where it turns it stretches as well, w'' + omega^2 w (1 + c (w/h)^2) = 0, which shortens its period T.
+    After a pulse of duration t the board swings as if pushed at t / 2: the first peak is at t / 2 + T / 4, and half
+    a swing after it is before t + 3 / 4 T. With finite rotations the board also stretches,
+    w'' + omega^2 w (1 + c (w/h)^2) = 0, which shortens its period T.
     """
     longest, omega = longest_duration(case), first_mode(case)[1]
     if case.shock.duration != "auto":
         return longest
-    pulse, period = longest - math.tau / omega, HELD * math.tau / omega
+    pulse, period = longest - math.tau / omega, PERIOD_RATIO * math.tau / omega
     if decided(case).shock.numerics.kinematics != "small":
-        period *= stretched_period(HELD * expected_deflection(case).largest / case.board.thickness)
+        period *= stretched_period(PERIOD_RATIO * expected_deflection(case).largest / case.board.thickness)
     return min(longest, pulse + 0.75 * period)
 
 
 def stretched_period(deflection: float) -> float:
-    """Return the period of a board that stretches over that of one that does not, which deflects by so many h.
+    """Return the ratio of the periods of a board that stretches and a board that only bends.
 
-    Its amplitude a in h has the same energy, a^2 + c a^4 / 2; 1 + 3/4 c a^2 is the square of its frequency.
+    Both swing with the same energy. The amplitude a [h] of the stretching board solves a^2 + c a^4 / 2 = w^2; the
+    square of its frequency grows by 1 + 3/4 c a^2.
+
+    Args:
+        deflection: Amplitude w of the board that only bends, over its thickness h.
     """
     square = (math.sqrt(1.0 + 2.0 * STRETCH * deflection**2) - 1.0) / STRETCH
     return 1.0 / math.sqrt(1.0 + 0.75 * STRETCH * square)
@@ -72,9 +77,9 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
     """Return the largest |q| [m] of q'' + omega^2 q = 4/pi a(t) from rest, by Duhamel's integral.
 
     Args:
-        omega: angular frequency [rad/s].
-        velocity: integral of a from 0 to a time [m/s].
-        duration: of what is looked at [s].
+        omega: Angular frequency [rad/s].
+        velocity: Function of the time [s] that returns the integral of a from 0 to this time [m/s].
+        duration: Duration of the response [s].
     """
     duration = min(duration, MOST_PERIODS * math.tau / omega)
     count = max(SAMPLES, math.ceil(SAMPLES_A_PERIOD * omega * duration / math.tau))
@@ -87,18 +92,19 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
 
 
 def expected_peel(case: "BoardDropCase", deflection: Deflection) -> float:
-    """Return about the peel stress of the outermost joints [Pa]: under a package much stiffer than the board.
+    """Return an estimate of the peel stress of the outermost joints [Pa], under a package much stiffer than the board.
 
-    A board bent by a curvature K under a stiff plate on springs, k a unit of area, is apart from it by d: with
-    D d^(4) + k d = 0, and d^(2) = K, d^(3) = 0 at the plate's edge, p = k d = K sqrt(k D) there. A joint's stiffness is
-    that of its solder in series with what its pads are pressed into, E d / (1 - nu^2) each, with their diameter d.
+    The joints are an elastic foundation of stiffness k per area between a rigid plate and a board of bending stiffness
+    D and curvature K. The gap opens by d with D d^(4) + k d = 0, and d^(2) = K, d^(3) = 0 at the edge of the plate, so
+    the pressure is p = k d = K sqrt(k D) there. Each joint is its solder in series with the laminate under both pads,
+    a half-space of stiffness E a / (1 - nu^2) under a pad of diameter a.
     """
     package, materials = case.package, case.materials
     diameter = 2.0 * min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
     area = math.pi / 4.0 * diameter**2
     parts = materials.board, materials.substrate, materials.solder
     board, substrate, solder = (material.engineering_constants.young[0] for material in parts)
-    springs = (diameter * young / (1.0 - HALF_SPACE**2) for young in (board, substrate))
+    springs = (diameter * young / (1.0 - LAMINATE_POISSON**2) for young in (board, substrate))
     compliance = package.standoff / (solder * area) + sum(1.0 / spring for spring in springs)
     curvature = deflection.slope**2 / deflection.largest if deflection.largest > 0.0 else 0.0
     bending = board * case.board.thickness**3 / 12.0
@@ -109,7 +115,7 @@ def decided(case: "BoardDropCase") -> "BoardDropCase":
     """Return the case with the duration, the kinematics and the solder that its scene calls for.
 
     Raises:
-        PulseError: the table of the pulse cannot be read.
+        PulseError: The table of the pulse cannot be read.
     """
     scene, numerics = DropScene(case), case.shock.numerics
     update: dict[str, Any] = {"duration": scene.duration}
@@ -122,70 +128,70 @@ def decided(case: "BoardDropCase") -> "BoardDropCase":
 
 @dataclass(frozen=True)
 class DropScene:
-    """A case as effects see it, a ``Drop``; PulseError where a table of its pulse cannot be read."""
+    """Case as the ``Drop`` that effects are decided on; its properties raise PulseError for unreadable pulse tables."""
 
     case: "BoardDropCase"
 
     @property
     def shock(self) -> "Shock":
-        """Its parameters."""
+        """Parameters of the shock."""
         return self.case.shock
 
     @property
     def materials(self) -> "Mapping[str, Material]":
-        """Role -> material, as the scene calls for it."""
+        """Materials by role, with the solder that the scene calls for."""
         return self.decided_materials.by_role
 
     @cached_property
     def decided_materials(self) -> "Materials":
-        """The materials; the solder is elastic where it does not yield."""
-        given = self.case.materials
-        if given.solder.plasticity is None or self.yielding["on"]:
-            return given
-        return given.model_copy(update={"solder": given.solder.elastic})
+        """Materials; the solder is elastic if it is not expected to yield."""
+        materials = self.case.materials
+        if materials.solder.plasticity is None or self.yielding["on"]:
+            return materials
+        return materials.model_copy(update={"solder": materials.solder.elastic})
 
     @property
     def thickness(self) -> float:
-        """Of the board [m]."""
+        """Thickness of the board [m]."""
         return self.case.board.thickness
 
     @property
     def symmetry(self) -> Literal["full", "quarter"]:
-        """Of the model."""
+        """Symmetry of the model."""
         return self.case.board.symmetry
 
     @property
     def weight(self) -> Decision:
-        """Whether weight acts, from g over the peak acceleration."""
+        """Decision on gravity, from g over the peak acceleration."""
         from reflowshock.fem.loads.shock_pulse import shock_pulse
 
         return shock_pulse(self.case.shock).gravity
 
     @property
     def yielding(self) -> Decision:
-        """Whether solder yields that can."""
+        """Decision on plastic solder, from the expected peel stress over its yield stress."""
         switch, cooled = self.shock.numerics.plasticity, self.cooled
         stress = expected_peel(self.case, self.expected) if switch == "auto" else 0.0
         return SolderPlasticity.called_for(switch, self.case.materials.by_role, stress, cooled)
 
     @property
     def cooled(self) -> bool:
-        """Whether the shock begins with the stress of cooling."""
+        """Whether the shock begins with the residual stress of cooling."""
         return self.case.cooled
 
     @property
     def duration(self) -> float:
-        """How long it is followed, at most [s]."""
+        """Longest duration of the computation [s]."""
         return longest_duration(self.case)
 
     @cached_property
     def expected(self) -> Deflection:
-        """How the shock bends the board."""
+        """Expected bending of the board by the shock."""
         return expected_deflection(self.case)
 
     @property
     def bent_by_weight(self) -> float:
-        """Deflection of the board [m] by weight alone."""
+        """Largest deflection of the board by its weight alone [m]."""
         from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 
         return first_mode_peak(self.expected.omega, lambda time: STANDARD_GRAVITY * time, self.duration)

@@ -12,16 +12,17 @@ if TYPE_CHECKING:
 def longest_duration(case: "BoardDropCase") -> float:
     """Return the longest duration of a shock [s]; if it is ``auto``, one period of the board after the pulse.
 
-    The period is that of a pinned beam; screws shorten it. Errors as ``expected_deflection``.
+    The board is taken as a pinned beam; screws shorten the real period.
+
+    Raises:
+        PulseError: The table of the pulse cannot be read.
     """
-    from reflowshock.fem.loads.pulse import Tabulated
     from reflowshock.fem.loads.shock_pulse import input_pulse
 
     if case.shock.duration != "auto":
         return case.shock.duration
     pulse, _ = input_pulse(case.shock)
-    end = float(pulse.times[-1]) if isinstance(pulse, Tabulated) else pulse.duration
-    return end + math.tau / first_mode(case)[1]
+    return pulse.duration + math.tau / first_mode(case)[1]
 
 
 def first_mode(case: "BoardDropCase") -> tuple[float, float]:

@@ -28,7 +28,11 @@ class FineJoints:
 
 
 def needs_coarse_joints(coupling: "JointCoupling | None") -> bool:
-    """Return whether a joint, or the macro model of a one-way run, needs the coarse joint mesh."""
+    """Return whether a shock needs coarse joint meshes: for joints that are not fine, or for a one-way macro model.
+
+    Args:
+        coupling: Coupling of the macro and the meso model; None, without a two-scale run, needs no coarse joints.
+    """
     return coupling is not None and (coupling.fine_joints != "all" or coupling.direction == "one_way")
 
 
@@ -36,7 +40,7 @@ class CoarseJoints(Effect["DropScene"]):
     """Effect: joints with a coarse mesh."""
 
     name = "coarse_joints"
-    adds = "eight hexahedra a joint instead of the fine mesh"
+    adds = "eight hexahedra per joint instead of the fine mesh"
     influence = "0.1 % of the fine joints' stress (cases/bga_drop, measured)"
     place = "reflowshock.workflow.board_drop.fine_joints.FineJoints"
     switch = "shock.coupling.fine_joints = all, critical, names"

@@ -1,4 +1,4 @@
-"""What cannot be fitted to the board of a drop: beside it, over something else, or with its shock."""
+"""Checks of fittings and further packages: off the board, overlapping, or incompatible with the shock."""
 
 import math
 from collections.abc import Iterator
@@ -18,37 +18,37 @@ PACKAGE = "package"  # name of the acceleration of the package's centre
 
 
 class DrawnHoles(Holes):
-    """The mounting holes of the board of a drop, wherever they are."""
+    """Mounting holes of the board of a drop at any positions."""
 
     at: tuple[tuple[float, float], ...]
 
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
-        """Their axes [m]."""
+        """Positions of the axes, (x, y) of each hole [m]."""
         return self.at
 
 
 class DrawnBoard(Structure):
-    """The board of a drop as a structure, z = 0 at its upper face."""
+    """Board of a drop as a structure, z = 0 at its upper face."""
 
     centre: tuple[float, float]
     holes: DrawnHoles | None
 
     @property
     def corners(self) -> tuple[Place, Place]:
-        """Return the lowest and the highest corner of the meshed part [m]."""
+        """Lowest and highest corner of the meshed part, (x, y, z) of each [m]."""
         (x, y, _), (length, width, thickness) = super().corners
         a, b = self.centre
         return (x + a, y + b, -thickness), (length + a, width + b, 0.0)
 
     @property
     def facet_sets(self) -> tuple[str, ...]:
-        """Return the names that supports may refer to."""
+        """Names of facet sets that supports may refer to."""
         return ("mounting_holes",)
 
 
 def drawn_board(case: "BoardDropCase") -> DrawnBoard:
-    """Return the board of a case; its elements and material are of no account."""
+    """Return the board of a case for geometric checks; its elements and material are arbitrary."""
     board, holes = case.board, case.board.holes
     return DrawnBoard(
         centre=board.centre,
@@ -81,29 +81,29 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
 def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Problem]:
     """Yield problems of further packages: off the board, over a hole or over another package."""
     package = case.package.substrate
-    taken = {"package": ((0.0, 0.0), (package.length, package.width))}
+    footprints = {"package": ((0.0, 0.0), (package.length, package.width))}
     for name, item in case.packages.items():
         key = f"packages.{name}"
         yield from _layers(key, item)
-        for other, (centre, sides) in taken.items():
+        for neighbour, (centre, sides) in footprints.items():
             gaps = [
                 abs(a - b) - 0.5 * (c + d) for a, b, c, d in zip(item.at, centre, item.substrate, sides, strict=False)
             ]
             if max(gaps) < 0.0:
-                yield Problem(f"{key}.at", f"overlaps {other}", None, f"{in_mm(-max(gaps))} farther away")
-        taken[key] = item.at, (item.substrate[0], item.substrate[1])
+                yield Problem(f"{key}.at", f"overlaps {neighbour}", None, f"{in_mm(-max(gaps))} farther away")
+        footprints[key] = item.at, (item.substrate[0], item.substrate[1])
         for x in (-0.5, 0.5):
             for y in (-0.5, 0.5):
                 corner = (item.at[0] + x * item.substrate[0], item.at[1] + y * item.substrate[1], 0.0)
                 yield from inside(f"{key}.at", corner, board)
-        yield from _beside_holes(f"{key}.at", item, board)
+        yield from _over_holes(f"{key}.at", item, board)
     if case.packages and case.cooled:
-        message = "does not know further packages, whose stress of cooling is left out"
+        message = "does not support further packages, whose residual stress is not computed"
         yield Problem("thermal.effects.residual_stress", message, "on", "off, or no packages")
 
 
 def _layers(key: str, item: Neighbour) -> Iterator[Problem]:
-    """Find posts that overlap or do not stand below the substrate, and a die that is larger than it."""
+    """Yield problems of posts that overlap, and of posts or a die that reach beyond the substrate."""
     if item.post > item.pitch:
         yield Problem(f"{key}.post", "is wider than the pitch", in_mm(item.post), f"<= {in_mm(item.pitch)}")
     for axis, count, outer, inner in zip("xy", (item.columns, item.rows), item.substrate, item.die, strict=False):
@@ -113,8 +113,8 @@ def _layers(key: str, item: Neighbour) -> Iterator[Problem]:
             yield Problem(f"{key}.substrate", message, in_mm(outer), f">= {in_mm(max(array, inner))}")
 
 
-def _beside_holes(key: str, item: Neighbour, board: DrawnBoard) -> Iterator[Problem]:
-    """Find a package over a mounting hole."""
+def _over_holes(key: str, item: Neighbour, board: DrawnBoard) -> Iterator[Problem]:
+    """Yield the problem of a package over a mounting hole."""
     assert board.holes is not None
     nearest = min(
         math.hypot(
@@ -127,16 +127,16 @@ def _beside_holes(key: str, item: Neighbour, board: DrawnBoard) -> Iterator[Prob
 
 
 def spans(board: "Board") -> tuple[float, float]:
-    """Return how far the outermost mounting holes of a board are apart along x and y [m]."""
+    """Return the distances between the outermost mounting holes of a board along x and y [m]."""
     x, y = (places[-1] - places[0] for places in board.hole_lines)
     return x, y
 
 
 def in_mm(length: float) -> str:
-    """Write a length in millimetres."""
+    """Format a length [m] in millimetres."""
     return f"{1e3 * length:.4g} mm"
 
 
-def given(case: "BoardDropCase") -> dict:
-    """Return the fittings in the input format of the package fem."""
+def fem_input(case: "BoardDropCase") -> dict:
+    """Return the fittings of a case in the input format of the package ``fem``."""
     return case.model_dump(mode="json", include=set(BoardFittings.model_fields))

@@ -28,18 +28,18 @@ def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
 
 
 class IdenticalJoints(Effect["DropScene"]):
-    """The shock once more, with joints that are all alike."""
+    """Effect: second shock with identical joints."""
 
     name = "identical_joints"
-    adds = "the shock once more, all joints alike"
-    influence = "none on the answer: a comparison beside it"
+    adds = "a second shock with identical joints"
+    influence = "none on the result: a comparison"
     place = "reflowshock.workflow.board_drop.identical_joints.identical_sphere"
     switch = "shock.identical_joints = true, false"
     source = "truncated spheres"
     toggle = Toggle(KEY, True, False)
 
     def decide(self, drop: "DropScene") -> Decision:
-        """As the case says."""
+        """Return the setting of the case, with the height of the joints."""
         on = drop.shock.identical_joints
         why = f"{KEY} = {str(on).lower()}"
         if on:
@@ -48,7 +48,7 @@ class IdenticalJoints(Effect["DropScene"]):
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Find identical joints that would touch each other."""
+    """Yield the problem of identical joints that would touch each other."""
     package = case.package
     if not case.shock.identical_joints or package.rows * package.columns == 1:
         return
@@ -59,18 +59,23 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def shape_effect(real: float, identical: float) -> float | None:
-    """Return by what fraction real shapes change a peak of stress; None where identical joints are only pressed."""
+    """Return the relative change of a peak stress by real joint shapes.
+
+    Args:
+        real: Peak stress with real joints [Pa].
+        identical: Peak stress with identical joints [Pa]; without a positive one the result is None.
+    """
     return real / identical - 1.0 if identical > 0.0 else None
 
 
-def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str) -> Findings:
-    """Add what real shapes change in the critical joint's peak peel stress to the result of a shock.
+def with_comparison(findings: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str) -> Findings:
+    """Add the comparison of real and identical joints, by the peak peel stress of the critical joint, to a shock.
 
     Args:
-        found: metrics, health and effects of the shock with the real joints.
-        run: the run folder with the places in which the joints froze, the case.
-        folder: of the shock, with the run of a mode and that in ``identical``.
-        mode: whose run has the real joints.
+        findings: Metrics, health checks and effects of the shock with real joints.
+        run: Case, and run folder with the pad table after solidification.
+        folder: Folder of the shock, with a folder for the mode and a folder ``identical``.
+        mode: Mode of the run with real joints, the name of its folder.
     """
     from reflowshock.meshing.board.pads import read_pads
 
@@ -87,7 +92,7 @@ def compared(found: Findings, run: "Run[BoardDropCase]", folder: Path, mode: str
     }
     result = read_json(folder / FOLDER / "result.json")
     health = {f"{FOLDER}_{name}": check for name, check in result["health"].items()}
-    return replace(found, metrics=found.metrics | metrics, health=found.health | health)
+    return replace(findings, metrics=findings.metrics | metrics, health=findings.health | health)
 
 
 def _peaks(history: Path) -> dict[str, float]:

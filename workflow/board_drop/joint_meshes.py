@@ -70,12 +70,22 @@ def _closed(shape: "JointShape"):
 
 logger = logging.getLogger(__name__)
 
-BETWEEN = "+"  # the names of two joints that are one body
-IMAGE = "_image"  # ends the name of a joint behind a plane of symmetry
+BETWEEN = "+"  # separator in the names of bridged pairs
+IMAGE = "_image"  # suffix of the name of a joint behind a plane of symmetry
 
 
 def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool) -> dict[str, dict]:
-    """Place the package at its position after solidification and mesh the joints; return as ``mesh_array``."""
+    """Place the package at its position after solidification and mesh the joints; return their quality.
+
+    Args:
+        case: Case of a package.
+        run_folder: Run folder with the products of the preceding stages.
+        folder: Folder for the meshes.
+        coarse: Whether each joint is also meshed coarse.
+
+    Returns:
+        Quality by kind of mesh (prefix of files and metrics), then by joint; kinds without joints are left out.
+    """
     from reflowshock.meshing.board.displaced_assembly import (
         prescribed_displacement,
         read_displacement,
@@ -100,7 +110,16 @@ def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coars
 
 
 def mesh_identical_joints(run: Run[BoardDropCase], folder: Path, *, coarse: bool) -> dict[str, dict]:
-    """Mesh unloaded truncated spheres of the solder volume under a flat package; return as ``mesh_array``."""
+    """Mesh unloaded truncated spheres of the solder volume under a flat package; return their quality.
+
+    Args:
+        run: Case, and run folder with the flat assembly.
+        folder: Folder for the meshes.
+        coarse: Whether each joint is also meshed coarse.
+
+    Returns:
+        Quality by kind of mesh (prefix of files and metrics), then by joint.
+    """
     from reflowshock.meshing.board.displaced_assembly import uniform_lift, write_displaced_assembly
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.sphere_surface import sphere_surface
@@ -125,13 +144,13 @@ def mesh_array(
     *,
     coarse: bool,
 ) -> "dict[str, list[JointMesh]]":
-    """Mesh joints.
+    """Mesh all joints of an array fine, and on request also coarse.
 
     Args:
         bodies: Closed surface and pad site of each joint.
         side: Underside of the package.
-        package: Package.
-        board: Board.
+        package: Parameters of the package.
+        board: Parameters of the board.
         coarse: Whether each joint is also meshed coarse.
 
     Returns:
@@ -199,7 +218,7 @@ def mesh_bridges(
         pair = (first, _nearest_image(first, second)) if quarter else (first, second)
         try:
             meshes.append(mesh_bridge(surfaces[name], pair, case.package, MirroredSide(side) if quarter else side))
-        except JointMeshError as error:  # the verdict stands without it
+        except JointMeshError as error:  # the mesh is not needed for the verdict
             logger.warning("%s are bridged, but their common body was not meshed: %s", name, error)
     return meshes
 

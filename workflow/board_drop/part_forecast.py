@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MACRO = "board"  # part of the macro model
 BOXES = ("board", "substrate", "die")  # roles with box elements, except in columns
-IN_COLUMN = "column"  # what ``shock.numerics.mass_scaled`` calls them
+IN_COLUMN = "column"  # name of columns in ``shock.numerics.mass_scaled``
 MOST_ELEMENTS = 10_000_000  # largest part whose element shapes are computed; larger ones are never meshed
 COLUMN = f"_{IN_COLUMN}"  # ends the names of parts of board and substrate around fine joints
 
@@ -98,8 +98,8 @@ def _forecasts(case: "BoardDropCase", estimates: "Mapping[str, PartEstimate]") -
         if len(shapes):
             step[name] = min(step[name], float(skewed_critical_step(material_of(case, name), shapes).min()))
     heavier = {name for name in step if role_of(name) in scaled or (name.endswith(COLUMN) and IN_COLUMN in scaled)}
-    others = min((step[name] for name in step if name not in heavier), default=min(step.values()))
-    target = min(others, case.shock.numerics.mass_scaled_step or math.inf)
+    smallest = min((step[name] for name in step if name not in heavier), default=min(step.values()))
+    target = min(smallest, case.shock.numerics.mass_scaled_step or math.inf)
     raised = step | {name: max(step[name], target) for name in heavier}
     return {
         name: PartForecast(

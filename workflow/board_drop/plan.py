@@ -17,13 +17,23 @@ SETTLES = "ends half a swing of the board after the largest stress of the joints
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
-    """Yield the joints of a package and the assumed speed of the reflow."""
+    """Yield the lines of ``plan`` for a package without a shock: its joints, and the assumed speed of the reflow.
+
+    Args:
+        case: Case of a package.
+        outlook: Forecast of the case.
+    """
     yield f"\n{_joints(case, outlook)}"
     yield styled("\n[dim]{}", REFLOW_SPEED)
 
 
 def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator[RenderableType]:
-    """Yield sizes, the shock and the assumed speeds of a board drop."""
+    """Yield the tables and lines of ``plan`` for a board drop: mesh sizes, shock, and the assumed speeds.
+
+    Args:
+        case: Case of a board drop.
+        outlook: Forecast of the case, with its shock.
+    """
     assert outlook.shock is not None
     yield _sizes(case, outlook)
     yield _shock(case, outlook.shock)

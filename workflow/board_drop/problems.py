@@ -1,4 +1,4 @@
-"""What does not fit together in the case of a package: its geometry, its solder, its shock."""
+"""Checks of the parameters of a package against each other: geometry, solder, shock."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -15,29 +15,30 @@ from reflowshock.workflow.reflow import forecast as reflow_forecast
 
 
 def package_problems(case: PackageCase) -> list[Problem]:
-    """Find parameters that make no possible package, joint or board together."""
+    """Return the contradictions between the parameters of package, joints and board."""
     return _of_geometry(case) or _of_joints(case)
 
 
 def board_drop_problems(case: BoardDropCase) -> list[Problem]:
-    """Find parameters that make no possible package, joint, board or shock together."""
+    """Return the contradictions between the parameters of package, joints, board and shock."""
     from reflowshock.fem.problem import shock_checks
 
-    if found := _of_geometry(case):
-        return found
-    found = _of_joints(case) + _in_words(case, shock_checks.problems(case.shock)) + list(fine_joints.problems(case))
-    found += unreadable_pulses(case.pulse_tables)
-    found += _in_words(case, fittings.problems(case))
-    if case.shock.numerics.kinematics == "auto" and not found:
-        found += _in_words(case, map(_as_decided, shock_checks.problems(decided(case).shock)))
-    if found:
-        return found
-    found = [*identical_joints.problems(case), *shock_cooling.problems(case), *_of_flow(case), *_of_coupling(case)]
-    return found or list(step_problems(case))
+    if problems := _of_geometry(case):
+        return problems
+    problems = _of_joints(case) + _in_user_units(case, shock_checks.problems(case.shock))
+    problems += fine_joints.problems(case)
+    problems += unreadable_pulses(case.pulse_tables)
+    problems += _in_user_units(case, fittings.problems(case))
+    if case.shock.numerics.kinematics == "auto" and not problems:
+        problems += _in_user_units(case, map(_as_decided, shock_checks.problems(decided(case).shock)))
+    if problems:
+        return problems
+    problems = [*identical_joints.problems(case), *shock_cooling.problems(case), *_of_flow(case), *_of_coupling(case)]
+    return problems or list(step_problems(case))
 
 
 def _as_decided(problem: Problem) -> Problem:
-    """Say of kinematics that the scene has decided that the case did not ask for them."""
+    """Mark the value of kinematics that were decided from ``auto``."""
     is_decided = problem.key == "shock.numerics.kinematics"
     return replace(problem, value=f"auto, here {problem.value}") if is_decided else problem
 
@@ -45,11 +46,11 @@ def _as_decided(problem: Problem) -> Problem:
 def _of_geometry(case: PackageCase) -> list[Problem]:
     from reflowshock.meshing.board.checks import problems
 
-    return _in_words(case, problems(case.package, case.board, case.warpage))
+    return _in_user_units(case, problems(case.package, case.board, case.warpage))
 
 
 def _of_joints(case: PackageCase) -> list[Problem]:
-    """Find temperatures, solder and given surfaces that do not go with the joints of a possible package."""
+    """Return problems of temperatures, solder and given surfaces with the joints of a valid geometry."""
     from reflowshock.fem.problem import thermal as thermal_checks
     from reflowshock.meshing.board.pads import pad_table
     from reflowshock.particles.parameters import checks as particles_checks
@@ -63,33 +64,33 @@ def _of_joints(case: PackageCase) -> list[Problem]:
     of_solder = of_solder or particles_checks.problems(case.solder, geometries, package.pitch)
     if thermal:
         of_solder += reflow_forecast.problems(case.solder, geometries, thermal, package.pitch)
-    return _in_words(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
+    return _in_user_units(case, heated) + of_solder + list(given_surfaces.problems(package, pads, thermal is not None))
 
 
-def _in_words(case: PackageCase, found: Iterable[Problem]) -> list[Problem]:
-    """Say what checks of meshing or fem found in the words of a case file, values in the user's units."""
-    known = {key: field for key, _, field in fields.leaves(case)}
-    return [replace(problem, value=fields.shown(problem.value, known.get(problem.key))) for problem in found]
+def _in_user_units(case: PackageCase, problems: Iterable[Problem]) -> list[Problem]:
+    """Return problems with their values as a user writes them in the case file."""
+    by_key = {key: field for key, _, field in fields.leaves(case)}
+    return [replace(problem, value=fields.as_written(problem.value, by_key.get(problem.key))) for problem in problems]
 
 
 def _yielding(case: BoardDropCase) -> list[str]:
-    """Return the parts whose material yields there."""
+    """Return the roles of the materials that yield in the shock."""
     return [role for role, material in decided(case).materials.by_role.items() if material.plasticity is not None]
 
 
 def _of_flow(case: BoardDropCase) -> Iterator[Problem]:
-    """Find a limit of plastic work where nothing yields, and linear steps where something does."""
+    """Yield problems of limits on plastic work without yielding solder, and of linear steps with yielding materials."""
     failure, yielding = case.shock.failure, _yielding(case)
     if "solder" not in yielding:
         allowed = 'materials.solder of the library, such as "SAC405", or with a table plasticity'
         message = "by plastic work, but the solder does not yield"
         if (work := failure.layer_plastic_work) is not None:
-            limit = fields.shown(work.limit, type(work).model_fields["limit"])
+            limit = fields.as_written(work.limit, type(work).model_fields["limit"])
             yield Problem("shock.failure.layer_plastic_work.limit", f"judges {message}", limit, allowed)
         if failure.life is not None and failure.life.measure == "layer_plastic_work":
             yield Problem("shock.failure.life.measure", f"counts drops {message}", failure.life.measure, allowed)
     if case.shock.numerics.dns_solver == "implicit" and yielding:
-        message = f"is linear, but {' and '.join(yielding)} yields"
+        message = f"needs elastic materials, but {' and '.join(yielding)} yields"
         yield Problem("shock.numerics.dns_solver", message, "implicit", "explicit, or elastic materials")
 
 

@@ -1,4 +1,4 @@
-"""The state in which shocks begin: cooling from solidification, where the case asks for residual stress."""
+"""Initial state of shocks with residual stress: cooling from solidification to the temperature of the shock."""
 
 import hashlib
 import json
@@ -20,56 +20,59 @@ from reflowshock.workflow.process.fem_launch import run_fem
 if TYPE_CHECKING:
     from reflowshock.fem.estimates.solver_cost import SolverCost
 
-SCENE = ("meshes", "coarse_joints", "shock", "materials")  # of a request: what cooling depends on, too
+SCENE = ("meshes", "coarse_joints", "shock", "materials")  # keys of a request that cooling depends on
 RESULT, IDENTITY = "result.json", "identity.txt"
-FIRST = {"residual_two_scale": 0, "residual": 1}  # folders of coolings; the first gives the reported figures
+FIRST = {"residual_two_scale": 0, "residual": 1}  # order of the folders of coolings; the first gives the metrics
 
 
 def problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Find shocks that cannot begin with the stress of cooling."""
+    """Yield problems of settings of the shock that exclude residual stress."""
     if case.cooled and case.shock.numerics.kinematics == "corotational":
-        message = "cannot be combined with thermal.effects.residual_stress = on, which needs a path"
+        message = "cannot be combined with thermal.effects.residual_stress = on, whose stress depends on the path"
         yield Problem("shock.numerics.kinematics", message, "corotational", "finite, auto")
     if case.cooled and case.shock.coupling.direction == "one_way" and "two_scale" in case.shock.numerics.modes:
         message = "cannot be combined with thermal.effects.residual_stress = on: the macro model has its joints twice"
         yield Problem("shock.coupling.direction", message, "one_way", "two_way")
 
 
-def begun(run: Run[BoardDropCase], folder: Path, request: dict, prefix: str = "") -> dict:
-    """Return the request of a mode that begins with the stress of cooling; computed first, once for equal meshes.
+def with_initial_stress(run: Run[BoardDropCase], folder: Path, request: dict, prefix: str = "") -> dict:
+    """Compute the cooling of a mode, unless a mode with equal meshes has done so; return the request that refers to it.
 
     Args:
-        run: case, cores.
-        folder: of the shock.
-        request: what the package fem reads as input of the mode.
-        prefix: of its meshes.
+        run: Case and cores; without residual stress the request is returned as it is.
+        folder: Folder of the shock.
+        request: Input of the package ``fem`` for the mode.
+        prefix: Prefix of the mesh names of the mode; empty for real joints.
 
     Raises:
-        LaunchError: the run failed; the message has its last words.
+        LaunchError: The run failed; the message contains its last lines.
     """
     if not run.case.cooled:
         return request
     name = cooling_name(request, prefix)
     if not (folder / name).exists():
-        kept = run.checkpoints("shock").resolve() / name
-        _cool(run, kept, request)
-        shutil.copytree(kept, folder / name)
+        computed = run.checkpoints("shock").resolve() / name
+        _cool(run, computed, request)
+        shutil.copytree(computed, folder / name)
     return request | {"cooling": str((folder / name / "cooling.npz").resolve())}
 
 
 def cooling_name(request: dict, prefix: str) -> str:
-    """Return the folder of a mode's cooling: modes with all joints fine have the same."""
+    """Return the name of the folder with the cooling of a mode; modes with all joints fine share one."""
     return f"{prefix}residual" + ("" if request["shock"]["coupling"]["fine_joints"] == "all" else f"_{request['mode']}")
 
 
 def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
-    """Compute what cooling does, unless a stage that was killed has: a shock continues only from the same bits."""
+    """Compute the cooling into a folder, unless it has been computed with the same input.
+
+    A shock continues from its checkpoints only with the same bits, so a restarted stage reuses the cooling.
+    """
     from reflowshock.fem.parallel.checkpoint_files import digest_of_files
 
     thermal = run.case.thermal
     assert thermal is not None
     cooling = {name: request[name] for name in SCENE if name in request}
-    shock = request["shock"] | {"modes": 0}  # natural modes are those of the first mode of the run alone
+    shock = request["shock"] | {"modes": 0}  # only the first mode of the run computes natural modes
     cooling |= {"shock": shock, "mode": "cooling", "change": thermal.final - thermal.solidification}
     files = digest_of_files(
         *(Path(name) for name in (*request["meshes"], *filter(None, [request.get("coarse_joints")])))
@@ -84,33 +87,42 @@ def _cool(run: Run[BoardDropCase], folder: Path, request: dict) -> None:
     written.write_text(identity, encoding="utf-8")
 
 
-def with_cooling(found: Findings, case: BoardDropCase, folder: Path) -> Findings:
-    """Add to what the shocks found what the cooling of the first mode found, and the checks of all others."""
+def with_cooling(findings: Findings, case: BoardDropCase, folder: Path) -> Findings:
+    """Add the metrics of the first mode's cooling and the health checks of all coolings to a shock.
+
+    Args:
+        findings: Metrics, health checks and effects of the shock.
+        case: Case of a board drop.
+        folder: Folder of the shock; without coolings in it only the effect is added.
+    """
     paths = sorted(folder.glob(f"*residual*/{RESULT}"), key=lambda path: FIRST.get(path.parent.name, len(FIRST)))
-    metrics, health = dict(found.metrics), dict(found.health)
+    metrics, health = dict(findings.metrics), dict(findings.health)
     for number, path in enumerate(paths):
         result, prefix = json.loads(path.read_text(encoding="utf-8")), f"{path.parent.name}_" if number else ""
         metrics = metrics if number else result["metrics"] | metrics
         health |= {f"{prefix}{check}": value for check, value in result["health"].items()}
-    return replace(found, metrics=metrics, health=health, effects={**found.effects, **effect(case)})
+    return replace(findings, metrics=metrics, health=health, effects={**findings.effects, **effect(case)})
 
 
 def effect(case: BoardDropCase) -> dict:
-    """Return whether shocks begin with the stress of cooling, and why; nothing where nothing is heated."""
+    """Return the decision on residual stress by the name of the effect; empty for a case without ``[thermal]``."""
     thermal = case.thermal
     if thermal is None:
         return {}
     cooling = f": cooling by {thermal.solidification - thermal.final:.4g} K"
-    wanted = ResidualStress.wanted(thermal, f"{cooling}; an upper bound: solder relaxes at room temperature")
-    return {ResidualStress.name: wanted}
+    remark = f"{cooling}; an upper bound: solder relaxes at room temperature"
+    return {ResidualStress.name: ResidualStress.setting(thermal, remark)}
 
 
 def forecast(case: BoardDropCase, parts: Mapping[str, PartForecast]) -> tuple[dict, float]:
-    """Return the effect with its predicted cost, and the wall time [s] of all coolings.
+    """Return the decision on residual stress with its predicted cost, and the wall time of all coolings [s].
 
     Args:
-        case: the case.
-        parts: of the mesh with all joints fine; modes with other fine joints cool apart.
+        case: Case of a board drop.
+        parts: Parts of the mesh with all joints fine; modes with coarse joints have coolings of their own.
+
+    Returns:
+        Decision by the name of the effect, empty for a case without ``[thermal]``; zero seconds without cooling.
     """
     effects = effect(case)
     if not case.cooled:

@@ -19,13 +19,13 @@ def shock_effects(case: BoardDropCase) -> dict[str, Decision]:
 
 
 def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
-    """Decide which further joint meshes are made: coarse and identical joints."""
+    """Decide on coarse and identical joints, the effects that add joint meshes."""
     return decided(OF_JOINTS, DropScene(case))
 
 
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
-    """Return the effects of a run with their predicted influence."""
+    """Return the effects of a run with their predicted influence, where there is a prediction."""
     predicted = shock_effects(case)
-    known = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) for name in effects}
-    expected = {name: {"influence": item["influence"]} for name, item in known.items() if item and "influence" in item}
-    return {name: record | expected.get(name, {}) for name, record in effects.items()}
+    by_name = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects}
+    influence = {name: {"influence": item["influence"]} for name, item in by_name.items() if "influence" in item}
+    return {name: record | influence.get(name, {}) for name, record in effects.items()}

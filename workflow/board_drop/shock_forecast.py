@@ -84,7 +84,7 @@ class ShockForecast:
         substeps: Steps of a DNS in a window, m.
         windows: Number of windows.
         search: Predicted wall time of the windows of the coarse run that finds the critical joints [s], zero where
-            there is none.
+            the case names them.
         two_scale: Predicted wall time of the windows of the two-scale run [s].
         dns: Predicted wall time of the windows of the DNS with explicit steps [s].
         dns_share: Share of the windows that the DNS computes.
@@ -200,8 +200,8 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
 def estimate_mesh(case: "BoardDropCase", parts: Parts) -> "MeshEstimate":
     """Return the estimated mesh that the division needs, from the forecast parts.
 
-    Layers of solder at the pads are rows of their own: copper touches the first, which touches the second. Other rows
-    are taken not to touch.
+    Both layers of solder at the pads are separate rows: copper touches the first, which touches the second. Other
+    rows are assumed not to touch.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The modes of the board's shock as runs of the package fem."""
+"""Launch of the modes of a shock as MPI runs of the package ``fem``."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ from reflowshock.workflow.board_drop.fine_joints import (
     needs_coarse_joints,
     write_fine_joints,
 )
-from reflowshock.workflow.board_drop.shock_cooling import begun
+from reflowshock.workflow.board_drop.shock_cooling import with_initial_stress
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
@@ -24,9 +24,12 @@ IDENTICAL_TITLE = "identical joints"
 
 
 def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
-    """Return which joints the two-scale run has fine; where they are the critical ones, by a run with coarse joints.
+    """Return the fine joints of the two-scale run; find the critical ones by a run with all joints coarse.
 
-    That run is a two-scale run, too, in ``coarse``: of all runs the cheapest, since the board keeps its large step.
+    That run, in the folder ``coarse``, is a two-scale run as well, because the board then keeps its large step.
+
+    Raises:
+        LaunchError: The run failed; the message contains its last lines.
     """
     coupling, modes = run.case.shock.coupling, run.case.shock.numerics.modes
     if coupling.fine_joints != "critical" or "two_scale" not in modes:
@@ -42,33 +45,33 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
 
 
 def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints, prefix: str = "") -> None:
-    """Run one mode of the shock on its MPI ranks, showing its progress.
+    """Run one mode of the shock on its MPI ranks and show its progress.
 
     Args:
-        run: run folder with assembly and joints, case, cores.
-        folder: where the mode's products go.
-        mode: "two_scale" or "dns", which has all joints fine.
-        fine: the fine joints of a two-scale run.
-        prefix: begins the names of the meshes, where they are not those of the real joints.
+        run: Run folder with assembly and joints, case, cores.
+        folder: Folder for the products of the mode.
+        mode: "two_scale", or "dns" with all joints fine.
+        fine: Fine joints of a two-scale run; ignored for "dns".
+        prefix: Prefix of the names of the meshes; empty for real joints.
 
     Raises:
-        LaunchError: the run failed; the message has its last words.
+        LaunchError: The run failed; the message contains its last lines.
     """
     chosen = fine.names if mode == "two_scale" else "all"
     coupling = run.case.shock.coupling.model_copy(update={"fine_joints": chosen})
     request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
-    if not prefix and mode == next(one for one in MODES if one in run.case.shock.numerics.modes):
+    if not prefix and mode == next(name for name in MODES if name in run.case.shock.numerics.modes):
         request["shock"]["modes"] = run.case.shock.modes
     request |= _end_of_first(run, folder.parent)
     if mode == "two_scale" and needs_coarse_joints(coupling):
         request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
-    request = begun(run, folder.parent, request, prefix)
+    request = with_initial_stress(run, folder.parent, request, prefix)
     run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
 
 
 def _end_of_first(run: Run[BoardDropCase], folder: Path) -> dict:
-    """Return when a run ends, where the case does not say it: with the first mode, which ends when it has settled."""
+    """Return the input that ends a run of duration ``auto``: the first mode when it settles, others with it."""
     if run.case.shock.duration != "auto":
         return {}
     result = folder / run.case.shock.numerics.modes[0] / "result.json"
@@ -83,7 +86,7 @@ def _mesh(run: Run[BoardDropCase], name: str) -> str:
 
 
 def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupling: JointCoupling) -> dict:
-    """Return the input of a run of the package fem, but for its folders and natural modes."""
+    """Return the input of the package ``fem`` for a run, except its folders and natural modes."""
     case = decided(run.case)
     shock = case.shock.model_copy(update={"coupling": coupling, "modes": 0})
     return {
@@ -91,7 +94,7 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
         "meshes": [_mesh(run, name) for name in meshes],
         "shock": shock.model_dump(mode="json", exclude={"failure"}),
         "materials": case.materials.model_dump(mode="json"),
-        **fittings.given(case),
+        **fittings.fem_input(case),
     }
 
 

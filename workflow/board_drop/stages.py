@@ -76,5 +76,5 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     if run.case.shock.identical_joints:
         main = next(iter(results))
         run_mode(run, folder / identical_joints.FOLDER, main, fine, identical_joints.PREFIX)
-        shock_findings = identical_joints.compared(shock_findings, run, folder, main)
+        shock_findings = identical_joints.with_comparison(shock_findings, run, folder, main)
     return with_cooling(shock_findings, run.case, folder)

@@ -91,7 +91,7 @@ def literal_names(field: FieldInfo) -> tuple[str, ...]:
     return typing.get_args(annotation) if typing.get_origin(annotation) is typing.Literal else ()
 
 
-def wanted_items(field: FieldInfo) -> str:
+def item_count_message(field: FieldInfo) -> str:
     """Return a message about the required number of items in the list of a field."""
     items = typing.get_args(field.annotation)
     return "must be a list with at least one item" if Ellipsis in items else f"must be a list of {len(items)} items"
@@ -184,7 +184,7 @@ def display(value: object, field: FieldInfo) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def shown(value: object, field: FieldInfo | None) -> object:
+def as_written(value: object, field: FieldInfo | None) -> object:
     """Return an SI value as text in the user's unit if its field is a quantity, otherwise the value itself."""
     return display(value, field) if value is not None and field is not None and quantity_of(field) else value
 

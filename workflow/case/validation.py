@@ -47,7 +47,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
     if field is None:
         return Problem(key, text, value)
     if kind in ("tuple_type", "too_short", "too_long") or (kind == "missing" and isinstance(record["loc"][-1], int)):
-        return Problem(key, fields.wanted_items(field), value, fields.allowed(field))
+        return Problem(key, fields.item_count_message(field), value, fields.allowed(field))
     if kind == "missing":
         return Problem(key, "is missing", None, fields.allowed(field))
     if fields.models_of(field) and kind.startswith("union_tag"):

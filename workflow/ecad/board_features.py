@@ -4,8 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
-from reflowshock.meshing.board.checks import problems
-from reflowshock.meshing.board.parameters import Board, Package, Warpage
+from reflowshock.meshing.board.checks import hole_problems
+from reflowshock.meshing.board.parameters import Board, Package
 from reflowshock.units import from_si
 from reflowshock.workflow.ecad.layout import Component, EcadError, Hole, Layout, Point, box_around, in_mm
 
@@ -76,18 +76,17 @@ def mounting_holes(board: Layout, package: Package, thickness: float, least: flo
     if len(chosen) < 2 or math.dist(chosen[0].at, chosen[-1].at) == 0.0:
         message = f"the board has no two mounting holes of {in_mm(usual)} outside the package along both axes"
         raise EcadError(board.path, f"{message}; try another smallest diameter with --holes")
-    others = [hole for hole in wide if hole not in chosen]
-    listed = ", ".join(f"{in_mm(hole.diameter)} at ({in_mm(hole.at[0])}, {in_mm(hole.at[1])})" for hole in others[:8])
-    more = f" and {len(others) - 8} more" if len(others) > 8 else ""
+    left_out = [hole for hole in wide if hole not in chosen]
+    listed = ", ".join(f"{in_mm(hole.diameter)} at ({in_mm(hole.at[0])}, {in_mm(hole.at[1])})" for hole in left_out[:8])
+    more = f" and {len(left_out) - 8} more" if len(left_out) > 8 else ""
     note = f"holes left out (other diameter, under the package, or too close to others): {listed}{more}"
-    return sorted(chosen, key=lambda hole: hole.at), [note] if others else []
+    return sorted(chosen, key=lambda hole: hole.at), [note] if left_out else []
 
 
 def _can_be_meshed(chosen: list[Hole], hole: Hole, board: Layout, package: Package, thickness: float) -> bool:
-    """Return whether a hole can be meshed with the chosen ones; a board that may turn about them is accepted."""
+    """Return whether a hole can be meshed with the chosen ones; the board may still rotate about them."""
     trial = Board.model_validate(board_table(board, thickness, [*chosen, hole]))
-    hole_problems = [p for p in problems(package, trial, Warpage()) if p.key.startswith("board.holes")]
-    return all("rotate about" in problem.message for problem in hole_problems)
+    return not any(hole_problems(package, trial))
 
 
 def lumped_masses(board: Layout, package: str, thickness: float) -> tuple[list[Mass], list[str]]:

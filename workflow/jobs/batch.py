@@ -47,11 +47,20 @@ class Machine:
         return self.slurm or Local(self.cores, self.oversubscribe)
 
 
-def machine_of(executor: Local | Slurm, *, one_run: bool = False) -> Machine:
-    """Return the resources for computing points with a chosen executor."""
-    if isinstance(executor, Slurm):
-        return Machine(executor.largest, oversubscribe=executor.oversubscribe, slurm=executor, live=one_run)
-    return Machine(executor.cores, one_run, executor.oversubscribe, live=one_run)
+def machine_of(executor: Executor, *, one_run: bool = False) -> Machine:
+    """Return the resources for computing points with a chosen executor.
+
+    Args:
+        executor: Executor of the stages.
+        one_run: Whether only one point is computed: its stages show their progress and, on this machine, use all cores.
+    """
+    return Machine(
+        cores=executor.largest,
+        exclusive=one_run and executor.cluster is None,
+        oversubscribe=executor.oversubscribe,
+        slurm=executor.cluster,
+        live=one_run,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +157,7 @@ def run_points(
             tried |= {job.name for job in jobs}
             for point in points:
                 show_products(store, point)
-            done = _run(store, jobs, machine, lock)
-            if not done:
+            if not _run(store, jobs, machine, lock):
                 break
     finally:
         for point in points:
@@ -180,12 +188,12 @@ def log_of(store: Store, point: Point, stage: str) -> Path:
 
 def _describe_silent_end(store: Store, point: Point, stage: str, state: StageState) -> str:
     """Describe the end of a stage that left no message."""
-    name, said, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
-    if by_cluster := failures_of(said).get(name):
-        return f"{by_cluster}; see {said}"
+    name, output, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
+    if by_cluster := failures_of(output).get(name):
+        return f"{by_cluster}; see {output}"
     if not log.exists():
         reason = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
-        return f"{reason}; see {said}\n{last_words(store.home)}" if said.is_file() else reason
+        return f"{reason}; see {output}\n{last_words(store.home)}" if output.is_file() else reason
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     last = f'; last output: "{words[-1].strip()}"' if words else ""
     if shutil.disk_usage(store.home).free < LEAST_FREE:

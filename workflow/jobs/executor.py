@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
@@ -38,6 +38,14 @@ class Executor(Protocol):
     @property
     def oversubscribe(self) -> bool:
         """Whether MPI may have more ranks than cores."""
+
+    @property
+    def largest(self) -> int:
+        """Largest number of cores of a stage."""
+
+    @property
+    def cluster(self) -> "Slurm | None":
+        """The executor itself if it submits jobs to a cluster, None on this machine."""
 
     @property
     def options(self) -> Sequence[str]:
@@ -76,6 +84,15 @@ class Local:
     environment: dict[str, str] = field(default_factory=dict)
 
     @property
+    def largest(self) -> int:
+        """All cores: one stage may use them."""
+        return self.cores
+
+    @property
+    def cluster(self) -> None:
+        """None: stages run on this machine."""
+
+    @property
     def options(self) -> Sequence[str]:
         """Option with the number of cores."""
         return ("--cores", str(self.cores))
@@ -110,6 +127,11 @@ class Slurm:
     oversubscribe: bool = False
     # Snakemake cancels its jobs on SIGINT, which background processes of a script would ignore by default.
     guard: Sequence[str] = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
+
+    @property
+    def cluster(self) -> Self:
+        """This executor, which submits jobs to a cluster."""
+        return self
 
     @property
     def environment(self) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The cases of a package on a board: its joints reflowed; then the board dropped, where a shock is given."""
+"""Cases of a package on a board: reflow of its joints and, with a shock, drop of the board."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
     from reflowshock.particles.core.geometry import JointGeometry
 
-# Where solder overflows a sixth of the steps: tests/verification/test_particles_large_steps.py
+# Saves five sixths of the steps if solder overflows: tests/verification/test_particles_large_steps.py
 LARGE_STEPS = 100.0
 
 
@@ -55,7 +55,7 @@ HEATED = tuple(
     )
 )  # fmt: skip
 STRUCTURE_ROLES = tuple(f"materials.{role}" for role in ("board", "substrate", "die", "copper"))
-JUDGED_BY = ("shock.failure",)  # which changes no history: what was computed is judged again by other limits
+JUDGED_BY = ("shock.failure",)  # changes only the verdict, so histories stay valid
 COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
 
 
@@ -63,15 +63,15 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
     """Return the stages of a package on a board.
 
     Args:
-        heated: whether the reflow has temperatures: it then needs the mesh of board and package.
-        dropped: whether there is a shock.
+        heated: Whether the reflow has temperatures, and so needs the mesh of board and package.
+        dropped: Whether the case has a shock.
     """
     geometry = Stage(
         "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")
     )
     solid = ("reflow/shapes.h5", "reflow/joints.json", "reflow/pads.json")
     if heated:
-        last = () if dropped else COOLED  # what is reported of cooling, where no shock begins with it
+        last = () if dropped else COOLED  # without a shock, the reflow reports on cooling
         parameters = (*PADS, *HEATED, *STRUCTURE_ROLES, "solder", *last)
         reflow = Stage("reflow", parameters, ("geometry",), (*solid, "reflow/structure.npz"))
     else:
@@ -118,12 +118,15 @@ class PackageCase(Case):
 
     @property
     def pipeline(self) -> Pipeline:
-        """The stages: with temperatures, the reflow needs the mesh of board and package."""
+        """Stages of the package; with temperatures, the reflow needs the mesh of board and package."""
         return package_pipeline(heated=self.thermal is not None, dropped=False)
 
     @classmethod
     def completed(cls, table: dict) -> dict:
-        """With temperatures take large time steps: load steps are at rest, only the shape there counts."""
+        """Return the table with large time steps as default for a case with temperatures.
+
+        Its load steps end at rest, and only the shapes at rest are used.
+        """
         solder = table.get("solder")
         if "thermal" not in table or not isinstance(solder, dict):
             return table
@@ -133,7 +136,7 @@ class PackageCase(Case):
         return table | {"solder": solder | {"numerics": {"time_step_limit": LARGE_STEPS} | numerics}}
 
     def resolved(self) -> Self:
-        """With inertia, and without a scheme given, take ispg where it is verified: it costs less than tetrahedra."""
+        """Return the case with ispg, the cheapest scheme, if it names no scheme and ispg is verified for its joints."""
         from reflowshock.meshing.board.checks import problems
 
         if "scheme" in self.solder.numerics.model_fields_set:
@@ -146,7 +149,7 @@ class PackageCase(Case):
 
     @property
     def unverified(self) -> str | None:
-        """What of joints that can be drawn the scheme ispg is not verified for; None where it is."""
+        """Property of the joints that the scheme ispg is not verified for, as text; None if it is verified for all."""
         from reflowshock.particles.parameters.joint_checks import unverified_joints
 
         lowest = 0.0 if self.thermal is None else self.thermal.lowest_corner
@@ -154,25 +157,25 @@ class PackageCase(Case):
 
     @property
     def joints(self) -> "dict[str, JointGeometry]":
-        """Geometry of each joint, by name, where temperatures move nothing."""
+        """Geometry of each joint by name, without displacements by temperature."""
         from reflowshock.meshing.board.pads import pad_table
 
         return joint_geometries(pad_table(self.package, self.board, self.warpage))
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take files of surfaces as relative to the folder of the case file."""
+        """Resolve surface files relative to the folder of the case file."""
         return given_surfaces.located(table, folder)
 
     @property
     def ranks_by_key(self) -> dict[str, int]:
-        """MPI ranks of the reflow, too, if it has any."""
+        """MPI ranks by the key of the case file that sets them, including those of the reflow if it has any."""
         of_reflow = {"reflow.ranks": self.reflow.ranks} if self.reflow.ranks is not None else {}
         return super().ranks_by_key | of_reflow
 
     @property
     def files(self) -> dict[str, Path]:
-        """Surfaces of joints."""
+        """Files of joint surfaces by key."""
         return given_surfaces.files(self.package)
 
 
@@ -185,17 +188,17 @@ class BoardDropCase(PackageCase, BoardFittings):
 
     @property
     def cooled(self) -> bool:
-        """Whether shocks begin with the stress of cooling."""
+        """Whether shocks begin with the residual stress of cooling."""
         return self.thermal is not None and self.thermal.effects.residual_stress == "on"
 
     @property
     def pipeline(self) -> Pipeline:
-        """The stages: those of the package, then the shock."""
+        """Stages of the package, then the shock."""
         return package_pipeline(heated=self.thermal is not None, dropped=True)
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Take surfaces and the shock's table as relative to the folder of the case file."""
+        """Resolve surface files and the table of the shock relative to the folder of the case file."""
         shock = table.get("shock")
         if isinstance(shock, dict) and isinstance(shock.get("table"), str):
             shock["table"] = resolved_path(folder, shock["table"])
@@ -203,12 +206,12 @@ class BoardDropCase(PackageCase, BoardFittings):
 
     @property
     def files(self) -> dict[str, Path]:
-        """Surfaces of joints, and the shock's table."""
+        """Files of joint surfaces and of the table of the shock, by key."""
         return super().files | {key: path for key, (path, *_) in self.pulse_tables.items()}
 
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:
-        """The shock's table, if it has one."""
+        """Table of the shock by key: file, quantity, column; empty without one."""
         shock = self.shock
         return {} if shock.table is None else {"shock.table": (Path(shock.table), "acceleration", shock.table_column)}
 

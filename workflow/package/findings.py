@@ -22,7 +22,7 @@ Records = Mapping[str, Mapping[str, Any]]
 
 
 def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
-    """Return the number of joints and of hexahedra in each part."""
+    """Return the number of joints, and the number of hexahedra in each part, as metrics."""
     counts = {f"elements_{part}": metric(count) for part, count in elements.items()}
     return Findings(metrics={"joint_count": metric(joints), **counts})
 
@@ -32,6 +32,10 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
 
     Open joints and joints that lean too much for a coaxial reference are not compared. Joints with a given surface
     count only by width and bridging.
+
+    Args:
+        joints: Record of each joint, by name, from ``joints.json``.
+        effects: Decision on each effect of the reflow.
     """
     flowed = [joint for joint in joints.values() if "given" not in joint]
 
@@ -107,7 +111,11 @@ def _has_reference(metrics: Mapping[str, dict]) -> bool:
 
 
 def of_surface(surfaces: Records) -> Findings:
-    """Return metrics and checks of closed surfaces: volume error, and volume change of given surfaces."""
+    """Return metrics and checks of closed surfaces: volume error, and volume change of given surfaces.
+
+    Args:
+        surfaces: Measures of each surface, by name, from ``surfaces.json``.
+    """
     error = worst(surface["volume_error"] for surface in surfaces.values() if "given" not in surface)
     changes = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
     stretched = {"given_surface_volume_change_max": metric(worst(changes))} if changes else {}
@@ -118,7 +126,12 @@ def of_surface(surfaces: Records) -> Findings:
 
 
 def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any]) -> Findings:
-    """Return metrics and checks of joint meshes; ``qualities`` by kind (prefix of the metrics), then by joint."""
+    """Return metrics and checks of joint meshes: volume, scaled Jacobian, critical time step.
+
+    Args:
+        qualities: Quality by kind of mesh (prefix of the metrics), then by joint.
+        effects: Decision on each effect that adds joint meshes.
+    """
     metrics: dict[str, dict] = {}
     health: dict[str, dict] = {}
     for kind, quality in qualities.items():

@@ -17,7 +17,7 @@ KEY = "package.surfaces"
 
 
 def located(table: dict, folder: Path) -> dict:
-    """Resolve the paths of surface files relative to the folder of the case file."""
+    """Resolve, in place, the surface files of a case table relative to the folder of its file; return the table."""
     package = table.get("package")
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):

@@ -13,7 +13,7 @@ from reflowshock.fem.problem.failure import Failure, Life
 from reflowshock.workflow.case.text import SHOWN, number, quantity
 
 PASS, FAIL, NO_LIMIT = "PASS", "FAIL", "NO LIMIT"
-NAMED = 12  # joints that fail, in one sentence
+NAMED = 12  # failed joints that a sentence names at most
 MEASURES: dict[str, Measure] = {"peel_stress": PEEL, "layer_von_mises": VON_MISES, "layer_plastic_work": PLASTIC_WORK}
 WORDS = {"peel_stress": "peel", "layer_von_mises": "von Mises", "layer_plastic_work": "plastic work"}
 
@@ -22,28 +22,29 @@ def verdict_of(failure: Failure, history: Arrays, critical: str, coarse: Collect
     """Judge the joints of a run.
 
     Args:
-        failure: the limits, and the law of life.
-        history: of the run.
-        critical: the joint whose figures count where there is no limit.
-        coarse: joints that have the coarse mesh: their values are rough.
+        failure: Limits, and the law of life.
+        history: Arrays of ``history.npz`` of the run.
+        critical: Joint that is reported if the case sets no limits.
+        coarse: Joints with the coarse mesh, whose values are approximate.
 
     Returns:
-        ``design`` and ``joint``, which decides it; ``joints`` by name, each with its ``verdict`` by the ``criterion``
-        of least ``margin``, which is ``limit`` over ``value``; ``life``, the shortest of all joints, where there is a
-        law. A margin is None without a limit, and where the value is not positive.
+        Record of the verdict. ``design`` is the verdict on the package and ``joint`` the joint that decides it.
+        ``joints`` contains the ``verdict`` of each joint by the ``criterion`` with the smallest ``margin``, which is
+        ``limit`` over ``value``; the margin is None without a limit or a positive value. ``life`` is the shortest of
+        all joints, and is present only with a law of life.
     """
     names = [str(name) for name in history["joints"]]
     joints = {name: _of_joint(failure, history, column) for column, name in enumerate(names)}
-    joints = {name: found | ({"mesh": "coarse"} if name in coarse else {}) for name, found in joints.items()}
-    margins = {name: found["margin"] for name, found in joints.items() if found["margin"] is not None}
-    verdicts = {found["verdict"] for found in joints.values()}
+    joints = {name: joint | ({"mesh": "coarse"} if name in coarse else {}) for name, joint in joints.items()}
+    margins = {name: joint["margin"] for name, joint in joints.items() if joint["margin"] is not None}
+    verdicts = {joint["verdict"] for joint in joints.values()}
     design = next(word for word in (FAIL, PASS, NO_LIMIT) if word in verdicts or word == NO_LIMIT)
     law = {} if failure.life is None else {"life": _life(failure.life, history)}
     return {"design": design, "joint": min(margins, key=margins.__getitem__, default=critical), "joints": joints} | law
 
 
 def _of_joint(failure: Failure, history: Arrays, column: int) -> dict:
-    """Judge the joint in a column by the criterion of least margin."""
+    """Judge the joint in a column of the history by the criterion with the smallest margin."""
     judged = [
         _against(name, float(MEASURES[name].peaks(history)[column]), limit.limit) | {"source": limit.source}
         for name, limit in failure.limits.items()
@@ -51,41 +52,46 @@ def _of_joint(failure: Failure, history: Arrays, column: int) -> dict:
     if not judged:
         value = float(MEASURES["peel_stress"].peaks(history)[column])
         return {"criterion": "peel_stress", "value": value, "limit": None, "margin": None, "verdict": NO_LIMIT}
-    return min(judged, key=lambda found: float("inf") if found["margin"] is None else found["margin"])
+    return min(judged, key=lambda record: float("inf") if record["margin"] is None else record["margin"])
 
 
 def _against(criterion: str, value: float, limit: float) -> dict:
+    """Return the record of a value judged against a limit."""
     margin = limit / value if value > 0.0 else None
     verdict = PASS if value <= limit else FAIL
     return {"criterion": criterion, "value": value, "limit": limit, "margin": margin, "verdict": verdict}
 
 
 def _life(life: Life, history: Arrays) -> dict:
-    """Return drops to failure of the joint that fails first by the user's law, None where no measure is positive."""
+    """Return the drops to failure of the joint that fails first by the law of life; None if no measure is positive."""
     measure = MEASURES[life.measure]
     peaks = measure.peaks(history)
     column = int(np.argmax(peaks))
     value = float(peaks[column])
     drops, least, most = life.drops(SHOWN[measure.unit][0] * value) if value > 0.0 else (None, None, None)
-    told = {"joint": str(history["joints"][column]), "measure": life.measure, "value": value, "source": life.source}
-    return told | {"drops": drops, "least": least, "most": most}
+    record = {"joint": str(history["joints"][column]), "measure": life.measure, "value": value, "source": life.source}
+    return record | {"drops": drops, "least": least, "most": most}
 
 
 def answer(verdict: dict, error: float | None) -> str:
     """Return the verdict in one line.
 
     Args:
-        verdict: ``verdict_of``.
-        error: discretisation error of the deciding measure; None where it is not known.
+        verdict: Record of ``verdict_of``.
+        error: Relative discretisation error of the deciding measure; None if unknown.
     """
     joint = verdict["joints"][verdict["joint"]]
-    known = "not known, run reflowshock accuracy" if error is None else f"±{100.0 * error:.2g} %"
+    discretisation = "not known, run reflowshock accuracy" if error is None else f"±{100.0 * error:.2g} %"
     life = f"; {in_drops(verdict['life'])}" if "life" in verdict else ""
-    return f"{verdict['joint']}: {against_limit(joint)}, {joint['verdict']}{life}; discretisation {known}"
+    return f"{verdict['joint']}: {against_limit(joint)}, {joint['verdict']}{life}; discretisation {discretisation}"
 
 
 def failing(verdict: dict) -> str:
-    """Say which joints fail, the one of least margin first; empty where none does."""
+    """Return a sentence on the joints that fail, the smallest margin first; empty if none fails.
+
+    Args:
+        verdict: Record of ``verdict_of``.
+    """
     joints = verdict["joints"]
     failed = sorted((name for name in joints if joints[name]["verdict"] == FAIL), key=lambda k: joints[k]["margin"])
     if not failed:
@@ -96,7 +102,11 @@ def failing(verdict: dict) -> str:
 
 
 def against_limit(joint: dict) -> str:
-    """Write a joint's value of its limit, with the margin."""
+    """Format the value of a joint with its limit and margin.
+
+    Args:
+        joint: Record of a joint in ``verdict_of``; without a limit only the value is written.
+    """
     measure = MEASURES[joint["criterion"]]
     value, unit = _text(joint["value"], measure.unit)
     if joint["limit"] is None:
@@ -106,7 +116,11 @@ def against_limit(joint: dict) -> str:
 
 
 def in_drops(life: dict) -> str:
-    """Write a life with its scatter band."""
+    """Format a life with its scatter band, or as unlimited.
+
+    Args:
+        life: Record ``life`` of ``verdict_of``.
+    """
     if life["drops"] is None:
         return f"life unlimited, {life['measure'].replace('_', ' ')} is not positive"
     middle, least, most = (number(float(f"{life[name]:.2g}")) for name in ("drops", "least", "most"))
@@ -114,9 +128,9 @@ def in_drops(life: dict) -> str:
 
 
 def _text(value: float, unit: str) -> tuple[str, str]:
-    """Write a value with three digits, and its unit."""
-    factor, shown = SHOWN[unit]
-    return f"{factor * value:.3g}", shown
+    """Return a value with three digits, and its unit."""
+    factor, display_unit = SHOWN[unit]
+    return f"{factor * value:.3g}", display_unit
 
 
 def limits_table(failure: Failure) -> dict | None:

@@ -10,7 +10,7 @@ from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import resolved_path
-from reflowshock.workflow.structure.references import AnyReference, Record
+from reflowshock.workflow.structure.references import AnyReference
 
 MESH_KEYS = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
 MOTION_KEYS = ("structure", "materials", *Fittings.model_fields, "loads", "dynamics")
@@ -57,8 +57,8 @@ class StructureCase(StructureProblem, Case):
         }
         return loads | {
             f"references.{name}.table": (Path(record.table), "acceleration", record.table_column)
-            for name, record in self.references.items()
-            if isinstance(record, Record)
+            for name, reference in self.references.items()
+            if (record := reference.record) is not None
         }
 
     @property

@@ -83,7 +83,7 @@ def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return core time and wall time of the coupled run over those of the DNS, without start-up."""
+    """Return the ratios of core time and wall time of the coupled run to the DNS, without start-up, as metrics."""
     results = [
         json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
     ]

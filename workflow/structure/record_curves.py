@@ -1,4 +1,4 @@
-"""Charts of computed and recorded_acceleration accelerations, and of the response spectra of the inputs."""
+"""Charts of computed and recorded accelerations, and of the response spectra of the inputs."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,6 @@ from reflowshock.workflow.report.curves import GRAVITY, MILLI, TIME
 from reflowshock.workflow.report.spectra import spectrum_curves
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.records import recorded_acceleration
-from reflowshock.workflow.structure.references import Record
 
 Histories = Mapping[str, Mapping[str, NDArray]]
 
@@ -27,10 +26,10 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
     charts = []
     for name in next(iter(accelerations.values())):
         lines = [
-            Series("recorded", record.time / MILLI, record.filtered / GRAVITY, GREY)
+            Series("recorded", recorded.time / MILLI, recorded.filtered / GRAVITY, GREY)
             for reference in case.references.values()
-            if isinstance(reference, Record) and reference.watch == name
-            for record in [recorded_acceleration(case, reference, end)]
+            if (record := reference.record) is not None and record.watch == name
+            for recorded in [recorded_acceleration(case, record, end)]
         ]
         lines += [
             Series(x=computed[name].time / MILLI, y=computed[name].filtered / GRAVITY, **styles[solver])
@@ -43,7 +42,6 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
 def input_spectra(case: StructureCase) -> list[Chart]:
     """Return the shock response spectrum of every input-G over the duration of the run."""
     from reflowshock.fem.loads.structure_pulses import pulses_of
-    from reflowshock.fem.problem.load_kinds import InputG
 
-    inputs = {name: load for name, load in case.loads.items() if isinstance(load, InputG)}
+    inputs = {name: load for name, load in case.loads.items() if load.is_base_excitation}
     return spectrum_curves(pulses_of(inputs), case.dynamics.duration)

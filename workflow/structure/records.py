@@ -26,7 +26,13 @@ def recorded_acceleration(case: StructureCase, reference: Record, end: float):
 
 
 def compare_with_record(case: StructureCase, reference: Record, history: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return the peaks of a record and the relative differences of the computed peaks, as metrics."""
+    """Return the peaks of a record and the relative differences of the computed peaks, as metrics.
+
+    Args:
+        case: Case of a structure.
+        reference: Recorded acceleration at a watch point.
+        history: Arrays of ``history.npz`` of a solver.
+    """
     from reflowshock.fem.loads.structure_pulses import pulses_of
     from reflowshock.fem.output.acceleration import watch_accelerations
 
@@ -34,6 +40,6 @@ def compare_with_record(case: StructureCase, reference: Record, history: Mapping
     measured = recorded_acceleration(case, reference, float(history["time"][-1])).peaks_in_g(reference.watch)
     metrics = {f"measured_{name}": metric(value, "G") for name, value in measured.items()}
     for name, value in computed.peaks_in_g(reference.watch).items() if computed else ():
-        what, _, where = name.partition("@")
-        metrics[f"{what}_difference@{where}"] = metric(value / measured[name] - 1.0)
+        quantity, _, location = name.partition("@")
+        metrics[f"{quantity}_difference@{location}"] = metric(value / measured[name] - 1.0)
     return metrics

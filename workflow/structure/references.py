@@ -5,11 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.fem.problem.load_kinds import Pressure
+from reflowshock.fem.problem.load_kinds import AnyLoad
 from reflowshock.fem.problem.structure import StructureProblem
-from reflowshock.names import nearest
 from reflowshock.parameters import Parameters
-from reflowshock.problem import Problem
+from reflowshock.problem import Problem, unknown_name
 from reflowshock.quantity import Quantity
 
 
@@ -17,8 +16,23 @@ class Reference(Parameters):
     """Base of all references: immutable, unknown keys are errors."""
 
     def problems(self, key: str, problem: StructureProblem) -> Iterator[Problem]:
-        """Check the reference against the rest of the case; ``key`` is its table in the case file."""
+        """Yield contradictions to the rest of the case.
+
+        Args:
+            key: Dotted key of the reference's table in the case file.
+            problem: Structure with its layers, watch points, loads and solver.
+        """
         yield from ()
+
+    @property
+    def record(self) -> "Record | None":
+        """The reference itself if it is a recorded acceleration, otherwise None."""
+        return None
+
+    @property
+    def published(self) -> "Published | None":
+        """The reference itself if it is a published value, otherwise None."""
+        return None
 
 
 class BarWave(Reference):
@@ -100,6 +114,11 @@ class Published(Reference):
     value: str
     source: str
 
+    @property
+    def published(self) -> "Published":
+        """The reference itself."""
+        return self
+
 
 class Record(Reference):
     """Recorded acceleration at a watch point (CSV file in the format of load tables), with the filter of the run."""
@@ -112,6 +131,11 @@ class Record(Reference):
     def problems(self, key: str, problem: StructureProblem) -> Iterator[Problem]:
         """Check that the watch point exists."""
         yield from _existing(f"{key}.watch", self.watch, problem.watch, "watch point")
+
+    @property
+    def record(self) -> "Record":
+        """The reference itself."""
+        return self
 
 
 AnyReference = Annotated[
@@ -142,31 +166,37 @@ def _heights(key: str, reference: BarWave | LayeredBar, problem: StructureProble
 def _pressure(key: str, name: str, problem: StructureProblem, pulse: str) -> Iterator[Problem]:
     yield from _existing(key, name, problem.loads, "load")
     load = problem.loads.get(name)
-    if load is not None and not (isinstance(load, Pressure) and load.peak is not None and load.pulse == pulse):
+    if load is not None and not (_is_pressure(load) and load.peak is not None and load.pulse == pulse):
         yield Problem(key, f"is not a {pulse} pressure given by its peak", name, f'a pressure with pulse = "{pulse}"')
 
 
 def _pulse(key: str, name: str, problem: StructureProblem) -> Iterator[Problem]:
     yield from _existing(key, name, problem.loads, "load")
     load = problem.loads.get(name)
-    if load is not None and not (isinstance(load, Pressure) and load.on == "z_min" and _ends(load)):
+    if load is not None and not (_is_pressure(load, "z_min") and _ends(load)):
         yield Problem(
             key, "is not a pulse of pressure on z_min", name, "a pressure on z_min with a duration or a table"
         )
 
 
-def _ends(load: Pressure) -> bool:
+def _is_pressure(load: AnyLoad, on: str | None = None) -> bool:
+    """Return whether a load is a pressure on a facet set, or on any facet set if ``on`` is None."""
+    return load.quantity == "pressure" and on in (None, load.facet_set)
+
+
+def _ends(load: AnyLoad) -> bool:
+    """Return whether a load has an end: a duration, or a table."""
     return load.table is not None or load.duration is not None
 
 
-def _existing(key: str, name: str, names: dict, what: str) -> Iterator[Problem]:
-    if name not in names:
-        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
+def _existing(key: str, name: str, names: dict, noun: str) -> Iterator[Problem]:
+    """Yield the problem of an unknown watch point or load, called ``noun``."""
+    return unknown_name(key, name, names, noun)
 
 
 def _layers(key: str, count: int, problem: StructureProblem) -> Iterator[Problem]:
     layers = len(problem.structure.layers)
     if layers != count:
         yield Problem(
-            f"{key}.kind", f"there is no exact solution for {layers} layers", None, f"{count} in structure.layers"
+            f"{key}.kind", f"the exact solution does not cover {layers} layers", None, f"{count} in structure.layers"
         )

@@ -18,7 +18,6 @@ from reflowshock.workflow.report.tables import costs
 from reflowshock.workflow.structure.case import StructureCase
 from reflowshock.workflow.structure.findings import read_history, read_modes
 from reflowshock.workflow.structure.record_curves import acceleration_curves, input_spectra
-from reflowshock.workflow.structure.references import Published
 from reflowshock.workflow.structure.stages import read_results
 
 SOLVER_STYLE: dict[str, dict[str, Any]] = {
@@ -114,16 +113,16 @@ def headline(metrics: dict) -> list[dict]:
 
 def label(name: str) -> str:
     """Return the name of a metric as readable text."""
-    what, _, where = name.partition("@")
-    return what.replace("_", " ") + (f" at {where}" if where else "")
+    quantity_name, _, location = name.partition("@")
+    return quantity_name.replace("_", " ") + (f" at {location}" if location else "")
 
 
 def text(name: str, metric: dict) -> str:
     """Format the value of a metric: errors and differences in per cent, strains in microstrain."""
-    what = name.partition("@")[0]
-    if what.endswith(FRACTIONS):
+    quantity_name = name.partition("@")[0]
+    if quantity_name.endswith(FRACTIONS):
         return percent(metric["value"])
-    if what.endswith("strain"):
+    if quantity_name.endswith("strain"):
         return f"{1e6 * metric['value']:.0f} µm/m"
     is_short = metric["unit"] == "m" and 0.0 < metric["value"] < SHORTEST_IN_MM
     return f"{number(1e6 * metric['value'])} µm" if is_short else quantity(metric)
@@ -148,13 +147,13 @@ def published_table(case: StructureCase, metrics: dict) -> dict | None:
     """Return a table of computed and published values, or None without published values."""
     rows = [
         [
-            label(reference.metric),
-            text(reference.metric, metrics[reference.metric]) if reference.metric in metrics else "–",
-            reference.value,
-            reference.source,
+            label(published.metric),
+            text(published.metric, metrics[published.metric]) if published.metric in metrics else "–",
+            published.value,
+            published.source,
         ]
         for reference in case.references.values()
-        if isinstance(reference, Published)
+        if (published := reference.published) is not None
     ]
     return {"head": ["quantity", "computed", "published", "source"], "rows": rows} if rows else None
 
