@@ -1,5 +1,6 @@
 """Physics of a liquid body: forces, operators, events and constraints of the active effects."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -26,6 +27,16 @@ class Force(Protocol):
 
     def force(self, body: Body) -> Floats:
         """Return the force -dE/dx, shape (n, 3) [N]: the exact negative gradient of ``energy``."""
+
+
+class BodyForce(ABC):
+    """Force on the volume of the liquid, applied as an equal load on its surface."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def hydrostatic_pressure(self, points: Floats) -> Floats:
+        """Return the pressure whose gradient balances the force, which the solver does not see, shape (n,) [Pa]."""
 
 
 class Operator(Protocol):

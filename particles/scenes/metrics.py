@@ -16,7 +16,7 @@ from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
-from reflowshock.particles.physics.physics import Force, plate_wrench
+from reflowshock.particles.physics.physics import BodyForce, Force, plate_wrench
 from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
@@ -155,7 +155,11 @@ def _reference_weight(flow: LiquidFlow) -> float | None:
 def particle_pressure(flow: LiquidFlow) -> Floats:
     """Pressure of the particles above ambient `(n,)` [Pa], with the hydrostatic part that acts as a surface force."""
     body = flow.body.whole()
-    return body.pressure - _weight(flow) * body.points[:, 2]
+    pressure = body.pressure
+    for force in flow.physics.forces:
+        if isinstance(force, BodyForce):
+            pressure = pressure + force.hydrostatic_pressure(body.points)
+    return pressure
 
 
 def contact_radius(body: Body, wall: int) -> float:
