@@ -43,8 +43,8 @@ test-golden: setup  ## run all cases with this checkout and the commit BASE; res
 test-mpi: setup  ## run the tests that start several MPI ranks
 	$(PYTHON) -m pytest tests/mpi
 
-lint: setup  ## ruff, mypy, import rules
-	$(PYTHON) -m pytest tests/unit/test_code.py
+lint: setup  ## ruff, mypy, import rules, wording
+	$(PYTHON) -m pytest tests/unit/test_code.py tests/unit/test_writing.py
 
 docs: setup  ## build the site: build/docs/html/index.html
 	@$(PYTHON) -c 'import furo, myst_nb, sphinx_copybutton' 2>/dev/null || \

@@ -3,6 +3,7 @@
 Nothing is computed here. Figures come from ``benchmarks/results/*.json`` and ``cases/*/accuracy.json``.
 """
 
+import ast
 import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -18,11 +19,12 @@ LONGEST_LIST = 60  # rows of a table; longer lists are data, not tables
 def benchmark_tables() -> Iterator[str]:
     """Yield a section for each stored benchmark: purpose, conditions and figures."""
     yield from ("# Results of benchmarks", "")
-    yield "The last measurement of each script in [benchmarks](../../benchmarks/README.md). The load is the number of"
-    yield from ("processes that want a core, averaged over five minutes, at the start and the end.", "")
+    yield "The last measurement of each script in [benchmarks](../../benchmarks/README.md). The load is the mean"
+    yield from ("number of runnable processes over five minutes, at the start and the end.", "")
     for path in sorted((ROOT / "benchmarks/results").glob("*.json")):
         stored = json.loads(path.read_text())
-        yield from (f"## {path.stem}", "", f"*{_conditions(stored['conditions'])}*", "")
+        yield from (f"## {_words(path.stem).capitalize()}", "", _purpose(path.stem), "")
+        yield from (f"*{_conditions(stored['conditions'])}*", "")
         yield from _tables(stored["figures"], path.stem)
 
 
@@ -49,6 +51,13 @@ def table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> Iterator[str]
         yield ""
 
 
+def _purpose(script: str) -> str:
+    """Return the first paragraph of the docstring of a benchmark, with the name of its file."""
+    source = ROOT / f"benchmarks/{script}.py"
+    words = (ast.get_docstring(ast.parse(source.read_text())) or "") if source.exists() else ""
+    return f"`{script}.py`: " + " ".join(words.partition("\n\n")[0].split())
+
+
 def _conditions(conditions: dict[str, Any]) -> str:
     """Return date, machine and load as one line."""
     loads = (conditions["load_at_start"], conditions["load_at_end"])
@@ -66,7 +75,8 @@ def _tables(figures: Any, title: str) -> Iterator[str]:
         rows = _rows(value)
         if rows:
             columns = list(dict.fromkeys(column for row in rows for column in row))
-            yield from (f"**{_words(name)}**", "")
+            if name != "rows":
+                yield from (f"**{_words(name)}**", "")
             yield from table(map(_words, columns), (tuple(_text(row.get(c)) for c in columns) for row in rows))
         elif isinstance(value, dict) and value:
             yield from (f"**{_words(name)}**", "")

@@ -104,7 +104,7 @@ def effects() -> Iterator[str]:
 def figures() -> Iterator[str]:
     """Yield fitted orders, results of each case, and the tests against exact or independent solutions."""
     yield from ("# Figures of validation", "", "## Orders of convergence", "")
-    yield "Fitted by `reflowshock accuracy`, stored in `accuracy.json` of the case: error(h) = C h^order."
+    yield "Fitted by `reflowshock accuracy`, stored in `accuracy.json` of the case: $e(h) = C h^p$ with the order $p$."
     yield from ("", *table(("case", "parameter", "error", "order", "theory"), _orders()))
     yield from ("## Results of the cases", "")
     for path in CASES:
