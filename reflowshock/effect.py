@@ -38,7 +38,7 @@ class Toggle:
 
 
 class Effect(ABC, Generic[Scene]):
-    """Effect of the model. Effects without a ``place`` are loads or parts of the method and not listed.
+    """Effect of the model. Effects without an ``implementation`` are loads or parts of the method and not listed.
 
     Attributes:
         name: Name in plans, reports and ``summary.json``.
@@ -46,7 +46,7 @@ class Effect(ABC, Generic[Scene]):
         adds: Term that it adds to the equations.
         number: Dimensionless number that decides on it.
         influence: Expected relative change of the result, as a formula of the number.
-        place: Dotted name of the object that acts, or of the function that decides.
+        implementation: Dotted name of the object that acts, or of the function that decides.
         switch: Key of the case file, and its values.
         source: Source of the number or the law.
         acts: Whether it acts above or below the threshold.
@@ -59,7 +59,7 @@ class Effect(ABC, Generic[Scene]):
     adds: str = ""
     number: str = GIVEN
     influence: str = ""
-    place: str = ""
+    implementation: str = ""
     switch: str = ""
     source: str = ""
     acts: Literal["above", "below"] = "above"

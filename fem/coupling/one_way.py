@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.coupling.held_velocity import VelocityFollower
 from reflowshock.fem.dynamics.participant import SingleModel, explicit_motion
 from reflowshock.fem.estimates.estimate import WindowPlan
-from reflowshock.fem.loads.load import Kept, Load
+from reflowshock.fem.loads.load import Checkpointed, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
@@ -56,7 +56,7 @@ class Driver(SingleModel):
 class InterfaceWork(Load):
     """Work that moves the interface of a submodel [J]."""
 
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum"}
     work: float = 0.0
 
 

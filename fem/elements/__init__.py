@@ -1,1 +1,1 @@
-"""The family of elements."""
+"""Finite elements: geometry, stiffness, lumped mass and critical time step; start with `element.py`."""

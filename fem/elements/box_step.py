@@ -1,4 +1,4 @@
-"""Critical step of the elements into which a box is cut: known before anything is meshed."""
+"""Critical time step of the elements of a box, computed before anything is meshed."""
 
 from itertools import permutations
 
@@ -15,9 +15,14 @@ NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 
 def box_element_step(element: str, formulation: str, material: Material, size: NDArray[np.float64]) -> float:
-    """Return the smallest element critical step [s] of a box with edges ``size (3,)`` [m], cut into elements.
+    """Return the smallest critical time step [s] of the elements into which a box is divided.
 
-    Tetrahedra are the six around a diagonal of the box; those of a mesh may share its other diagonals.
+    Args:
+        element: Hexahedron, tetrahedron or tetrahedron_quadratic. The six tetrahedra share one diagonal of the box; a
+            mesh may use another one.
+        formulation: Formulation of hexahedra, see ``element.element_kind``.
+        material: Material with axes along x, y and z.
+        size: Edge lengths of the box, shape (3,) [m].
     """
     points, cells = (CORNERS, np.arange(8)[None]) if element == "hexahedron" else diagonal_tetrahedra()
     if element == "tetrahedron_quadratic":
@@ -35,7 +40,7 @@ def box_element_step(element: str, formulation: str, material: Material, size: N
 
 
 def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Cut the unit cube into the six tetrahedra around its diagonal (Kuhn): one path along its edges each."""
+    """Return points ``(8, 3)`` and cells ``(6, 4)`` of the unit cube cut into six tetrahedra at a diagonal (Kuhn)."""
     cells = np.array([[0, 1 << a, 1 << a | 1 << b, 7] for a, b, _ in permutations(range(3))])
     edges = CORNERS[cells[:, 1:]] - CORNERS[cells[:, :1]]
     inside_out = np.linalg.det(edges) < 0.0
@@ -46,7 +51,7 @@ def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 def with_middle_nodes(
     points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Add the middle of every edge; nodes of neighbours are not joined, for the step that does not matter."""
+    """Return points and 10-node cells with edge midpoints, not shared by neighbours, which the step does not need."""
     middles = points[cells[:, EDGES]].mean(axis=2)
     numbers = len(points) + np.arange(middles.shape[0] * middles.shape[1]).reshape(middles.shape[:2])
     return np.concatenate([points, middles.reshape(-1, 3)]), np.concatenate([cells, numbers], axis=1)

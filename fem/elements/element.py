@@ -17,15 +17,15 @@ CHUNK = 2048  # elements whose matrices are in memory at a time (hexahedra: 9 Mi
 
 @dataclass(frozen=True, slots=True)
 class Elements:
-    """Elements and their materials.
+    """Elements of one kind and their materials.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        cells: ``(ne, k)`` int32; node order as in DOLFINx, tensor order for hexahedra.
-        material: ``(ne,)`` int32, index into ``elasticity``.
-        elasticity: ``(nm, 6, 6)`` [Pa].
-        density: ``(ne,)`` [kg/m^3].
-        kind: What the elements are.
+        points: Nodes, shape (n, 3) [m].
+        cells: Nodes of each element, shape (ne, k) int32; order as in DOLFINx, tensor order for hexahedra.
+        material: Index of each element into ``elasticity``, shape (ne,) int32.
+        elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
+        density: Density of each element, shape (ne,) [kg/m^3].
+        kind: Kind of element.
     """
 
     points: NDArray[np.float64]
@@ -36,19 +36,23 @@ class Elements:
     kind: ElementKind = HEXAHEDRON
 
     def subset(self, chosen: NDArray[np.bool_] | NDArray[np.integer]) -> "Elements":
-        """Return some of the elements on the same points."""
+        """Return some of the elements, by mask or indices, with the same points."""
         return replace(self, cells=self.cells[chosen], material=self.material[chosen], density=self.density[chosen])
 
 
 def element_kind(nodes: int, formulation: str = HEXAHEDRON.name) -> ElementKind:
-    """Return the kind of elements with so many nodes; only hexahedra have more than one formulation."""
+    """Return the kind of element by its number of nodes and, for hexahedra, its formulation."""
     if nodes == HEXAHEDRON.nodes:
         return {kind.name: kind for kind in (HEXAHEDRON, ONE_POINT)}[formulation]
     return {kind.nodes: kind for kind in (TETRAHEDRON, TETRAHEDRON_QUADRATIC)}[nodes]
 
 
 def element_geometry(points: NDArray[np.float64], cells: NDArray[np.int32]) -> Geometry:
-    """Integrate over elements; all formulations with the same nodes have the same integrals.
+    """Return the integrals over elements; formulations with the same nodes share them.
+
+    Args:
+        points: Nodes, shape (n, 3) [m].
+        cells: Nodes of each element, shape (ne, k).
 
     Raises:
         MeshError: An element is turned inside out.
@@ -71,7 +75,7 @@ def element_stiffness(elements: Elements) -> NDArray[np.float64]:
 
 
 def lumped_mass(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the lumped mass ``(n,)`` [kg] from the nodes' shares ``(ne, k)`` [m^3] in the volumes."""
+    """Return the lumped mass ``(n,)`` [kg] from the volume of each node in each element ``(ne, k)`` [m^3]."""
     mass = np.zeros(len(elements.points))
     np.add.at(mass, elements.cells, elements.density[:, None] * nodal_volume)
     return mass
@@ -82,15 +86,15 @@ def critical_steps(
     nodal_volume: NDArray[np.float64],
     stiffness: Callable[[Elements], NDArray[np.float64]] = element_stiffness,
 ) -> NDArray[np.float64]:
-    """Return the critical time step of each element on its own: ``(ne,)`` [s], 2 / omega_max of M_e^-1 K_e.
+    """Return the critical time step of each single element, 2 / omega_max of M_e^-1 K_e, shape (ne,) [s].
 
-    No assembled model has a smaller one (Irons' bound); this holds for tied nodes too, whose weights are not negative.
-    Elements of equal shape and material are computed once.
+    Their minimum bounds the critical step of an assembled model from below (Irons' bound), also with tied nodes, whose
+    weights are not negative. Elements of equal shape and material are computed once.
 
     Args:
-        elements: The elements.
-        nodal_volume: ``(ne, k)`` [m^3] shares of the nodes.
-        stiffness: Returns the stiffness ``(ne, 3k, 3k)`` [N/m] of elements.
+        elements: Elements of one kind.
+        nodal_volume: Volume of each node in each element, shape (ne, k) [m^3].
+        stiffness: Function that returns the stiffness of elements, shape (ne, 3k, 3k) [N/m].
     """
     first, shape = classes(elements)
     frequency = np.empty(len(first))
@@ -103,11 +107,11 @@ def critical_steps(
 
 
 def classes(elements: Elements) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Group elements that are translations of each other, of one material and density.
+    """Group elements that are translations of each other, with equal material and density.
 
     Returns:
-        One element of each class, and the class of each element ``(ne,)`` int32. Shapes are equal within 1e-12 of the
-        model's extent.
+        One element of each class, and the class of each element, shape (ne,) int32. Shapes count as equal within 1e-12
+        of the extent of the model.
     """
     corners = elements.points[elements.cells]
     extent = float(np.ptp(elements.points, axis=0).max())

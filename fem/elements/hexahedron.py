@@ -1,4 +1,4 @@
-"""The 8-node hexahedron with incompatible modes, fully integrated. Nodes in tensor order."""
+"""Fully integrated 8-node hexahedron with incompatible modes; nodes in tensor order."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from reflowshock.fem.kernels import hexahedron as kernels_hexahedron
 
 @dataclass(frozen=True, slots=True)
 class IncompatibleModes:
-    """The default hexahedron; see ``kernels.hexahedron.stiffness``."""
+    """Hexahedron with incompatible modes, the default; see ``kernels.hexahedron.stiffness``."""
 
     name: str = "incompatible_modes"
     nodes: int = 8
@@ -26,7 +26,7 @@ class IncompatibleModes:
     def stiffness(
         self, corners: NDArray[np.float64], elasticity: NDArray[np.float64], material: NDArray[np.int32]
     ) -> NDArray[np.float64]:
-        """Return the condensed stiffness ``(ne, 24, 24)`` [N/m]."""
+        """Return the stiffness ``(ne, 24, 24)`` [N/m] with the incompatible modes condensed."""
         result = np.empty((len(corners), 24, 24))
         kernels_hexahedron.stiffness(corners, elasticity, material, result)
         return result

@@ -1,4 +1,4 @@
-"""The contract of the element family: what the rest of the program asks of a kind of element."""
+"""Interface of the kinds of elements."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,9 +14,9 @@ class Geometry:
     """Integrals over elements of k nodes.
 
     Attributes:
-        nodal_volume: ``(ne, k)`` [m^3] share of each node in the volume, positive; times density the lumped mass.
-        gradient: ``(ne, k, 3)`` [1/m] volume average of each shape function's gradient; gives the average strain.
-        lowest: ``(ne,)`` [m^3] smallest Jacobian determinant at the points where it was looked at.
+        nodal_volume: Positive volume of each node, shape (ne, k) [m^3]; times density it is the lumped mass.
+        gradient: Volume average of the gradient of each shape function, shape (ne, k, 3) [1/m]; gives the mean strain.
+        lowest: Smallest Jacobian determinant at the integration points, shape (ne,) [m^3].
     """
 
     nodal_volume: NDArray[np.float64]
@@ -25,45 +25,42 @@ class Geometry:
 
     @property
     def volume(self) -> NDArray[np.float64]:
-        """Return ``(ne,)`` [m^3]."""
+        """Volume of each element, shape (ne,) [m^3]."""
         return self.nodal_volume.sum(axis=1)
 
 
 class ElementKind(Protocol):
-    """A kind of element: its integrals and its linear stiffness."""
+    """Kind of element with its integrals and its linear stiffness."""
 
     @property
     def name(self) -> str:
-        """Return what case files call it."""
+        """Name in case files."""
 
     @property
     def nodes(self) -> int:
-        """Return the number of nodes of an element, k."""
+        """Number of nodes of an element, k."""
 
     @property
     def hourglass(self) -> bool:
-        """Return whether a part of the stiffness resists modes that the integration points do not see."""
+        """Whether part of the stiffness is hourglass control, for modes without strain at the integration points."""
 
     def geometry(self, corners: NDArray[np.float64]) -> Geometry:
-        """Return the integrals over elements with nodes at ``corners (ne, k, 3)`` [m], also of inverted ones."""
+        """Return the integrals over elements with nodes at ``corners (ne, k, 3)`` [m]; inverted ones raise no error."""
 
     def stiffness(
         self, corners: NDArray[np.float64], elasticity: NDArray[np.float64], material: NDArray[np.int32]
     ) -> NDArray[np.float64]:
-        """Return the stiffness of each element, unknowns node by node.
+        """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element, with unknowns node by node.
 
         Args:
-            corners: ``(ne, k, 3)`` [m].
-            elasticity: ``(nm, 6, 6)`` [Pa].
-            material: ``(ne,)`` index into ``elasticity``.
-
-        Returns:
-            ``(ne, 3k, 3k)`` [N/m].
+            corners: Nodes of each element, shape (ne, k, 3) [m].
+            elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
+            material: Index of each element into ``elasticity``, shape (ne,).
         """
 
 
 def strain_matrix(gradient: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return B of strain = B u, from gradients ``(..., k, 3)`` [1/m]: ``(..., 6, 3k)``, u node by node."""
+    """Return B of strain = B u, shape (..., 6, 3k) with u node by node, from gradients ``(..., k, 3)`` [1/m]."""
     *outer, nodes, _ = gradient.shape
     matrix = np.zeros((*outer, 6, nodes, 3))
     for row, component, direction in DERIVATIVES:

@@ -1,7 +1,4 @@
-"""Energy of the mean strains of elements: what is left of the strain energy is the hourglass control's.
-
-The hourglass energy in the balance is what the mean strains do not hold.
-"""
+"""Energy of the mean strains of elements; the rest of the strain energy is the hourglass energy."""
 
 from dataclasses import dataclass
 
@@ -14,13 +11,13 @@ from reflowshock.fem.elements.stress import mean_strain
 
 @dataclass(frozen=True, slots=True)
 class MeanStrain:
-    """The one-point part of elements, one entry a shape and material.
+    """Mean strains of elements, with one entry per class of equal shape and material.
 
     Attributes:
-        cells: ``(ne, k)`` int32.
-        shape: ``(ne,)`` int32, class of each element.
-        gradient: ``(ns, k, 3)`` [1/m] mean gradients.
-        rigidity: ``(ns, 6, 6)`` [J] volume times elasticity.
+        cells: Nodes of each element, shape (ne, k) int32.
+        shape: Class of each element, shape (ne,) int32.
+        gradient: Mean gradients of the shape functions of each class, shape (ns, k, 3) [1/m].
+        rigidity: Volume times elasticity of each class, shape (ns, 6, 6) [J].
     """
 
     cells: NDArray[np.int32]
@@ -30,7 +27,7 @@ class MeanStrain:
 
     @classmethod
     def of(cls, elements: Elements) -> "MeanStrain | None":
-        """Return the mean strains of elements with hourglass control, None for elements without."""
+        """Return the mean strains of elements with hourglass control, or None for elements without it."""
         if not elements.kind.hourglass:
             return None
         first, shape = classes(elements)

@@ -1,4 +1,4 @@
-"""The elements of a mesh with the materials of its parts."""
+"""Elements of a mesh with the materials of its parts."""
 
 from collections.abc import Sequence
 
@@ -18,14 +18,14 @@ def elements_of(
     materials: Sequence[Material],
     formulation: str = HEXAHEDRON.name,
 ) -> Elements:
-    """Give cells the elements and the materials of their parts.
+    """Return the elements of cells with the materials of their parts.
 
     Args:
-        points: ``(n, 3)`` [m].
-        cells: ``(ne, k)`` nodes.
-        part: ``(ne,)`` part of each cell.
+        points: Nodes, shape (n, 3) [m].
+        cells: Nodes of each cell, shape (ne, k).
+        part: Part of each cell, shape (ne,).
         materials: Material of each part.
-        formulation: Of hexahedra, see ``element.element_kind``.
+        formulation: Formulation of hexahedra, see ``element.element_kind``.
     """
     return Elements(
         points=points,

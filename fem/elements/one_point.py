@@ -1,9 +1,9 @@
-"""The 8-node hexahedron with one-point strain and stiffness hourglass control.
+"""One-point 8-node hexahedron with stiffness hourglass control.
 
-A nodal field is its affine part with the mean gradient plus the rest, the hourglass part P u. The mean strain gives
-V B^T C B; the hourglass part is resisted by the incompatible-modes stiffness restricted to it, K_h = P^T K P. Because K
-passes the patch test, its affine and hourglass parts do not couple, so that coefficient 1 gives K back exactly, on any
-shape: linear bodies lose nothing, and non-linear ones need the material law at one point only.
+A nodal field is the sum of its affine part with the mean gradient and its hourglass part P u. The mean strain gives the
+stiffness V B^T C B; the hourglass part has the incompatible-modes stiffness restricted to it, K_h = P^T K P. Because K
+passes the patch test, affine and hourglass parts do not couple, so coefficient 1 reproduces K exactly on any shape:
+linear results do not change, and nonlinear elements evaluate the material law at one point only.
 Modes as in Flanagan & Belytschko, IJNME 17 (1981), with mean gradients; their amplitudes are q = gamma^T u.
 """
 
@@ -34,7 +34,7 @@ class OnePoint:
     hourglass: bool = True
 
     def geometry(self, corners: NDArray[np.float64]) -> Geometry:
-        """Integrate as ``IncompatibleModes`` does: the mean gradients are exact volume averages."""
+        """Return the integrals of ``IncompatibleModes``; the mean gradients are exact volume averages."""
         return HEXAHEDRON.geometry(corners)
 
     def stiffness(
@@ -54,13 +54,14 @@ def hourglass_control(
     """Return the hourglass modes of hexahedra and their stiffness.
 
     Args:
-        corners: ``(ne, 8, 3)`` [m].
-        elasticity: ``(nm, 6, 6)`` [Pa].
-        material: ``(ne,)`` index into ``elasticity``.
+        corners: Nodes of each element, shape (ne, 8, 3) [m].
+        elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
+        material: Index of each element into ``elasticity``, shape (ne,).
 
     Returns:
-        gamma ``(ne, 8, 4)``, orthogonal to affine fields: amplitudes ``q_ki = sum_a gamma_ak u_ai``; and the symmetric
-        stiffness ``(ne, 12, 12)`` [N/m] on them, index 3k + i. Force of a node: ``f_ai = sum_k gamma_ak (H q)_ki``.
+        Modes gamma, shape (ne, 8, 4), orthogonal to affine fields, with amplitudes ``q_ki = sum_a gamma_ak u_ai``; and
+        the symmetric stiffness H of the amplitudes, index 3k + i, shape (ne, 12, 12) [N/m]. The nodal force is
+        ``f_ai = sum_k gamma_ak (H q)_ki``.
     """
     gradient = HEXAHEDRON.geometry(corners).gradient
     gamma = HOURGLASS - gradient @ (corners.transpose(0, 2, 1) @ HOURGLASS)
@@ -72,11 +73,11 @@ def hourglass_control(
 
 
 def transformed(left: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (left x 1) matrix (left x 1)^T for vectors of three components per row: ``(ne, 3m, 3m)``.
+    """Return A matrix A^T with A the Kronecker product of ``left`` and the 3 x 3 identity, shape (ne, 3m, 3m).
 
     Args:
-        left: ``(ne, m, n)``.
-        matrix: ``(ne, 3n, 3n)``.
+        left: Transformation of nodal values, shape (ne, m, n).
+        matrix: Matrix with three components per node, shape (ne, 3n, 3n).
     """
     count, rows, columns = left.shape
     wide = np.einsum("emn,ij->eminj", left, np.eye(3)).reshape(count, 3 * rows, 3 * columns)

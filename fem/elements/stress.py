@@ -1,15 +1,15 @@
-"""Stress and strain from displacements, consistent with the element: mean gradients give its average strain."""
+"""Stress and strain from displacements; the mean gradients of an element give its average strain."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def mean_strain(gradient: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the average strain of elements ``(m, 6)``, shear as engineering strain.
+    """Return the average strain of elements ``(m, 6)`` (xx yy zz xy yz xz), with engineering shear strain.
 
     Args:
-        gradient: ``(m, k, 3)`` [1/m] mean gradients.
-        displacement: ``(m, k, 3)`` [m] at the nodes.
+        gradient: Mean gradients of the shape functions, shape (m, k, 3) [1/m].
+        displacement: Displacement of the nodes, shape (m, k, 3) [m].
     """
     h = np.einsum("mai,maj->mij", displacement, gradient)
     return np.stack(
@@ -24,9 +24,9 @@ def element_stress(
     """Return the average stress of elements ``(m, 6)`` [Pa].
 
     Args:
-        gradient: ``(m, k, 3)`` [1/m] mean gradients.
-        elasticity: ``(m, 6, 6)`` [Pa].
-        displacement: ``(m, k, 3)`` [m] at the nodes.
+        gradient: Mean gradients of the shape functions, shape (m, k, 3) [1/m].
+        elasticity: Elasticity of each element, shape (m, 6, 6) [Pa].
+        displacement: Displacement of the nodes, shape (m, k, 3) [m].
     """
     return np.einsum("mij,mj->mi", elasticity, mean_strain(gradient, displacement))
 
@@ -54,11 +54,11 @@ def voigt(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest and the smallest in-plane principal strain at the centres of facets normal to z: ``(2, f)``.
+    """Return the largest and the smallest in-plane principal strain ``(2, f)`` at the centres of facets normal to z.
 
     Args:
-        corners: ``(f, 4, 2)`` [m], cyclic.
-        displacement: ``(f, 4, 2)`` [m].
+        corners: In-plane corners in cyclic order, shape (f, 4, 2) [m].
+        displacement: In-plane displacement of the corners, shape (f, 4, 2) [m].
     """
     tangent = np.array([[-0.25, -0.25], [0.25, -0.25], [0.25, 0.25], [-0.25, 0.25]])
     jacobian = np.einsum("fai,ad->fid", corners, tangent)

@@ -7,20 +7,21 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.kind import Geometry, strain_matrix
 
-EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # of the middle nodes 4 to 9
+EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # vertices of the edges of the middle nodes 4 to 9
 # Vertices and face centroids in barycentric coordinates, weights of volume 1/6: exact for cubics (Stroud 1971, T3:3-3),
-# so that curved elements pass the patch test; the vertices show where an element is turned inside out.
+# so that curved elements pass the patch test; points at the vertices detect inverted elements.
 CUBIC_POINTS = np.concatenate([np.eye(4), (1.0 - np.eye(4)) / 3.0])
 CUBIC_WEIGHTS = np.repeat([1.0 / 240.0, 9.0 / 240.0], 4)
 LINEAR_SHARE = np.full(4, 1.0 / 4.0)
 # Diagonal of the consistent mass, scaled to the total (Hinton, Rock & Zienkiewicz 1976); row sums would be negative at
 # the vertices.
 QUADRATIC_SHARE = np.repeat([1.0 / 36.0, 4.0 / 27.0], [4, 6])
-BARYCENTRIC = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # their derivatives
+# Derivatives of the barycentric coordinates.
+BARYCENTRIC = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def quadratic_derivatives(barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return dN_a/dxi_d of the ten quadratic functions at barycentric points ``(q, 4)``: ``(q, 10, 3)``."""
+    """Return dN_a/dxi_d ``(q, 10, 3)`` of the quadratic shape functions at barycentric points ``(q, 4)``."""
     vertices = (4.0 * barycentric - 1.0)[:, :, None] * BARYCENTRIC
     first, second = EDGES.T
     edges = barycentric[:, first, None] * BARYCENTRIC[second] + barycentric[:, second, None] * BARYCENTRIC[first]
@@ -29,14 +30,14 @@ def quadratic_derivatives(barycentric: NDArray[np.float64]) -> NDArray[np.float6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tetrahedron:
-    """A tetrahedron integrated numerically.
+    """Numerically integrated tetrahedron.
 
     Attributes:
-        name: As case files write it.
-        derivatives: ``(q, k, 3)`` dN_a/dxi_d at the integration points.
-        weights: ``(q,)``, of volume 1/6.
-        share: ``(k,)`` of each node in the volume.
-        hourglass: None here.
+        name: Name in case files.
+        derivatives: Derivatives dN_a/dxi_d at the integration points, shape (q, k, 3).
+        weights: Weights of the integration points, with sum 1/6, shape (q,).
+        share: Share of each node in the volume, shape (k,).
+        hourglass: False, because tetrahedra have no hourglass control.
     """
 
     name: str
@@ -47,11 +48,11 @@ class Tetrahedron:
 
     @property
     def nodes(self) -> int:
-        """Return k."""
+        """Number of nodes, k."""
         return len(self.share)
 
     def geometry(self, corners: NDArray[np.float64]) -> Geometry:
-        """Integrate the gradients; nodal volumes are fixed shares of the volume."""
+        """Return the integrals over elements; nodal volumes are fixed shares of the volume."""
         gradient, determinant = self.gradients(corners)
         volume = determinant @ self.weights
         shares = determinant * self.weights / np.where(volume == 0.0, 1.0, volume)[:, None]

@@ -1,1 +1,1 @@
-"""Effects, time steps and cost before anything is meshed. Plain NumPy."""
+"""Effects, time steps and cost, predicted before anything is meshed with plain NumPy; start with `estimate.py`."""

@@ -1,4 +1,4 @@
-"""Base of the effects of a drop, and the drop that they decide on: before it is computed and after."""
+"""Base class of the effects of a drop, and the properties of a planned and a completed drop that decide on them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Deflection(NamedTuple):
 
 
 class Drop(Protocol):
-    """Drop before it is computed."""
+    """Properties of a drop before it is computed."""
 
     @property
     def shock(self) -> Shock:

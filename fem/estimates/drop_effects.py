@@ -39,14 +39,14 @@ class WeightEffect(DropEffect):
     adds = "f = M g"
     number = "g / peak acceleration"
     threshold = NEGLIGIBLE_WEIGHT
-    influence = "what g alone deflects the board by, over the deflection of the shock"
-    place = "reflowshock.fem.loads.load.BodyAcceleration"
+    influence = "static deflection of the board under g, over the deflection by the shock"
+    implementation = "reflowshock.fem.loads.load.BodyAcceleration"
     switch = "shock.gravity = auto, on, off"
     source = "linear in the load"
 
     @staticmethod
-    def beside(switch: Switch, peak: float, gravity: float) -> Decision:
-        """Decide on gravity in a shock, from the switch, the peak acceleration and g [m/s^2]."""
+    def by_peak(switch: Switch, peak: float, gravity: float) -> Decision:
+        """Decide on gravity in a shock by its switch, or else by g over the peak acceleration, both in [m/s^2]."""
         ratio = gravity / peak if peak > 0.0 else math.inf
         reason = f"1 G is {ratio:.3g} of the peak acceleration"
         if switch != "auto":
@@ -98,7 +98,7 @@ def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
     why = f"stretching changes deflections by up to {100.0 * bound:.3g} % ({relation})"
     if not turns:
         return "small", why
-    return ("finite", f"{why}; the stress of cooling takes a path") if cooled else ("corotational", why)
+    return ("finite", f"{why}; residual stress needs path-dependent elements") if cooled else ("corotational", why)
 
 
 class FiniteRotation(DropEffect):
@@ -106,10 +106,10 @@ class FiniteRotation(DropEffect):
 
     name = "finite_rotation"
     adds = "F = R U, P = R s U^-1 instead of eps = sym grad u"
-    number = f"1 - w / w0, w0^2 = w^2 + c w^4 / (2 t^2), c = {STIFFENING_BOUND:g}: ends held apart"
+    number = f"1 - w / w0, w0^2 = w^2 + c w^4 / (2 t^2), c = {STIFFENING_BOUND:g}: immovable ends"
     threshold = NEGLIGIBLE_STIFFENING
     influence = f"1 - w / w0 of the deflection, c = {STIFFENING_OF_BOARD:g} of boards on four holes"
-    place = "reflowshock.fem.kernels.nonlinear.Path"
+    implementation = "reflowshock.fem.kernels.nonlinear.Path"
     switch = "shock.numerics.kinematics = auto, small, corotational, finite"
     source = "Woinowsky-Krieger 1950"
     toggle = Toggle("shock.numerics.kinematics", "corotational", "small")
@@ -136,7 +136,8 @@ class FiniteRotation(DropEffect):
 class SolderPlasticity(DropEffect):
     """Plasticity of the solder."""
 
-    name, adds, place, source = Plasticity.name, Plasticity.adds, Plasticity.place, Plasticity.source
+    name, adds, source = Plasticity.name, Plasticity.adds, Plasticity.source
+    implementation = Plasticity.implementation
     number = "expected peel stress / sigma_y, peel = K sqrt(k E t^3 / 12) pitch^2 / A, board bent by K on springs k"
     threshold = YIELDS_FROM
     influence = Plasticity.influence
@@ -188,7 +189,7 @@ class RayleighEffect(DropEffect):
     adds = "f = -(alpha M + beta K) v"
     number = "xi omega T, xi = (alpha / omega + beta omega) / 2"
     influence = "1 - exp(-xi omega T) of the first mode"
-    place = "reflowshock.fem.loads.damping.RayleighDamping"
+    implementation = "reflowshock.fem.loads.damping.RayleighDamping"
     switch = "shock.damping.* of a case, or none"
     source = "Rayleigh"
 
@@ -196,7 +197,7 @@ class RayleighEffect(DropEffect):
         """Decide by the coefficients, with the damping of the first mode of the board as influence."""
         (alpha, beta), omega = drop.shock.damping.coefficients, drop.expected.omega
         if not (alpha or beta):
-            return decision(False, "shock.damping gives none", 0.0)
+            return decision(False, "shock.damping is zero", 0.0)
         ratio = 0.5 * (alpha / omega + beta * omega)
         loss = -math.expm1(-ratio * omega * drop.duration)
         return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", loss)
@@ -215,7 +216,7 @@ class Failing(DropEffect):
     number = "value / limit"
     threshold = 1.0
     influence = "none: joints are judged, not broken"
-    place = "reflowshock.workflow.package.verdict.verdict_of"
+    implementation = "reflowshock.workflow.package.verdict.verdict_of"
     switch = "shock.failure.*.limit, each with its source, or none"
     source = "JESD22-B111"
 
@@ -236,7 +237,7 @@ class DrivenJoints(DropEffect):
     name = "one_way"
     adds = "nothing: F_G += N^T F_L is left out, a coarse model drives"
     influence = "not predicted: fine joints' stiffness less the coarse ones', over the board's"
-    place = "reflowshock.fem.coupling.one_way.OneWay"
+    implementation = "reflowshock.fem.coupling.one_way.OneWay"
     switch = "shock.coupling.direction = two_way, one_way"
     source = "submodel"
     toggle = Toggle("shock.coupling.direction", "one_way", "two_way")
@@ -256,8 +257,8 @@ class MassScaling(DropEffect):
     adds = "rho times (dt_target / dt)^2 in small elements"
     number = "added mass / mass of the model"
     threshold = ADDED_MASS_LIMIT
-    influence = "half of the added share, of frequencies; of its own part more"
-    place = "reflowshock.fem.model.steps.mass_factor"
+    influence = "about half the relative added mass in frequencies, more in the scaled part"
+    implementation = "reflowshock.fem.model.steps.mass_factor"
     switch = "shock.numerics.mass_scaled = list of roles"
     source = "Rayleigh quotient"
     toggle = Toggle("shock.numerics.mass_scaled", ("copper",), ())
@@ -277,9 +278,9 @@ class ByLargeMass(DropEffect):
     """Input-G by a large mass at the mounting holes."""
 
     name = "large_mass"
-    adds = "a mass at the holes, pushed: M_L (x'' - a(t)) = 0"
+    adds = "an accelerated mass at the holes: M_L (x'' - a(t)) = 0"
     influence = "none beyond mass of the model / M_L"
-    place = "reflowshock.fem.loads.large_mass.LargeMass"
+    implementation = "reflowshock.fem.loads.large_mass.LargeMass"
     switch = "shock.method = direct, large_mass"
     source = "H 4.4"
 
@@ -294,7 +295,7 @@ class Symmetry(DropEffect):
     name = "symmetry"
     adds = "u_n = 0 on x = 0 and y = 0: a quarter of the elements"
     influence = "none where model and load are symmetric"
-    place = "reflowshock.fem.mesh.supports.held_components"
+    implementation = "reflowshock.fem.mesh.supports.held_components"
     switch = "board.symmetry = quarter, full"
     source = "symmetry"
 

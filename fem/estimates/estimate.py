@@ -1,4 +1,4 @@
-"""Steps and cost before anything is meshed: plain NumPy, for ``plan`` and for the run itself."""
+"""Time steps and cost predicted before anything is meshed, in plain NumPy for plans and runs."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -14,29 +14,29 @@ from reflowshock.fem.problem.shock import Ranks
 from reflowshock.materials.elasticity import elasticity_matrix
 from reflowshock.materials.parameters import Material
 
-# Element updates per second and core of a whole substep (force, update, tie) of elements whose matrix is assembled, as
-# those of joints, on one core of an AMD EPYC (AVX-512); boards are boxes in rows, which share their matrices.
+# Element updates per second of whole substeps (force, update, tie) on one core of an AMD EPYC (AVX-512), for elements
+# with one matrix each, such as those of joints; boards are rows of boxes, which share their matrices.
 UPDATES_PER_SECOND = 1.2e7
 BOARD_ADVANTAGE = 4.3
-ROW_COST = 4.0  # updates of boxes in the time that a row of them takes, however short (boards of graded boxes)
-IDLE_COST = 0.15  # updates of assembled elements in the time in which the nodes of one move that does not act
+ROW_COST = 4.0  # fixed cost of a row of boxes, in updates of a box (boards of graded boxes)
+IDLE_COST = 0.15  # cost of moving the nodes of an inactive element, in updates of an element with its own matrix
 WINDOW_OVERHEAD = 1.5e-4  # [s] interpreter per window, same source
 STEP_OVERHEAD = 2.5e-5  # [s] interpreter per step of a motion or of a level inside it, same source
 CALL_OVERHEAD = 1.2e-4  # [s] interpreter per window whose steps are one call, same source
 LATENCY = 1.5e-5  # [s] a message between two ranks of one machine, same source
-PULSE_STEPS = 200  # implicit steps in the shortest pulse: 3e-4 of the period of what swings twice in it
-ROUNDING = 1e-9  # of a duration
-RUN_STEPS = 1000  # implicit steps in a run, at least
+PULSE_STEPS = 200  # implicit steps in the shortest pulse: period error 3e-4 of a mode with two periods per pulse
+ROUNDING = 1e-9  # relative rounding error of a duration
+RUN_STEPS = 1000  # least number of implicit steps in a run
 Step = TypeVar("Step", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, slots=True)
 class WindowPlan:
-    """The time steps of a run.
+    """Time steps of a run.
 
     Attributes:
         window: Coupling interval DT [s], the step of the macro model.
-        substeps: m, meso steps per window.
+        substeps: Meso steps per window, m.
         windows: Number of windows.
         stride: Windows between two history samples.
     """
@@ -48,23 +48,23 @@ class WindowPlan:
 
     @property
     def step(self) -> float:
-        """Return dt = DT / m [s]."""
+        """Meso step dt = DT / m [s]."""
         return self.window / self.substeps
 
 
 def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
-    """Return the critical step [s] of a box element with edges ``size (3,)`` [m] along the material's axes.
+    """Return the critical time step [s] of a box element with edges ``size (3,)`` [m] along the material's axes.
 
-    With the lumped mass the stiffest modes are the uniform strains: omega^2 is the largest eigenvalue of
-    4 C_ij / (density h_i h_j) over the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density in shear. Incompatible
-    modes soften bending below both.
+    With lumped mass the modes with the highest frequency are the uniform strains: omega^2 is the largest eigenvalue of
+    4 C_ij / (density h_i h_j) for the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density for shear. Incompatible
+    modes lower the bending frequencies below both.
     """
     return _box_critical_step(material, tuple(map(float, size)))
 
 
 @lru_cache(maxsize=4096)
 def _box_critical_step(material: Material, lengths: tuple[float, ...]) -> float:
-    """Return the same; a plan asks for the same boxes hundreds of times."""
+    """Return ``box_critical_step``, cached because a plan evaluates the same boxes hundreds of times."""
     elasticity, size = elasticity_matrix(material), np.array(lengths)
     normal = np.linalg.eigvalsh(elasticity[:3, :3] / np.outer(size, size))[-1]
     pairs = ((3, 0, 1), (4, 1, 2), (5, 0, 2))
@@ -73,10 +73,15 @@ def _box_critical_step(material: Material, lengths: tuple[float, ...]) -> float:
 
 
 def skewed_critical_step(material: Material, edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the critical steps ``(n,)`` [s] of hexahedra with three edges each, ``(n, 3, 3)`` [m], at any angles.
+    """Return the critical time steps ``(n,)`` [s] of parallelepipeds.
 
-    The uniform strains are the stiffest modes here, too: u_i = a_ik xi_k with xi from -1 to 1 has the strain of
-    a_ik d(xi_k)/dx_j and the kinetic energy of the mass times a_ik^2. Of boxes this is ``box_critical_step``.
+    As in ``box_critical_step``, which is the special case of boxes, the modes with the highest frequency are the
+    uniform strains: u_i = a_ik xi_k, with xi from -1 to 1, has the displacement gradient a_ik d(xi_k)/dx_j, and the
+    modal masses of all a_ik are equal.
+
+    Args:
+        material: Material, with axes along x, y and z.
+        edges: Three edge vectors of each element, in its rows, shape (n, 3, 3) [m].
     """
     gradient = 2.0 * np.linalg.inv(edges)  # (n, 3, 3): d(xi_k)/dx_j at j, k
     strain = np.zeros((len(edges), 6, 3, 3))  # of a_ik at i, k
@@ -90,25 +95,25 @@ def skewed_critical_step(material: Material, edges: NDArray[np.float64]) -> NDAr
 
 
 def damped_critical_step(critical: Step, stiffness: float) -> Step:
-    """Return critical steps [s] with stiffness-proportional damping: dt (sqrt(1 + xi^2) - xi), cancelling nothing.
+    """Return critical time steps [s] with stiffness-proportional damping, dt (sqrt(1 + xi^2) - xi).
 
     Args:
-        critical: 2 / omega_max without damping [s], one or many.
-        stiffness: beta [s]; the highest mode has xi = beta omega_max / 2.
+        critical: Critical steps without damping, 2 / omega_max, a number or an array [s].
+        stiffness: Damping coefficient beta [s]; the highest mode has the damping ratio xi = beta omega_max / 2.
     """
-    ratio = stiffness / critical
+    ratio = stiffness / critical  # the result is the formula above without its cancellation
     return critical / (np.hypot(1.0, ratio) + ratio)
 
 
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:
-    """Choose window and substeps from critical steps; runs of other steps have their samples at the same times.
+    """Choose window and substeps from critical steps, with samples at times that do not depend on the steps.
 
     Args:
-        macro_step: Smallest element critical step of the macro model and of the elements that touch the interface [s].
-        meso_step: Smallest element critical step of the meso model [s].
-        fraction: Of the critical step that is used.
+        macro_step: Smallest critical step of macro elements and of elements at the interface [s].
+        meso_step: Smallest critical step of meso elements [s].
+        fraction: Time step over critical time step.
         duration: Simulated time [s]; a whole number of samples, each a whole number of windows.
-        samples: History samples wanted; fewer where there are fewer windows.
+        samples: Requested number of history samples; the plan has fewer if there are fewer windows.
     """
     least = math.ceil(duration / (fraction * macro_step))
     samples = min(samples, least)
@@ -120,27 +125,27 @@ def window_plan(macro_step: float, meso_step: float, fraction: float, duration: 
 
 
 def implicit_plan(plan: WindowPlan, largest: float) -> WindowPlan:
-    """Return windows from sample to sample of another plan, in implicit steps of at most ``largest`` [s]."""
+    """Return a plan whose windows end at the samples of another one, with implicit steps of at most ``largest`` [s]."""
     spacing = plan.stride * plan.window
     return WindowPlan(spacing, math.ceil(spacing / largest), plan.windows // plan.stride, 1)
 
 
 def shortened(plan: WindowPlan, duration: float) -> WindowPlan:
-    """Return the first windows of a plan, up to the sample at a duration [s] or the next one after it."""
+    """Return a plan cut after the first sample at or after a duration [s]."""
     samples = math.ceil(duration / (plan.stride * plan.window) * (1.0 - ROUNDING))
     return replace(plan, windows=min(plan.windows, plan.stride * samples))
 
 
 def largest_implicit_step(duration: float, pulses: Iterable[float]) -> float:
-    """Return the largest implicit step [s] of a run, whatever its mesh.
+    """Return the largest implicit step [s] of a run, which does not depend on the mesh.
 
-    On the JEDEC board under its half sine of 0.5 ms, steps of 1/50, 1/100 and 1/200 of the pulse are 5e-4, 1e-4 and
-    3e-5 (relative L2) off in the displacement of the centre, 4e-3, 1e-3 and 3e-4 in its strain
+    On the JEDEC board under its half sine of 0.5 ms, steps of 1/50, 1/100 and 1/200 of the pulse have relative L2
+    errors of 5e-4, 1e-4 and 3e-5 in the displacement of the centre, 4e-3, 1e-3 and 3e-4 in its strain
     (benchmarks/jedec_oracle.py).
 
     Args:
         duration: Simulated time [s].
-        pulses: Durations of its loads [s].
+        pulses: Durations of the load pulses [s]; may be empty.
     """
     return min([duration / RUN_STEPS, *(pulse / PULSE_STEPS for pulse in pulses)])
 
@@ -151,14 +156,14 @@ def predict_seconds(
     """Predict the wall time of a two-scale and of a DNS run on equal cores.
 
     Args:
-        macro_elements: Elements of the macro model, all boxes of a board.
-        meso: Elements of each step level of the meso model, in the cost of assembled ones, and its steps a window.
-        plan: Time steps; its substeps are those of a DNS.
-        ranks: Their number, and which placements are allowed.
-        at_once: Whether a rank that has the meso model for itself takes its steps in one call; that of a DNS does.
+        macro_elements: Number of elements of the macro model, all boxes of a board.
+        meso: Number of elements (weighted by cost) and number of steps per window of each level of the meso model.
+        plan: Time steps; the substeps are the steps of the DNS.
+        ranks: Number of ranks and allowed placements.
+        at_once: Whether a rank with only the meso model takes all steps of a window in one compiled call, as the DNS.
 
     Returns:
-        Seconds of the windows of ``two_scale`` and of ``dns``.
+        Wall time of all windows of the two-scale and of the DNS run [s].
     """
     board = macro_elements / BOARD_ADVANTAGE / UPDATES_PER_SECOND
     work = sum(elements * steps for elements, steps in meso) / UPDATES_PER_SECOND

@@ -33,7 +33,7 @@ class MaterialEffect(Effect[OfMaterials]):
         raise NotImplementedError
 
     def report(self, run: OfMaterials) -> Decision:
-        """Return the decision for the results of a run, equal to that of the plan."""
+        """Return the decision for the results of a run, which equals the decision of the plan."""
         return self.decide(run)
 
 
@@ -45,7 +45,7 @@ class Plasticity(MaterialEffect):
     number = "sigma_eq / sigma_y"
     threshold = 1.0
     influence = "none below sigma_y; above it not predicted"
-    place = "reflowshock.fem.forces.force_nonlinear.NonlinearElements"
+    implementation = "reflowshock.fem.forces.force_nonlinear.NonlinearElements"
     switch = "materials.solder = SAC405 …, or a table with or without plasticity"
     source = "von Mises; Johnson & Cook 1983"
 
@@ -62,7 +62,7 @@ class StrainRate(MaterialEffect):
     number = "C"
     threshold = 0.0
     influence = f"C ln(p' / p0') of the yield stress at p' = {RATE_OF_DROPS:g} 1/s"
-    place = "reflowshock.materials.plasticity.plastic_increment"
+    implementation = "reflowshock.materials.plasticity.plastic_increment"
     switch = "materials.*.plasticity.C"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:
@@ -84,7 +84,7 @@ class ThermalSoftening(MaterialEffect):
     number = "T*^m"
     threshold = 0.0
     influence = "T*^m of the yield stress"
-    place = "reflowshock.materials.parameters.JohnsonCook"
+    implementation = "reflowshock.materials.parameters.JohnsonCook"
     switch = "materials.*.temperature"
 
     def of_laws(self, scene: OfMaterials, laws: Mapping[str, JohnsonCook]) -> Decision:

@@ -1,4 +1,4 @@
-"""Which ranks carry which model, and how long a window takes then: plain NumPy, from costs and speeds."""
+"""Placement of models on MPI ranks: admissible placements and the predicted time of a window."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ Role = Literal["macro", "meso", "dns", "structure"]
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Which ranks carry which model.
+    """Ranks of each model.
 
     Attributes:
-        ranks: Ranks of each model, ascending; a rank that carries several takes turns in this order.
+        ranks: Ascending ranks of each model; a rank with several models computes them in this order.
     """
 
     ranks: dict[Role, tuple[int, ...]]
 
     @property
     def name(self) -> Literal["shared", "disjoint"]:
-        """Return whether all models are on the same ranks."""
+        """Name of the placement: shared if all models are on the same ranks, else disjoint."""
         return "shared" if len(set(self.ranks.values())) == 1 else "disjoint"
 
     @property
     def words(self) -> str:
-        """Return which ranks carry which model, for people."""
+        """Placement as text for reports."""
         if self.name == "shared":
             return f"shared by {len(next(iter(self.ranks.values())))}"
         return ", ".join(f"{role} on rank {'+'.join(map(str, ranks))}" for role, ranks in self.ranks.items())
@@ -37,12 +37,12 @@ class Placement:
 
 @dataclass(frozen=True, slots=True)
 class ModelCost:
-    """What a window of one model costs.
+    """Cost of a window of one model.
 
     Attributes:
-        work: Seconds that ranks share, on one of speed one.
-        calls: Seconds that each of them spends, however many they are.
-        sums: Sums over the nodes that they share, each a message.
+        work: Time divided among the ranks, on one rank of speed one [s].
+        calls: Time spent by every rank [s].
+        sums: Number of sums over shared nodes, one message each.
     """
 
     work: float
@@ -52,13 +52,13 @@ class ModelCost:
 
 @dataclass(frozen=True, slots=True)
 class WindowCost:
-    """What a window of two models costs.
+    """Cost of a window of two models.
 
     Attributes:
-        macro: The macro model.
-        meso: The meso model.
-        latency: Seconds of a message.
-        overlap: Whether models with ranks of their own work at the same time, as the scheme allows.
+        macro: Cost of the macro model.
+        meso: Cost of the meso model.
+        latency: Time of one message [s].
+        overlap: Whether the coupling scheme lets models on disjoint ranks compute at the same time.
     """
 
     macro: ModelCost
@@ -69,7 +69,7 @@ class WindowCost:
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """A placement and the predicted seconds of its window."""
+    """Placement with the predicted time of its window [s]."""
 
     placement: Placement
     seconds: float
@@ -81,19 +81,19 @@ def shared(roles: Sequence[Role], size: int) -> Placement:
 
 
 def disjoint(macro: Sequence[int], size: int) -> Placement:
-    """Return the placement of the macro model on some of ``size`` ranks, of the meso model on all others."""
+    """Return the placement with the macro model on the ranks ``macro`` of ``size``, the meso model on all others."""
     others = tuple(rank for rank in range(size) if rank not in macro)
     return Placement({"macro": tuple(sorted(macro)), "meso": others})
 
 
 def admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
-    """Yield the placements of two models that an input allows: with equal costs, the first is the simplest.
+    """Yield the placements of two models that an input allows, the simplest first.
 
-    A model's ranks are alike: the macro model takes the slowest or the fastest.
+    In disjoint placements the macro model takes the slowest or the fastest ranks, so ranks of a model are alike.
 
     Args:
-        ranks: What the input asks for.
-        speeds: Of each rank.
+        ranks: Requested ranks and placement.
+        speeds: Relative speed of each rank.
     """
     size = len(speeds)
     if ranks.placement != "disjoint":
@@ -108,28 +108,28 @@ def admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
 
 def alternatives(ranks: Ranks, speeds: Sequence[float], cost: WindowCost) -> list[Alternative]:
     """Return all admissible placements of two models with their predicted windows, the fastest first."""
-    found = [Alternative(item, window_seconds(item, speeds, cost)) for item in admissible(ranks, speeds)]
-    return sorted(found, key=lambda item: item.seconds)
+    candidates = [Alternative(item, window_seconds(item, speeds, cost)) for item in admissible(ranks, speeds)]
+    return sorted(candidates, key=lambda item: item.seconds)
 
 
 def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
-    """Return the predicted seconds of the fastest placement on ranks of speed one, however many these are."""
-    size, found = ranks.total, []
+    """Return the predicted time of a window of the fastest placement on ranks of speed one [s]."""
+    size, seconds = ranks.total, []
     if ranks.placement != "disjoint":
         macro, meso = (model_seconds(model, size, size > 1, cost.latency) for model in (cost.macro, cost.meso))
-        found.append(_together(cost, macro, meso, 2.0 * (size > 1)))
+        seconds.append(_together(cost, macro, meso, 2.0 * (size > 1)))
     if ranks.placement != "shared":
         for count in [ranks.macro] if ranks.macro else range(1, size):
             macro = model_seconds(cost.macro, count, count > 1, cost.latency)
             meso = model_seconds(cost.meso, size - count, size - count > 1, cost.latency)
-            found.append(_together(cost, macro, meso, None))
-    return min(found)
+            seconds.append(_together(cost, macro, meso, None))
+    return min(seconds)
 
 
 def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCost) -> float:
-    """Return the predicted seconds of a window: work over the speeds of those who do it, and messages.
+    """Return the predicted time of a window [s]: work over the speeds of its ranks, plus messages.
 
-    Ranks that carry both models do them one after the other, ranks that carry one wait for the slower model.
+    Ranks with both models compute them in turn; ranks with one model wait for the slower model.
     """
     power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
     several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
@@ -139,7 +139,7 @@ def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCo
 
 
 def _together(cost: WindowCost, macro: float, meso: float, sharing: float | None) -> float:
-    """Return the seconds of both models: in turn where ranks carry both, which exchange ``sharing`` messages."""
+    """Return the time of both models [s]: in turn with ``sharing`` messages, or on disjoint ranks if that is None."""
     if sharing is not None:
         return macro + meso + sharing * cost.latency
     return (max if cost.overlap else sum)((macro, meso)) + 2.0 * cost.latency
@@ -158,7 +158,7 @@ def model_seconds(cost: ModelCost, speed: float, several: bool, latency: float) 
 
 
 def check_size(ranks: Ranks, size: int) -> None:
-    """Check that the number of MPI ranks is that of the input.
+    """Check that the number of MPI ranks equals ``ranks.total`` of the input.
 
     Raises:
         RankError: The numbers differ.

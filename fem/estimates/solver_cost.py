@@ -1,4 +1,4 @@
-"""Cost of explicit and implicit steps of a structure before it is meshed: which is cheaper, what only one can do."""
+"""Predicted cost of explicit and implicit steps of a structure before it is meshed, and the choice between them."""
 
 import math
 from collections.abc import Iterable
@@ -10,9 +10,9 @@ from reflowshock.fem.estimates.material_effects import plastic_laws
 from reflowshock.fem.problem.structure import Dynamics, StructureProblem
 
 COMPONENTS = 3
-LEAF = 3  # layers of nodes that are eliminated at once
-# MUMPS orders without knowing that the mesh is a box: operations and entries over those of the dissection. Plates one
-# to four layers thick and cubes of 1e3 to 7e4 unknowns needed 1.3 to 2.8 and 1.2 to 1.7 (benchmarks/jedec_oracle.py).
+LEAF = 3  # largest number of node layers that are eliminated at once
+# Operations and entries of MUMPS, whose ordering does not use the box shape, over nested dissection of the box. Plates
+# of one to four layers and cubes of 1e3 to 7e4 unknowns needed 1.3 to 2.8 and 1.2 to 1.7 (benchmarks/jedec_oracle.py).
 OPERATIONS_FACTOR = 1.7
 ENTRIES_FACTOR = 1.45
 
@@ -32,24 +32,31 @@ NONLINEAR_RATE = {
     "tetrahedron": 1.3e7,
     "tetrahedron_quadratic": 4.5e6,
 }
-TURNING_BOX_RATE, TURNING_RATE = 2.0e7, 1.2e7  # elastic and corotational: boxes of graded meshes, any hexahedra
-TURNING_BOARD_RATE = 1.35e7  # such boxes of a board that waits for memory: 1e5 of them, or 1e4 in turns with the joints
+TURNING_BOX_RATE, TURNING_RATE = 2.0e7, 1.2e7  # elastic and corotational: boxes of graded meshes, other hexahedra
+TURNING_BOARD_RATE = 1.35e7  # boxes of a board limited by memory bandwidth: 1e5, or 1e4 alternating with the joints
 FACTOR_RATE = 3.0e9  # operations per second of the factorisation
 SOLVE_RATE = 6.0e8  # entries of the factor per second of a solution
-ASSEMBLY_SECONDS = 2.0e-5  # [s] an equation
-EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] a step, interpreter
-IMPLICIT_UPDATE = 3.0e-7  # [s] a step and node: forces, vectors, energy balance
-# Cooling of joints that yield: a few Newton steps, each with some ten products.
+ASSEMBLY_SECONDS = 2.0e-5  # [s] per equation
+EXPLICIT_OVERHEAD, IMPLICIT_OVERHEAD = 2.5e-5, 4.0e-4  # [s] per step, interpreter
+IMPLICIT_UPDATE = 3.0e-7  # [s] per step and node: forces, vectors, energy balance
+# Cooling of joints that yield: a few Newton steps, each with about ten products.
 COOLING_TANGENTS, COOLING_SOLUTIONS = 10, 120
-TANGENT_RATE = 1.0e4  # elements that yield a second
-PLATE_LAYERS = 4  # of the plate that stands for a package on its board: those of the board
-ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] factor; matrix while it is assembled
-ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] explicit
+TANGENT_RATE = 1.0e4  # tangents of yielding elements per second
+PLATE_LAYERS = 4  # layers of the equivalent plate of board and package, as many as the board has
+ENTRY_MEMORY, EQUATION_MEMORY = 11.0, 3.0e3  # [B] per entry of the factor, per equation during assembly
+ELEMENT_MEMORY, NODE_MEMORY = 300.0, 500.0  # [B] per element and node of the explicit solver
 
 
 @dataclass(frozen=True, slots=True)
 class SolverCost:
-    """Cost of one solver on one core: steps, seconds in all, seconds before the first step, memory [B]."""
+    """Cost of one solver on one core.
+
+    Attributes:
+        steps: Number of time steps.
+        seconds: Total time, set-up included [s].
+        setup: Time before the first step [s].
+        memory: Memory [B].
+    """
 
     steps: int
     seconds: float
@@ -63,8 +70,8 @@ class SolverForecast:
 
     Attributes:
         explicit: Cost of explicit steps.
-        implicit: Cost of implicit steps, of the linear model where the problem is not linear.
-        only_explicit: What of the problem only the explicit solver can do; empty where either can.
+        implicit: Cost of implicit steps, of the linear model if the problem is nonlinear.
+        only_explicit: Nonlinearities that only the explicit solver supports; empty if both solvers can be used.
     """
 
     explicit: SolverCost
@@ -73,18 +80,18 @@ class SolverForecast:
 
     @property
     def cheaper(self) -> str:
-        """Return the name of the solver that takes less time."""
+        """Name of the solver that takes less time."""
         return "explicit" if self.explicit.seconds <= self.implicit.seconds else "implicit"
 
     @property
     def sentence(self) -> str:
-        """Say which solver to take, and why."""
+        """Recommendation of a solver with its reason."""
         if self.only_explicit:
-            return f"Only the explicit solver does {', '.join(self.only_explicit)}."
+            return f"Only the explicit solver supports {', '.join(self.only_explicit)}."
         costs = {"explicit": self.explicit.seconds, "implicit": self.implicit.seconds}
         ratio = max(costs.values()) / min(costs.values())
-        chosen = f"{self.cheaper.capitalize()} steps are {ratio:.3g} times cheaper here"
-        return f"{chosen}; yielding, finite rotations and two-scale runs need explicit ones."
+        comparison = f"{self.cheaper.capitalize()} steps are {ratio:.3g} times cheaper here"
+        return f"{comparison}; plasticity, finite rotations and two-scale runs need explicit steps."
 
 
 def forecast_solvers(
@@ -93,8 +100,8 @@ def forecast_solvers(
     """Predict the cost of both solvers on one core.
 
     Args:
-        problem: The structure.
-        elements: Number of elements of its mesh.
+        problem: Parameters of the structure.
+        elements: Number of elements of the mesh.
         explicit_steps: Steps of the explicit solver.
         implicit_steps: Steps of the implicit solver, see ``implicit_step``.
     """
@@ -115,7 +122,7 @@ def explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverC
 
 
 def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
-    """Predict the cost of implicit steps of a box of nodes: one factorisation, and a solution a step."""
+    """Predict the cost of implicit steps of a box with nodes ``(nx, ny, nz)``: one factorisation, a solve per step."""
     factor, equations = box_factor(nodes), 3 * math.prod(nodes)
     setup = factor.operations / FACTOR_RATE + ASSEMBLY_SECONDS * equations
     step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
@@ -124,20 +131,20 @@ def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
 
 
 def cooling_cost(elements: int, yielding: int) -> SolverCost:
-    """Predict the cost of residual stress: one factor of so many hexahedra, of which some yield, and its solutions."""
+    """Predict the cost of the residual stress of hexahedra, some of them yielding: one factorisation and its solves."""
     solutions = COOLING_SOLUTIONS if yielding else 1
     cost = implicit_cost(plate_nodes(elements), solutions)
     return replace(cost, seconds=cost.seconds + COOLING_TANGENTS * yielding / TANGENT_RATE)
 
 
 def plate_nodes(elements: int) -> tuple[int, int, int]:
-    """Return the nodes of a square plate of so many hexahedra, as board and package with their joints make one."""
+    """Return the nodes per side of a square plate with a number of hexahedra, the model of a board with package."""
     side = max(1, round(math.sqrt(elements / PLATE_LAYERS)))
     return side + 1, side + 1, PLATE_LAYERS + 1
 
 
 def node_counts(problem: StructureProblem) -> tuple[int, int, int]:
-    """Return the nodes along each side of the box; those that rings around holes add are left out."""
+    """Return the nodes along each side of the box, without the nodes that rings around holes add."""
     structure = problem.structure.refined
     layers = sum(layer.cells for layer in structure.layers.values())
     order = 2 if structure.element == "tetrahedron_quadratic" else 1
@@ -145,7 +152,7 @@ def node_counts(problem: StructureProblem) -> tuple[int, int, int]:
 
 
 def nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
-    """Return what makes a problem nonlinear, in words."""
+    """Return the nonlinearities of a problem as texts; empty for a linear problem."""
     plastic = ", ".join(plastic_laws(problem.layer_materials))
     reasons = [f"plasticity (layers {plastic})"] if plastic else []
     finite = problem.dynamics.kinematics != "small"
@@ -153,24 +160,24 @@ def nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
 
 
 def implicit_step(dynamics: Dynamics, pulses: Iterable[float]) -> float:
-    """Return the largest implicit step [s]: as given, or that of ``estimate.largest_implicit_step``."""
+    """Return the largest implicit step [s] from the case or, by default, by ``estimate.largest_implicit_step``."""
     return dynamics.numerics.implicit_step or largest_implicit_step(dynamics.duration, pulses)
 
 
 @dataclass(frozen=True, slots=True)
 class FactorSize:
-    """Floating point operations of a factorisation, and entries of the factor."""
+    """Number of floating-point operations of a factorisation, and number of entries of the factor."""
 
     operations: float
     entries: float
 
 
 def box_factor(nodes: tuple[int, int, int]) -> FactorSize:
-    """Predict the factor of a linear elastic box, three unknowns a node.
+    """Predict the size of the Cholesky factor of a linear elastic box, with three unknowns per node.
 
-    A box is cut by the smallest section through the middle of its longest side, and so on; the section is eliminated
-    after both halves, in a dense front with those earlier sections that border the box: s unknowns with a border of b
-    take ((s + b)^3 - b^3) / 3 operations and s^2 / 2 + s b entries (George, SIAM J. Numer. Anal. 10, 1973).
+    Nested dissection (George, SIAM J. Numer. Anal. 10, 1973): the separator through the middle of the longest side
+    splits a box in two, recursively. It is eliminated after both halves, in a dense front with the earlier separators
+    that border the box: s unknowns with a border of b take ((s + b)^3 - b^3) / 3 operations and s^2 / 2 + s b entries.
 
     Args:
         nodes: Nodes along each side.
@@ -181,7 +188,7 @@ def box_factor(nodes: tuple[int, int, int]) -> FactorSize:
 
 @cache
 def _dissect(nodes: tuple[int, int, int], bordered: tuple[bool, ...]) -> tuple[float, float]:
-    """Return operations and entries of a box; ``bordered``: sides, low and high by axis, with a section behind."""
+    """Return operations and entries of a box; ``bordered`` marks sides (low and high per axis) at a separator."""
     section = [nodes[1] * nodes[2], nodes[0] * nodes[2], nodes[0] * nodes[1]]
     border = float(COMPONENTS * sum(section[axis] * sum(bordered[2 * axis : 2 * axis + 2]) for axis in range(3)))
     longest = max(range(3), key=nodes.__getitem__)

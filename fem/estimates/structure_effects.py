@@ -75,7 +75,7 @@ class StructureDamping(Effect[MotionScene]):
         """Decide by the setting of the case."""
         keys = motion.problem.dynamics.damping.model_dump().items()
         settings = [f"{key} = {value:g}" for key, value in keys if value and key != "frequency"]
-        return decision(bool(settings), ", ".join(settings) or "none is given")
+        return decision(bool(settings), ", ".join(settings) or "dynamics.damping is zero")
 
 
 class StructureMassScaling(Effect[MotionScene]):

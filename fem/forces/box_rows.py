@@ -1,4 +1,4 @@
-"""Rows of equal boxes along lines of nodes: the order in which their force is computed."""
+"""Rows of equal boxes along lines of nodes, the order in which the kernels compute their force."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.box_rows import LONGEST
 
-SAME_PLANE = 1e-9  # of the model's extent
+SAME_PLANE = 1e-9  # tolerance over the extent of the model
 
 
 @dataclass(frozen=True, slots=True)
 class BoxRows:
-    """Lines of nodes and the rows of boxes between them; see ``kernels.box_rows.add_row_forces``.
+    """Lines of nodes and rows of boxes between them; see ``kernels.box_rows.add_row_forces``.
 
     Attributes:
-        nodes: ``(p,)`` int32, node at each position; those of a line follow each other.
-        rows: ``(nr, 6)`` int32.
+        nodes: Node at each position, shape (p,) int32; nodes of a line are consecutive.
+        rows: Positions of the four low corners of the first box, number of boxes and class, shape (nr, 6) int32.
     """
 
     nodes: NDArray[np.int32]
@@ -24,12 +24,12 @@ class BoxRows:
 
     @classmethod
     def find(cls, points: NDArray[np.float64], cells: NDArray[np.int32], shape: NDArray[np.int32]) -> "BoxRows":
-        """Find the rows along the first coordinate.
+        """Return the rows along the first coordinate.
 
         Args:
-            points: ``(n, 3)`` [m].
-            cells: ``(ne, 8)`` boxes; bit d of a local index is the side in coordinate direction d.
-            shape: ``(ne,)`` class of each; the boxes of a row are of one.
+            points: Nodes, shape (n, 3) [m].
+            cells: Boxes, shape (ne, 8); bit d of a local index is the side in coordinate direction d.
+            shape: Class of each box, shape (ne,); all boxes of a row have the same class.
         """
         nodes = lines(points, cells)
         position = np.full(len(points), -1)
@@ -37,16 +37,16 @@ class BoxRows:
         corners = position[cells]
         in_line = (corners[:, 1::2] == corners[:, ::2] + 1).all(axis=1)
         rows = runs(corners[in_line, ::2], shape[in_line])
-        apart = cells[~in_line]  # a node with two next ones, where meshes do not match: lines of their own
-        own = len(nodes) + 8 * np.arange(len(apart))[:, None] + np.arange(0, 8, 2)
-        single = np.column_stack([own, np.ones(len(apart)), shape[~in_line]])
+        apart = cells[~in_line]  # boxes at a node with two successors (non-matching meshes) get separate lines
+        starts = len(nodes) + 8 * np.arange(len(apart))[:, None] + np.arange(0, 8, 2)
+        single = np.column_stack([starts, np.ones(len(apart)), shape[~in_line]])
         return cls(
             np.concatenate([nodes, apart.ravel()]).astype(np.int32), np.concatenate([rows, single]).astype(np.int32)
         )
 
 
 def lines(points: NDArray[np.float64], cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the nodes of the boxes, line by line along the first coordinate, neighbouring lines close."""
+    """Return the nodes of the boxes line by line along the first coordinate, with neighbouring lines close together."""
     first = np.arange(len(points))
     first[cells[:, 1::2].ravel()] = cells[:, ::2].ravel()
     while np.any(first != first[first]):
@@ -57,11 +57,14 @@ def lines(points: NDArray[np.float64], cells: NDArray[np.int32]) -> NDArray[np.i
 
 
 def runs(starts: NDArray[np.int64], shape: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Join boxes whose four lines continue each other's: rows ``(nr, 6)`` of at most ``LONGEST`` boxes.
+    """Join consecutive boxes of equal class into rows of at most ``LONGEST`` boxes.
 
     Args:
-        starts: ``(ne, 4)`` positions of the low corners of each box.
-        shape: ``(ne,)`` class of each box.
+        starts: Positions of the four low corners of each box, shape (ne, 4).
+        shape: Class of each box, shape (ne,).
+
+    Returns:
+        Rows as in ``BoxRows.rows``, shape (nr, 6).
     """
     order = np.argsort(starts[:, 0], kind="stable")
     starts, shape = starts[order], shape[order]

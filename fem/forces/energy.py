@@ -1,4 +1,4 @@
-"""Energy that a force term holds or has used up."""
+"""Energy that a force term stores or has dissipated."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,8 +16,8 @@ class Energy:
     Attributes:
         strain: Elastic strain energy, recoverable.
         plastic: Work dissipated by plastic or viscous flow so far.
-        hourglass: Energy of the hourglass stiffness of elements with one integration point; in fully integrated ones
-            that yield the work of incompatible modes that are not yet in equilibrium.
+        hourglass: Energy of the hourglass stiffness of one-point elements; in yielding fully integrated elements the
+            work of incompatible modes that are not yet in equilibrium.
     """
 
     strain: float = 0.0
@@ -25,29 +25,30 @@ class Energy:
     hourglass: float = 0.0
 
     def __add__(self, other: "Energy") -> "Energy":
-        """Add energy by energy."""
+        """Return the sum, component by component."""
         return Energy(self.strain + other.strain, self.plastic + other.plastic, self.hourglass + other.hourglass)
 
     @property
     def total(self) -> float:
-        """Return the work that the internal force has taken up [J]."""
+        """Work of the internal force so far [J]."""
         return self.strain + self.plastic + self.hourglass
 
 
 class InternalForce(Protocol):
-    """Something that subtracts an internal force; see ``force.ForceTerm``."""
+    """Object that subtracts an internal force; see ``force.ForceTerm``."""
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
 
 
 def linear_energy(term: InternalForce, displacement: NDArray[np.float64], mean: MeanStrain | None) -> Energy:
-    """Return the energy u . K u / 2 of a term that is linear in the displacement ``(n, 3)`` [m].
+    """Return the energy u . K u / 2 of a linear force term.
 
     Args:
-        term: The term.
-        displacement: ``(n, 3)`` [m].
-        mean: Mean strains of elements with hourglass control, whose energy is what the mean strains do not hold.
+        term: Force term that is linear in the displacement.
+        displacement: Nodal displacement u, shape (n, 3) [m].
+        mean: Mean strains of elements with hourglass control, which split the energy into strain and hourglass energy;
+            None if all of it is strain energy.
     """
     force = np.zeros_like(displacement)
     term.add(displacement, force)

@@ -1,9 +1,10 @@
-"""Internal force terms: the contract, and the choice of one for the elements of a mesh.
+"""Internal force terms: their interface, and the terms of the elements of a mesh.
 
 A term is linear unless its material yields or the kinematics are finite. Linear boxes of equal shape and material share
 one stiffness and are computed in rows along lines of nodes (``force_congruent``); other linear elements are assembled
-into blocks of 3 x 3 (``force_assembled``). Hexahedra that stay elastic turn by any angle without a path
-(``force_corotational``), boxes at a quarter of their linear speed.
+into blocks of 3 x 3 (``force_assembled``). Elastic hexahedra with finite rotations need no history
+(``force_corotational``); boxes run at a quarter of their linear speed. All others are path-dependent
+(``force_nonlinear``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,16 +31,16 @@ if TYPE_CHECKING:
 
 
 class ForceTerm(Protocol):
-    """A part of the internal force; one that has ``arrays`` can be part of ``kernels.levels.take_steps``."""
+    """Part of the internal force; terms with the attribute ``arrays`` can be used in ``kernels.levels.take_steps``."""
 
     @property
     def history(self) -> dict[str, NDArray]:
-        """Return the arrays to write and restore in place for a restart; none where force follows from displacement."""
+        """Arrays by name that a restart restores in place; empty if the force follows from the displacement."""
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m].
 
-        A term with a path takes the step from the displacement of the call before: call it exactly once a step.
+        A path-dependent term takes a step from the displacement of the previous call: call it exactly once per step.
         """
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
@@ -48,13 +49,13 @@ class ForceTerm(Protocol):
 
 @runtime_checkable
 class TermWithPath(ForceTerm, Protocol):
-    """A force term that remembers."""
+    """Path-dependent force term."""
 
     def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
-        """Return the history by element, for a checkpoint; ``cells`` are the input numbers of the rank's elements."""
+        """Return the history by element for a checkpoint; ``cells`` are the global numbers of this rank's elements."""
 
     def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Set the history from the values that ``state`` returned."""
 
 
 def force_terms(
@@ -64,28 +65,28 @@ def force_terms(
     step: float = np.inf,
     laws: "Mapping[int, Law]" = MappingProxyType({}),
 ) -> list[ForceTerm]:
-    """Return the force terms of elements: linear ones, and one with a path where the problem calls for it.
+    """Return the force terms of elements: linear ones, and a path-dependent one where material or kinematics need it.
 
     Args:
-        elements: The elements.
+        elements: Elements of this rank.
         materials: Material of each index of ``elements.elasticity``.
         kinematics: Small, corotational or finite.
-        step: dt [s], of laws that depend on the rate; infinity stands for slow.
-        laws: Index of ``elements.elasticity`` -> law in UFL that stands in the place of this material.
+        step: Time step of rate-dependent laws [s]; infinity means quasi-static.
+        laws: UFL laws by index of ``elements.elasticity``, which replace the materials.
     """
-    own = ~np.isin(elements.material, list(laws))
-    return terms_of(elements, own, materials, kinematics, step) + ufl_terms(elements, laws)
+    library = ~np.isin(elements.material, list(laws))
+    return terms_of(elements, library, materials, kinematics, step) + ufl_terms(elements, laws)
 
 
 def terms_of(
-    elements: Elements, own: NDArray[np.bool_], materials: Sequence[Material], kinematics: Kinematics, step: float
+    elements: Elements, chosen: NDArray[np.bool_], materials: Sequence[Material], kinematics: Kinematics, step: float
 ) -> list[ForceTerm]:
-    """Return the force terms of those elements that are ``own (ne,)``; other arguments as ``force_terms``."""
+    """Return the force terms of the elements ``chosen (ne,)``; other arguments as ``force_terms``."""
     plastic = np.array([plastic_constants(material) for material in materials])
-    elastic = own & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
+    elastic = chosen & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
     linear = elastic if kinematics == "small" else np.zeros_like(elastic)
     turning = elastic if kinematics == "corotational" and elements.cells.shape[1] == 8 else np.zeros_like(elastic)
-    path = own & ~linear & ~turning
+    path = chosen & ~linear & ~turning
     terms = linear_terms(elements.subset(linear))
     terms += corotational_terms(elements, turning)
     if path.any():
@@ -95,17 +96,17 @@ def terms_of(
 
 
 def ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]:
-    """Return a force term for each law in UFL that elements of this rank have; arguments as ``force_terms``."""
+    """Return a force term for each UFL law with elements on this rank; arguments as ``force_terms``."""
     here = {index: np.flatnonzero(elements.material == index) for index in laws}
     if not any(map(len, here.values())):
         return []
-    from reflowshock.fem.forces.force_ufl import UflElements  # which loads the compiler of forms
+    from reflowshock.fem.forces.force_ufl import UflElements  # imports the form compiler only when needed
 
     return [UflElements(elements, chosen, laws[index]) for index, chosen in here.items() if len(chosen)]
 
 
 def linear_terms(elements: Elements) -> list[ForceTerm]:
-    """Return the force terms of elements that stay elastic and turn little: boxes share stiffnesses."""
+    """Return the force terms of elastic elements with small rotations, with shared stiffnesses of boxes."""
     box = in_rows(elements)
     terms: list[ForceTerm] = []
     if box.any():

@@ -14,7 +14,15 @@ from reflowshock.fem.kernels.force import add_block_force, assemble_upper_blocks
 
 @dataclass(frozen=True, slots=True)
 class AssembledElements:
-    """Upper triangle of a stiffness in block rows; see ``kernels.force.add_block_force`` for the arrays."""
+    """Upper triangle of a stiffness in block rows, as a ``force.ForceTerm``.
+
+    Attributes:
+        pointer: Start of each block row, shape (n + 1,) int32.
+        columns: Column of each block, shape (nz,) int32.
+        blocks: Blocks of the upper triangle, shape (nz, 3, 3) [N/m].
+        mean: Mean strains of elements with hourglass control, otherwise None.
+        history: Empty, because the force follows from the displacement.
+    """
 
     pointer: NDArray[np.int32]
     columns: NDArray[np.int32]
@@ -33,12 +41,12 @@ class AssembledElements:
         return cls(pointer, columns, blocks, MeanStrain.of(elements))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract K u from the force."""
+        """Subtract K u at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N]."""
         add_block_force(self.pointer, self.columns, self.blocks, displacement, force)
 
     @property
     def arrays(self) -> dict[str, tuple[NDArray, ...]]:
-        """Return its entry of ``kernels.levels.ForceArrays``."""
+        """Entry of ``kernels.levels.ForceArrays`` by name."""
         return {"assembled": (self.pointer, self.columns, self.blocks)}
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:

@@ -1,9 +1,9 @@
 """Internal force of boxes: one stiffness per shape and material, diagonalised by symmetry.
 
-A box of a material whose axes it shares has three mirror planes. In the Walsh-Hadamard basis of its eight nodes
-the 24 x 24 stiffness falls into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have
-the index p XOR 2^c. A product costs 216 multiplications and additions instead of 1152, with one small table per shape,
-and half of them are shared by the neighbours in a row of boxes (``box_rows``, ``kernels.box_rows``).
+A box along the axes of its material has three mirror planes. In the Walsh-Hadamard basis of its eight nodes the 24 x 24
+stiffness splits into eight blocks of 3 x 3, one per parity: the modes of component c with parity p have the index
+p XOR 2^c. A product takes 216 multiplications and additions instead of 1152, with one small table per shape, and
+neighbours in a row of boxes share half of them (``box_rows``, ``kernels.box_rows``).
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,21 +22,21 @@ UPPER = np.triu_indices(3)
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # proper rotations that bring each axis to the front
 BOX_TOLERANCE = 1e-9
-FEW = 64  # boxes whose assembled matrices cost no more than the calls of a term of their own
+FEW = 64  # number of boxes up to which assembled matrices cost no more than the calls of a separate term
 
 
 @dataclass(frozen=True, slots=True)
 class CongruentElements:
-    """Boxes that share stiffnesses, in rows along the axis that has the longest ones.
+    """Boxes that share stiffnesses, in rows along the axis with the longest rows.
 
     Attributes:
-        axes: ``(3,)`` coordinate directions in the order of the rows' frame.
-        nodes: ``(p,)`` int32, node at each position of the lines.
-        rows: ``(nr, 6)`` int32, see ``kernels.box_rows.add_row_forces``.
-        blocks: ``(ns, 8, 6)`` [N/m], in the rows' frame.
-        lines: ``(2, 3, p + PAD)`` displacements [m] and forces [N] at the positions, between calls of no meaning.
-        mean: Mean strains of elements with hourglass control.
-        history: Empty.
+        axes: Coordinate directions in the order of the frame of the rows, shape (3,).
+        nodes: Node at each position of the lines, shape (p,) int32.
+        rows: Rows of boxes, see ``kernels.box_rows.add_row_forces``, shape (nr, 6) int32.
+        blocks: Parity blocks of each shape in the frame of the rows, shape (ns, 8, 6) [N/m].
+        lines: Work space for displacements [m] and forces [N] at the positions, shape (2, 3, p + PAD).
+        mean: Mean strains of elements with hourglass control, otherwise None.
+        history: Empty, because the force follows from the displacement.
     """
 
     axes: NDArray[np.int64]
@@ -50,20 +50,20 @@ class CongruentElements:
     @classmethod
     def build(cls, elements: Elements) -> "CongruentElements":
         """Group boxes (``is_box``) into classes and rows, and diagonalise the stiffness of each class."""
-        ahead, axes, found, first = arranged(elements)
+        ahead, axes, box_rows, first = arranged(elements)
         blocks = parity_blocks(element_stiffness(ahead.subset(first)))
-        lines = np.zeros((2, 3, len(found.nodes) + PAD))
-        return cls(np.array(axes), found.nodes, found.rows, blocks, lines, MeanStrain.of(elements))
+        lines = np.zeros((2, 3, len(box_rows.nodes) + PAD))
+        return cls(np.array(axes), box_rows.nodes, box_rows.rows, blocks, lines, MeanStrain.of(elements))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract K u from the force."""
+        """Subtract K u at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N]."""
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
         add_row_forces(self.rows, self.blocks, self.lines[0], self.lines[1])
         subtract_lines(self.nodes, self.axes, self.lines[1], force)
 
     @property
     def arrays(self) -> dict[str, tuple[NDArray, ...]]:
-        """Return its entry of ``kernels.levels.ForceArrays``."""
+        """Entry of ``kernels.levels.ForceArrays`` by name."""
         return {"congruent": (self.nodes, self.axes, self.rows, self.blocks, self.lines)}
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
@@ -72,7 +72,7 @@ class CongruentElements:
 
 
 def arranged(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRows, NDArray[np.int64]]:
-    """Return boxes in the frame in which their rows are longest, its axes, the rows, and a box of each shape."""
+    """Return boxes in the frame with the longest rows, the axes of that frame, the rows, and a box of each shape."""
     first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
     candidates = []
     for axes in TURNS:
@@ -82,14 +82,14 @@ def arranged(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRow
 
 
 def turned(elements: Elements, axes: tuple[int, int, int]) -> Elements:
-    """Return elements in a frame whose directions are the given coordinate directions."""
+    """Return elements in a frame whose directions are the coordinate directions ``axes``."""
     voigt = [VOIGT.index((min(axes[i], axes[j]), max(axes[i], axes[j]))) for i, j in VOIGT]
     elasticity = np.ascontiguousarray(elements.elasticity[:, voigt][:, :, voigt])
     return replace(elements, points=np.ascontiguousarray(elements.points[:, axes]), elasticity=elasticity)
 
 
 def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which elements ``(ne, k, 3)`` are hexahedral boxes along the axes, whichever way they are numbered."""
+    """Return which elements with corners ``(ne, k, 3)`` are boxes along the axes, in any node order: shape (ne,)."""
     if corners.shape[1] != 8:
         return np.zeros(len(corners), dtype=bool)
     low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
@@ -102,7 +102,7 @@ def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def in_rows(elements: Elements) -> NDArray[np.bool_]:
-    """Return which elements ``(ne,)`` are worth a term of boxes: boxes, unless they are few among others."""
+    """Return which elements ``(ne,)`` form a term of boxes: all boxes, but none if a mixed mesh has only a ``FEW``."""
     box = is_box(elements.points[elements.cells])
     return box if box.all() or np.sum(box) >= FEW else np.zeros_like(box)
 
@@ -117,7 +117,13 @@ def aligned(elements: Elements) -> Elements:
 
 
 def parity_blocks(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the 3 x 3 blocks of box stiffnesses ``(ns, 24, 24)`` in symmetric storage, over 8: ``(ns, 8, 6)`` [N/m].
+    """Return the parity blocks of box stiffnesses.
+
+    Args:
+        stiffness: Stiffness of each shape, nodes in tensor order, shape (ns, 24, 24) [N/m].
+
+    Returns:
+        The 3 x 3 block of each parity over 8, in symmetric storage (00 01 02 11 12 22), shape (ns, 8, 6) [N/m].
 
     Raises:
         ValueError: A stiffness lacks the mirror symmetry of a box.

@@ -1,12 +1,12 @@
-"""Internal force of elastic hexahedra that turn by any angle and strain little, at a few times the cost of linear ones.
+"""Corotational internal force of elastic hexahedra with finite rotations and small strains.
 
-The linear stiffness of an element acts in the frame of its mean rotation: of boxes diagonalised by their symmetry
-(``force_congruent``, ``kernels.box_rotation``), of other hexahedra as mean strain and hourglass part
-(``kernels.turned_hexahedron``). The force is the exact derivative of an energy and needs no path. What it leaves out is
-of second order in the strain, (U - 1)^2 / 2: a strain of 1 % is wrong by 5e-5.
+The linear stiffness of an element acts in the frame of its mean rotation: for boxes diagonalised by their symmetry
+(``force_congruent``, ``kernels.box_rotation``), for other hexahedra split into mean strain and hourglass part
+(``kernels.turned_hexahedron``). The force is the exact derivative of an energy and has no history. The neglected strain
+is of second order, (U - 1)^2 / 2: 5e-5 at a strain of 1 %.
 
-Boxes stand in rows of equal ones, whose neighbours share work, or in blocks of any shapes: on the graded board of
-jedec_bga, with three boxes a row, blocks are 2.3 times as fast; from 24 boxes a row on, rows are.
+Boxes are stored in rows of equal boxes, whose neighbours share operations, or in blocks of any shapes: on the graded
+board of jedec_bga, with three boxes per row, blocks are 2.3 times as fast; from 24 boxes per row on, rows are faster.
 """
 
 from dataclasses import dataclass, field, replace
@@ -30,7 +30,7 @@ from reflowshock.fem.kernels.box_rotation import (
 from reflowshock.fem.kernels.box_rows import PAD, read_lines, subtract_lines
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces, turned_energies
 
-SHORT_ROWS = 8  # boxes of a row, in the mean, below which blocks of any shapes are faster
+SHORT_ROWS = 8  # mean number of boxes per row below which blocks of any shapes are used
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Parity and entries (00 01 02 11 12 22) of the blocks that resist the modes xy, xz, yz, xyz.
 HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)), (6, (0,)), (5, (3,)), (3, (5,)))
@@ -38,19 +38,19 @@ HIGHER = ((7, (0, 1, 2, 3, 4, 5)), (1, (3, 4, 5)), (2, (0, 2, 5)), (4, (0, 1, 3)
 
 @dataclass(frozen=True, slots=True)
 class CorotationalBoxes:
-    """Boxes that share stiffnesses and turn, in rows along the axis that has the longest ones.
+    """Corotational boxes that share stiffnesses, in rows along the axis with the longest rows.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        axes: ``(3,)`` coordinate directions in the order of the rows' frame.
-        nodes: ``(p,)`` int32, node at each position of the lines.
-        rows: ``(nr, 6)`` int32, see ``kernels.box_rows.add_row_forces``.
-        scales: ``(ns, 3)`` [1/m], -1 / (4 h) along each direction of the rows' frame.
-        constants: ``(ns, 27)``, see ``box_constants``.
-        lines: ``(2, 3, p + PAD)`` displacements [m] and forces [N] at the positions, between calls of no meaning.
-        hourglass: Whether the energy of the higher modes counts as that of hourglass control.
-        numbers: ``(ne,)`` the boxes' numbers among all elements of the rank.
-        history: Empty.
+        points: Nodes, shape (n, 3) [m].
+        axes: Coordinate directions in the order of the frame of the rows, shape (3,).
+        nodes: Node at each position of the lines, shape (p,) int32.
+        rows: Rows of boxes, see ``kernels.box_rows.add_row_forces``, shape (nr, 6) int32.
+        scales: -1 / (4 h) along each direction of the frame of the rows, shape (ns, 3) [1/m].
+        constants: Constants of each shape, see ``box_constants``, shape (ns, 27).
+        lines: Work space for displacements [m] and forces [N] at the positions, shape (2, 3, p + PAD).
+        hourglass: Whether the energy of the higher modes counts as hourglass energy.
+        numbers: Number of each box among all elements of the rank, shape (ne,).
+        history: Empty, because the force follows from the displacement.
     """
 
     points: NDArray[np.float64]
@@ -68,18 +68,25 @@ class CorotationalBoxes:
     def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalBoxes":
         """Group the ``chosen (ne,)`` elements, boxes (``force_congruent.is_box``), into shapes and rows."""
         elements = everything.subset(chosen)
-        ahead, axes, found, first = arranged(elements)
+        ahead, axes, box_rows, first = arranged(elements)
         shapes = ahead.subset(first)
         size = np.ptp(shapes.points[shapes.cells], axis=1)
-        lines = np.zeros((2, 3, len(found.nodes) + PAD))
+        lines = np.zeros((2, 3, len(box_rows.nodes) + PAD))
         constants = box_constants(shapes, size)
-        hourglass = elements.kind.hourglass
         return cls(
-            elements.points, np.array(axes), found.nodes, found.rows, -0.25 / size, constants, lines, hourglass, chosen
+            elements.points,
+            np.array(axes),
+            box_rows.nodes,
+            box_rows.rows,
+            -0.25 / size,
+            constants,
+            lines,
+            elements.kind.hourglass,
+            chosen,
         )
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force.
+        """Subtract the internal force at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N].
 
         Raises:
             InvertedElementError: A box is turned inside out.
@@ -92,7 +99,7 @@ class CorotationalBoxes:
 
     @property
     def arrays(self) -> dict[str, tuple[NDArray, ...]]:
-        """Return its entry of ``kernels.levels.ForceArrays``."""
+        """Entry of ``kernels.levels.ForceArrays`` by name."""
         return {"turning_rows": (self.nodes, self.axes, self.rows, self.scales, self.constants, self.lines)}
 
     def inverted(self, row: int, displacement: NDArray[np.float64]) -> InvertedElementError:
@@ -107,19 +114,19 @@ class CorotationalBoxes:
 
 @dataclass(frozen=True, slots=True)
 class TurningBlocks:
-    """Hexahedra that turn, sixteen of any shapes side by side; subclasses say of what kind.
+    """Corotational hexahedra in blocks of sixteen lanes; base class of boxes and other shapes.
 
     Attributes:
-        points: ``(n, 3)`` [m].
-        cells: ``(nb, 8, 16)`` int32, see ``forces``.
-        filled: ``(nb,)`` int32 elements of each block.
-        constants: ``(nb, 16 m)`` of each lane the m entries of ``constants_of``.
-        hourglass: Whether the energy of the higher modes counts as that of hourglass control.
-        numbers: ``(ne,)`` the elements' numbers among all of the rank.
-        history: Empty.
-        forces: Kernel that subtracts the force.
-        energies: Kernel of the energies of mean strains and higher modes.
-        entry: Of ``kernels.levels.ForceArrays``.
+        points: Nodes, shape (n, 3) [m].
+        cells: Nodes of each lane, shape (nb, 8, 16) int32.
+        filled: Number of elements of each block, shape (nb,) int32.
+        constants: The m entries of ``constants_of`` for each lane, lanes innermost, shape (nb, 16 m).
+        hourglass: Whether the energy of the higher modes counts as hourglass energy.
+        numbers: Number of each element among all elements of the rank, shape (ne,).
+        history: Empty, because the force follows from the displacement.
+        forces: Kernel that subtracts the internal force.
+        energies: Kernel that returns the energies of mean strains and higher modes [J].
+        entry: Name of the arrays in ``kernels.levels.ForceArrays``.
     """
 
     points: NDArray[np.float64]
@@ -135,17 +142,17 @@ class TurningBlocks:
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
-        """Return the elements with their nodes in the order that the kernels want: as they are."""
+        """Return the elements with nodes in the order of the kernels; here without change."""
         return elements
 
     @staticmethod
     def constants_of(shapes: Elements) -> NDArray[np.float64]:
-        """Return what the kernels need of an element of each shape: ``(ns, m)``."""
+        """Return the constants of each shape for the kernels, shape (ns, m), from one element per shape."""
         raise NotImplementedError
 
     @classmethod
     def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> Self:
-        """Put the ``chosen (ne,)`` elements into blocks."""
+        """Return the elements numbered ``chosen (ne,)`` in blocks."""
         elements = cls.ordered(everything.subset(chosen))
         element, filled = in_blocks(np.argsort(elements.cells.min(axis=1), kind="stable"))
         first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
@@ -155,14 +162,14 @@ class TurningBlocks:
         return cls(elements.points, cells, filled, by_block, elements.kind.hourglass, chosen)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force; errors as ``CorotationalBoxes.add``."""
+        """Subtract the internal force; arguments and errors as ``CorotationalBoxes.add``."""
         block = self.forces(self.cells, self.filled, self.constants, displacement, force)
         if block != UPRIGHT:
             raise self.inverted(block, displacement)
 
     @property
     def arrays(self) -> dict[str, tuple[NDArray, ...]]:
-        """Return its entry of ``kernels.levels.ForceArrays``."""
+        """Entry of ``kernels.levels.ForceArrays`` by name."""
         return {self.entry: (self.cells, self.filled, self.constants)}
 
     def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
@@ -183,12 +190,12 @@ class CorotationalBlocks(TurningBlocks):
 
     @staticmethod
     def ordered(elements: Elements) -> Elements:
-        """Return the boxes with bit d of a local index the side in direction d."""
+        """Return the boxes renumbered so that bit d of a local index is the side in direction d."""
         return aligned(elements)
 
     @staticmethod
     def constants_of(shapes: Elements) -> NDArray[np.float64]:
-        """Return ``box_constants``, then scales as of ``CorotationalBoxes``: ``(ns, 30)``."""
+        """Return ``box_constants`` followed by the scales of ``CorotationalBoxes``, shape (ns, 30)."""
         size = np.ptp(shapes.points[shapes.cells], axis=1)
         return np.column_stack([box_constants(shapes, size), -0.25 / size])
 
@@ -210,7 +217,7 @@ Corotational = CorotationalBoxes | CorotationalBlocks | CorotationalHexahedra
 
 
 def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[Corotational]:
-    """Return the terms of the ``chosen (ne,)`` elements, hexahedra: of boxes and of others."""
+    """Return the terms of the hexahedra with ``chosen (ne,)`` true: one for boxes and one for other shapes."""
     box = is_box(everything.points[everything.cells])
     boxes, others = np.flatnonzero(chosen & box), np.flatnonzero(chosen & ~box)
     terms: list[Corotational] = [corotational_boxes(everything, boxes)] if len(boxes) else []
@@ -218,31 +225,33 @@ def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[
 
 
 def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> CorotationalBoxes | CorotationalBlocks:
-    """Return the term of the ``chosen (ne,)`` elements, boxes: in rows, unless these are short."""
+    """Return the term of the boxes numbered ``chosen (ne,)``: in rows, or in blocks if the rows are short."""
     rows = CorotationalBoxes.build(everything, chosen)
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
 
 
 def accounted(energies: tuple[float, float], hourglass: bool) -> Energy:
-    """Return the energies of mean strains and higher modes [J], the latter as that of hourglass control or not."""
+    """Return the energies of mean strains and higher modes [J] as strain energy, the latter optionally as hourglass."""
     mean, higher = energies
     return Energy(strain=mean, hourglass=higher) if hourglass else Energy(strain=mean + higher)
 
 
-def inverted(what: str, start: NDArray[np.float64]) -> InvertedElementError:
-    """Return the error of a row or block of boxes that begins at a point ``(3,)`` [m]."""
-    place = ", ".join(f"{value:.6g}" for value in start)
-    return InvertedElementError(f"an element in {what} that begins near ({place}) m is turned inside out")
+def inverted(group: str, start: NDArray[np.float64]) -> InvertedElementError:
+    """Return the error of a group of boxes (a row or block) that begins at a point ``(3,)`` [m]."""
+    coordinates = ", ".join(f"{value:.6g}" for value in start)
+    return InvertedElementError(f"an element in {group} that begins near ({coordinates}) m is turned inside out")
 
 
 def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a force of boxes needs of each shape: ``(ns, 27)``.
-
-    V C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J], then the entries [N/m] of ``HIGHER`` in turn.
+    """Return the constants of the corotational force of boxes.
 
     Args:
-        shapes: A box of each shape, aligned, in the rows' frame.
-        size: ``(ns, 3)`` edges [m].
+        shapes: One aligned box of each shape, in the frame of the rows.
+        size: Edge lengths of each shape, shape (ns, 3) [m].
+
+    Returns:
+        V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J], then the entries of ``HIGHER`` [N/m],
+        shape (ns, 27).
     """
     elasticity = shapes.elasticity[shapes.material] * size.prod(axis=1)[:, None, None]
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))

@@ -1,11 +1,11 @@
-"""Internal force of elements that yield or turn: a path at each integration point.
+"""Internal force of elements with plasticity or finite rotations, with a history at each integration point.
 
-A 4-node tetrahedron has one constant strain: where it flows at constant volume it is too stiff, as at nu = 0.5
-(locking); use the 10-node one (four points, straight edges) or hexahedra for parts that yield.
+A 4-node tetrahedron has one constant strain: plastic flow at constant volume makes it too stiff (volumetric locking, as
+at nu = 0.5); use the 10-node tetrahedron (four points, straight edges) or hexahedra for parts that yield.
 
-Stress lives in the frame of the polar rotation, so that rotations of any size give no strain. The one-point hexahedron
-is twice as fast as the fully integrated one. Its hourglass forces yield as a section does: a plastic hinge has
-3 % too much moment, not 29 %.
+Stress is stored in the frame of the polar rotation, so finite rotations cause no strain. The one-point hexahedron is
+twice as fast as the fully integrated one. Its hourglass forces yield like a section under bending: the moment of a
+plastic hinge is 3 % too large instead of 29 %.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,29 +39,30 @@ from reflowshock.fem.parallel.checkpoint_state import Rows
 from reflowshock.materials.plasticity import NEVER_YIELDS
 
 AnyBlocks = Blocks | OnePointBlocks | HexahedronBlocks
-HISTORY = {  # name in checkpoints -> array of blocks that have it
+HISTORY = {  # name in checkpoints -> name of the array of the blocks
     "state": "state",
     "work": "plastic_work",
     "hourglass": "hourglass_energy",
     "place": "place",
     "slip": "slip",
 }
-RIGID = 1e30  # factor on the stiffness of incompatible modes that are to stay
+RIGID = 1e30  # factor on the stiffness of incompatible modes that keep their amplitudes
 
 
 @dataclass(frozen=True, slots=True)
 class NonlinearElements:
-    """Elements with a path.
+    """Path-dependent elements, as a ``force.TermWithPath``.
 
     Attributes:
-        elements: The elements.
-        numbers: ``(ne,)`` their numbers among all elements of the rank.
-        path: Kinematics and step.
-        elasticity: ``(nm, 6, 6)`` [Pa] of the materials of blocks: equal ones of ``elements`` are one.
-        lanes: Their order.
-        blocks: What the kernel works on.
-        kernel: Subtracts the force at a displacement; returns ``FINE`` or the block with an inverted element.
-        history: State, plastic work [J], and what else has a path.
+        elements: Elements of the term.
+        numbers: Number of each element among all elements of the rank, shape (ne,).
+        path: Kinematics and time step.
+        elasticity: Elasticity of the distinct materials of the blocks, shape (nm, 6, 6) [Pa].
+        lanes: Order of the elements in blocks.
+        blocks: Arrays of the kernel.
+        kernel: Function that subtracts the force at a displacement and returns ``FINE`` or a block with an inverted
+            element.
+        history: Arrays with history by name in checkpoints, e.g. state and plastic work [J].
     """
 
     elements: Elements
@@ -77,13 +78,13 @@ class NonlinearElements:
     def build(
         cls, everything: Elements, chosen: NDArray[np.int64], plastic: NDArray[np.float64], path: Path
     ) -> "NonlinearElements":
-        """Start from rest, without stress.
+        """Return elements at rest, without stress.
 
         Args:
-            everything: The elements of a rank.
-            chosen: ``(ne,)`` which of them.
-            plastic: ``(nm, 6)`` rows of ``materials.plasticity.plastic_constants``.
-            path: Kinematics and step.
+            everything: All elements of a rank.
+            chosen: Numbers of the elements of the term, shape (ne,).
+            plastic: Rows of ``materials.plasticity.plastic_constants``, shape (nm, 6).
+            path: Kinematics and time step.
         """
         elements = everything.subset(chosen)
         same, laws = alike(elements, plastic)
@@ -99,16 +100,16 @@ class NonlinearElements:
         else:
             blocks = gradient_blocks(same, lanes, laws, finite)
             kernel = partial(add_gradient_force, blocks, tuple(range(elements.kind.nodes)), path)
-        history = {name: getattr(blocks, kept) for name, kept in HISTORY.items() if hasattr(blocks, kept)}
+        history = {name: getattr(blocks, array) for name, array in HISTORY.items() if hasattr(blocks, array)}
         return cls(elements, chosen, path, same.elasticity, lanes, blocks, kernel, history)
 
     @property
     def finite(self) -> bool:
-        """Return whether rotations and strains are finite."""
+        """Whether rotations and strains are finite."""
         return self.path.finite
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force; the path goes on by a step.
+        """Subtract the internal force at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N], update the history.
 
         Raises:
             InvertedElementError: An element is turned inside out.
@@ -119,13 +120,13 @@ class NonlinearElements:
 
     @property
     def arrays(self) -> dict[str, Any]:
-        """Return its entries of ``kernels.levels.ForceArrays``; none where it has no place there."""
+        """Entries of ``kernels.levels.ForceArrays`` by name; empty for element kinds that are not supported there."""
         kinds = {OnePointBlocks: "one_point", HexahedronBlocks: "hexahedron"}
         kind = kinds.get(type(self.blocks))
         return {kind: self.blocks, "path": self.path} if kind else {}
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return the energies at the latest ``add``."""
+        """Return the energies at the displacement of the latest ``add``; the argument is not used."""
         blocks, valid = self.blocks, self.lanes.valid
         return Energy(
             strain=float(elastic_energy(blocks, self.elasticity)[valid].sum()),
@@ -134,28 +135,28 @@ class NonlinearElements:
         )
 
     def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
-        """Return the history by element, for a checkpoint; ``cells`` are the input numbers of the rank's elements."""
+        """Return the history by element for a checkpoint; ``cells`` are the global numbers of this rank's elements."""
         block, lane = np.nonzero(self.lanes.valid)
         numbers = cells[self.numbers[self.lanes.element[block, lane]]]
         return {name: Rows(numbers, by_lane(values)[block, lane]) for name, values in self.history.items()}
 
     def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
-        """Continue from the values of what ``state`` returned; lanes that repeat an element get its history, too."""
+        """Set the history from the values that ``state`` returned, also in lanes that repeat an element."""
         block, lane = np.nonzero(self.lanes.valid)
         row = np.empty(len(self.numbers), np.int64)
         row[self.lanes.element[block, lane]] = np.arange(len(block))
         for name, values in self.history.items():
             by_lane(values)[...] = state[name][row[self.lanes.element]]
 
-    def located(self, places: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return block and lane of some elements; ``places (k,)`` are positions among this term's elements."""
+    def located(self, indices: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return block and lane, each of shape (k,), of elements with ``indices (k,)`` into ``elements``."""
         block, lane = np.nonzero(self.lanes.valid)
         row = np.empty(len(self.numbers), np.int64)
         row[self.lanes.element[block, lane]] = np.arange(len(block))
-        return block[row[places]], lane[row[places]]
+        return block[row[indices]], lane[row[indices]]
 
     def points(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> "PointValues":
-        """Return the values at the integration points of elements found by ``located``."""
+        """Return the values at the integration points of elements, with block and lane from ``located``."""
         blocks = self.blocks
         points = blocks.state.shape[1]
         state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
@@ -164,67 +165,67 @@ class NonlinearElements:
         return PointValues(weight, state[..., :6], state[..., 6], work, self.ratios(block, lane))
 
     def ratios(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> NDArray[np.float64] | float:
-        """Return the volume at the integration points over that at rest; 1 where strains are small."""
+        """Return the volume at the integration points over the undeformed one ``(k, m)``, or 1 for small strains."""
         blocks = self.blocks
         if not self.finite:
             return 1.0
         if isinstance(blocks, HexahedronBlocks):
-            places = (
+            positions = (
                 by_lane(values)[row, lane]
                 for values, row in ((blocks.place, block), (blocks.corners, blocks.pattern[block]))
             )
-            now, rest = (gauss_volumes(place.reshape(-1, 7, 3)) for place in places)
+            now, rest = (gauss_volumes(position.reshape(-1, 7, 3)) for position in positions)
             return now / rest
         stretch = by_lane(blocks.state)[block, lane][..., 7:13]
         return np.linalg.det(symmetric(stretch.reshape(-1, 6))).reshape(stretch.shape[:-1])
 
-    def means(self, places: NDArray[np.integer]) -> "Means":
-        """Return mean values over some elements; ``places (k,)`` as in ``located``."""
-        found = self.points(*self.located(places))
-        share = found.weight / found.weight.sum(axis=1)[:, None]
-        stress = np.einsum("km,kmc->kc", share, found.stress)
-        return Means(stress, np.einsum("km,km->k", share, found.plastic_strain), found.plastic_work)
+    def means(self, indices: NDArray[np.integer]) -> "Means":
+        """Return the volume average of each of some elements; ``indices (k,)`` as in ``located``."""
+        values = self.points(*self.located(indices))
+        share = values.weight / values.weight.sum(axis=1)[:, None]
+        stress = np.einsum("km,kmc->kc", share, values.stress)
+        return Means(stress, np.einsum("km,km->k", share, values.plastic_strain), values.plastic_work)
 
-    def frozen(self, places: NDArray[np.integer]) -> "NonlinearElements":
-        """Return a term of some elements whose force at the displacement of the latest ``add`` is what it was there.
+    def frozen(self, indices: NDArray[np.integer]) -> "NonlinearElements":
+        """Return an elastic copy of some elements, with the same force at the displacement of the latest ``add``.
 
-        It does not flow, and its modes stay; ``take_path`` gives it their state.
+        It does not yield, and its incompatible modes keep their amplitudes; ``take_path`` copies the history into it.
         """
         plastic = np.tile(NEVER_YIELDS, (len(self.elements.elasticity), 1))
-        made = NonlinearElements.build(self.elements, places.astype(np.int64), plastic, Path(self.finite, np.inf))
-        if isinstance(made.blocks, HexahedronBlocks):
-            made.blocks.coupling[...] *= RIGID
-        return made
+        elastic = NonlinearElements.build(self.elements, indices.astype(np.int64), plastic, Path(self.finite, np.inf))
+        if isinstance(elastic.blocks, HexahedronBlocks):
+            elastic.blocks.coupling[...] *= RIGID
+        return elastic
 
     def take_path(self, other: "NonlinearElements", block: NDArray[np.int64], lane: NDArray[np.int64]) -> None:
-        """Take the history of the elements of another term, found by its ``located``, in the order of this one's."""
+        """Copy the history of elements of another term; block and lane from its ``located``, in this term's order."""
         order = self.lanes.element
         for name, values in self.history.items():
             by_lane(values)[...] = by_lane(other.history[name])[block[order], lane[order]]
 
     def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
         """Return the error that names the worst element of a block."""
-        elements, places = self.elements, self.lanes.element[block]
-        cells = elements.cells[places]
+        elements, indices = self.elements, self.lanes.element[block]
+        cells = elements.cells[indices]
         lowest = elements.kind.geometry((elements.points + displacement)[cells]).lowest
         worst = int(np.argmin(lowest))
-        place = ", ".join(f"{value:.6g}" for value in elements.points[cells[worst]].mean(axis=0))
+        centre = ", ".join(f"{value:.6g}" for value in elements.points[cells[worst]].mean(axis=0))
         return InvertedElementError(
-            f"element {self.numbers[places[worst]]}, at first near ({place}) m, is turned inside out (lowest Jacobian"
+            f"element {self.numbers[indices[worst]]}, at first near ({centre}) m, is turned inside out (lowest Jacobian"
             f" determinant {lowest[worst]:.3e} m^3)"
         )
 
 
 @dataclass(frozen=True, slots=True)
 class PointValues:
-    """Values at the m integration points of elements.
+    """Values at the m integration points of k elements.
 
     Attributes:
-        weight: ``(k, m)`` [m^3].
-        stress: ``(k, m, 6)`` [Pa] Kirchhoff stress in the frame that turns with the body.
-        plastic_strain: ``(k, m)`` equivalent plastic strain.
-        plastic_work: ``(k,)`` [J/m^3] of whole elements.
-        ratio: ``(k, m)`` volume over that at rest, or 1.
+        weight: Volume of each integration point, shape (k, m) [m^3].
+        stress: Kirchhoff stress in the corotated frame, shape (k, m, 6) [Pa].
+        plastic_strain: Equivalent plastic strain, shape (k, m).
+        plastic_work: Plastic work density averaged over each element, shape (k,) [J/m^3].
+        ratio: Deformed over undeformed volume, shape (k, m), or 1 for small strains.
     """
 
     weight: NDArray[np.float64]
@@ -235,19 +236,19 @@ class PointValues:
 
     @property
     def mises(self) -> NDArray[np.float64]:
-        """Return the von Mises stresses ``(k, m)`` [Pa] of the Cauchy stress, which no rotation changes."""
+        """Von Mises stress of the Cauchy stress, shape (k, m) [Pa]."""
         result: NDArray[np.float64] = von_mises(self.stress.reshape(-1, 6)).reshape(self.weight.shape)
         return result / self.ratio
 
 
 @dataclass(frozen=True, slots=True)
 class Means:
-    """Volume averages over elements.
+    """Volume averages over k elements.
 
     Attributes:
-        stress: ``(k, 6)`` [Pa] Kirchhoff stress in the frame that turns with the body.
-        plastic_strain: ``(k,)`` equivalent plastic strain.
-        plastic_work: ``(k,)`` [J/m^3].
+        stress: Kirchhoff stress in the corotated frame, shape (k, 6) [Pa].
+        plastic_strain: Equivalent plastic strain, shape (k,).
+        plastic_work: Plastic work density, shape (k,) [J/m^3].
     """
 
     stress: NDArray[np.float64]
@@ -256,7 +257,7 @@ class Means:
 
 
 def by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a view ``(nb, 16, m)`` or ``(nb, 16, p, m)`` of an array of blocks whose lanes are innermost."""
+    """Return a view with the lanes as second axis, ``(nb, 16, ...)``, of an array of blocks with lanes innermost."""
     split = values.reshape(*values.shape[:-1], -1, LANES)
     return np.moveaxis(split, -1, 1)
 

@@ -1,9 +1,10 @@
-"""Force terms from UFL: any hyperelastic or viscoelastic law, assembled by DOLFINx on the rank's own cells.
+"""Force terms from UFL: hyperelastic or viscoelastic laws, assembled by DOLFINx on the cells of one rank.
 
-A law is given by its stored energy; its stress and its tangent follow. Viscoelastic laws have internal variables at the
-integration points, which change once a step. This is for laws that the program's own elements do not have, and to check
-them. DOLFINx takes 8 to 50 times as long as own linear elements, 3 to 6 times as long as own ones at finite strain (but
-half as long as fully integrated hexahedra, whose modes are solved for), with internal variables 10 to 80 times.
+A law is defined by its stored energy; its stress and tangent follow. Viscoelastic laws have internal variables at the
+integration points, which are updated once per step. UFL serves laws that the compiled elements lack, and as a check of
+those. DOLFINx takes 8 to 50 times as long as the compiled linear elements, 3 to 6 times as long as those at finite
+strain (half as long as fully integrated hexahedra, which solve for their modes), with internal variables 10 to 80
+times.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,21 +22,21 @@ from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.parallel.checkpoint_state import Rows
 
-Expression = Any  # of UFL, whose classes have no common name in all versions
+Expression = Any  # UFL expression; the base class has different names in different versions
 Internal = Mapping[str, Expression]
-DEGREE = {4: 1, 8: 2, 10: 2}  # of the quadrature, by the nodes of a cell
+DEGREE = {4: 1, 8: 2, 10: 2}  # degree of the quadrature by number of nodes of a cell
 
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A material law in UFL. ``H = du/dX`` is the gradient of the displacement, ``(3, 3)``.
+    """Material law in UFL, with the displacement gradient ``H = du/dX``, shape (3, 3).
 
     Attributes:
-        energy: ``(H, internal)`` -> stored energy per undeformed volume [J/m^3].
-        stress: ``(H, internal)`` -> first Piola-Kirchhoff stress ``(3, 3)`` [Pa]; without it that of the energy, dW/dH.
-        internal: Name -> shape of each internal variable, zero at rest.
-        update: ``(H, internal)`` -> name -> value after a step, from the new H and the values before the step. Energy
-            and stress are given the new values.
+        energy: Function ``(H, internal)`` of the stored energy per undeformed volume [J/m^3].
+        stress: Function ``(H, internal)`` of the first Piola-Kirchhoff stress, shape (3, 3) [Pa]; None for dW/dH.
+        internal: Shape of each internal variable by name; all are zero at rest.
+        update: Function of the new H and the internal variables before a step that returns their values after it by
+            name; None without internal variables. Energy and stress receive the new values.
     """
 
     energy: Callable[[Expression, Internal], Expression]
@@ -44,7 +45,7 @@ class Law:
     update: Callable[[Expression, Internal], Internal] | None = None
 
     def first_piola_kirchhoff(self, gradient: Expression, internal: Internal) -> Expression:
-        """Return the stress ``(3, 3)`` [Pa] at a gradient of the displacement."""
+        """Return the first Piola-Kirchhoff stress ``(3, 3)`` [Pa] at a displacement gradient ``(3, 3)``."""
         if self.stress is not None:
             return self.stress(gradient, internal)
         variable = ufl.variable(gradient)
@@ -52,21 +53,21 @@ class Law:
 
 
 class Space:
-    """Elements as a mesh of DOLFINx's, of this rank alone.
+    """Function space on a DOLFINx mesh of the elements of one rank.
 
     Attributes:
-        mesh: The mesh.
-        displacement: A field on it.
+        mesh: DOLFINx mesh.
+        displacement: Displacement field [m].
         test: Test functions.
         dx: Measure of integrals over the undeformed cells.
-        degree: Of the quadrature.
-        order: ``(ne,)`` the element that each cell of the mesh is.
-        nodes: ``(m,)`` node of the elements that each block of the field's degrees of freedom belongs to.
-        dofs: ``(ne, k)`` these blocks by cell.
+        degree: Degree of the quadrature.
+        order: Element of each cell of the mesh, shape (ne,).
+        nodes: Node of each block of degrees of freedom, shape (m,).
+        dofs: Blocks of degrees of freedom of each cell, shape (ne, k).
     """
 
     def __init__(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> None:
-        """Take cells ``(ne, k)`` of points ``(n, 3)`` [m]."""
+        """Build the space from cells ``(ne, k)`` and points ``(n, 3)`` [m]."""
         used, compact = np.unique(cells, return_inverse=True)
         self.mesh = dolfinx_api.make_mesh(MPI.COMM_SELF, points[used], compact.reshape(cells.shape))
         space = dolfinx_api.vector_space(self.mesh)
@@ -79,15 +80,15 @@ class Space:
         self.nodes[self.dofs] = used[dolfinx_api.input_nodes(self.mesh)[dolfinx_api.cell_nodes(self.mesh)]]
 
     def set(self, displacement: NDArray[np.float64]) -> None:
-        """Take a displacement ``(n, 3)`` [m]."""
+        """Set the displacement field from nodal values ``(n, 3)`` [m]."""
         self.displacement.x.array.reshape(-1, 3)[:] = displacement[self.nodes]
 
 
 class UflElements:
-    """Elements whose stress is a law in UFL: a force term.
+    """Force term of elements with a UFL law.
 
     Attributes:
-        numbers: ``(ne,)`` their numbers among all elements of the rank.
+        numbers: Number of each element among all elements of the rank, shape (ne,).
         history: Values of the internal variables, by degree of freedom of their spaces.
     """
 
@@ -95,9 +96,9 @@ class UflElements:
         """Start from rest.
 
         Args:
-            everything: The elements of a rank.
-            chosen: ``(ne,)`` which of them.
-            law: Their material.
+            everything: All elements of a rank.
+            chosen: Numbers of the elements of the term, shape (ne,).
+            law: Material law of the elements.
         """
         self._space = space = Space(everything.points, everything.cells[chosen])
         self.numbers = chosen[space.order]
@@ -110,7 +111,7 @@ class UflElements:
         self.history = {name: variable.x.array for name, variable in variables.items()}
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force ``(n, 3)`` [N]; internal variables go on by a step."""
+        """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]; update internal variables."""
         space = self._space
         space.set(displacement)
         if self._internal:
@@ -120,20 +121,20 @@ class UflElements:
         force[space.nodes] -= result.reshape(-1, 3)
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return the stored energy at a displacement ``(n, 3)`` [m] and what viscous flow has dissipated [J]."""
+        """Return the stored energy at a displacement ``(n, 3)`` [m] and the viscous dissipation so far [J]."""
         self._space.set(displacement)
         stored = float(dolfinx.fem.assemble_scalar(self._energy))
         return Energy(strain=stored, plastic=self._internal.work() - stored if self._internal else 0.0)
 
     def state(self, cells: NDArray[np.int64]) -> dict[str, Rows]:
-        """Return the internal variables by element, for a checkpoint; ``cells`` are input numbers of all elements."""
+        """Return the internal variables by element for a checkpoint; ``cells`` are the global element numbers."""
         if not self._internal:
             return {}
         numbers = cells[self.numbers]
         return {name: Rows(numbers, values) for name, values in self._internal.by_cell().items()}
 
     def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Set the internal variables from the values that ``state`` returned."""
         if self._internal:
             self._internal.take(state)
 
@@ -141,8 +142,8 @@ class UflElements:
 class _Internal:
     """Internal variables of a law at the integration points, and the work of its stress.
 
-    Besides those of the law: gradient of the displacement, stress [Pa], and work [J/m^3], summed over steps: the mean
-    stress times the change of the gradient.
+    The variables of the law are followed by displacement gradient, stress [Pa] and work [J/m^3], the sum over steps of
+    mean stress times change of the gradient.
     """
 
     def __init__(self, space: Space, law: Law) -> None:
@@ -150,8 +151,8 @@ class _Internal:
         shapes = {**law.internal, "gradient": (3, 3), "stress": (3, 3), "work": ()}
         self._space = space
         spaces = {name: dolfinx_api.quadrature_space(space.mesh, space.degree, shape) for name, shape in shapes.items()}
-        self.variables = {name: dolfinx.fem.Function(own) for name, own in spaces.items()}
-        self._dofs = {name: dolfinx_api.cell_dofs(own) for name, own in spaces.items()}
+        self.variables = {name: dolfinx.fem.Function(points) for name, points in spaces.items()}
+        self._dofs = {name: dolfinx_api.cell_dofs(points) for name, points in spaces.items()}
         old, gradient = self.variables, ufl.grad(space.displacement)
         new = dict(law.update(gradient, old))
         stress = law.first_piola_kirchhoff(gradient, new)
@@ -163,20 +164,20 @@ class _Internal:
         self._work = dolfinx.fem.form(old["work"] * space.dx)
 
     def step(self) -> None:
-        """Replace all values by those after a step to the present displacement."""
+        """Update all variables by a step to the current displacement."""
         self.take({name: evaluate() for name, evaluate in self._update.items()})
 
     def work(self) -> float:
-        """Return the work that the stress has taken up [J]."""
+        """Return the work of the stress so far [J]."""
         return float(dolfinx.fem.assemble_scalar(self._work))
 
     def by_cell(self) -> dict[str, NDArray[np.float64]]:
-        """Return a copy of the values of each variable, ``(ne, points * size)``."""
+        """Return a copy of the values of each variable by name, shape (ne, points * size)."""
         count = len(self._space.order)
         return {name: self._blocks(name)[self._dofs[name]].reshape(count, -1) for name in self.variables}
 
     def take(self, values: Mapping[str, NDArray[np.float64]]) -> None:
-        """Set values of each variable, as ``by_cell`` returns them."""
+        """Set the values of each variable in the layout of ``by_cell``."""
         for name, dofs in self._dofs.items():
             self._blocks(name)[dofs] = values[name].reshape(*dofs.shape, -1)
 
@@ -187,7 +188,7 @@ class _Internal:
 
 
 def tangent_at_rest(elements: Elements, law: Law) -> NDArray[np.float64]:
-    """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element at rest against a sudden step, node by node."""
+    """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element at rest (instantaneous response), node by node."""
     count, nodes = elements.cells.shape
     apart = np.arange(count * nodes).reshape(count, nodes)
     space = Space(elements.points[elements.cells].reshape(-1, 3), apart)

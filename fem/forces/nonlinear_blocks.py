@@ -1,4 +1,4 @@
-"""Elements in blocks of sixteen lanes for the nonlinear kernels: the order of elements, shapes, initial state."""
+"""Elements in blocks of sixteen lanes for the nonlinear kernels: order, constants of shapes, initial state."""
 
 from dataclasses import dataclass, replace
 
@@ -23,61 +23,61 @@ TEN_NODES = Tetrahedron(
 )
 SYMMETRIC = (np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2]))  # rows and columns of xx yy zz xy yz xz
 ORTHOTROPIC = (np.append(SYMMETRIC[0], [3, 4, 5]), np.append(SYMMETRIC[1], [3, 4, 5]))
-# Parities of the modes xy, xz, yz, xyz; their places and signs among the amplitudes of ``one_point``.
+# Parities of the modes xy, xz, yz, xyz; their indices and signs among the amplitudes of ``one_point``.
 HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
-LINEAR = [0, 1, 3]  # places of the modes x, y, z among the parities from 1 on
+LINEAR = [0, 1, 3]  # indices of the modes x, y, z among the parities from 1 on
 MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
 
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """The order of elements in blocks.
+    """Order of elements in blocks of sixteen lanes.
 
     Attributes:
-        element: ``(nb, 16)`` element of each lane; lanes past the last one of a group repeat it.
-        filled: ``(nb,)`` int32 elements of each block.
-        pattern: ``(nb,)`` int32; blocks of equal shapes have the same.
-        shape: ``(ns,)`` an element of each different shape.
-        place: ``(np, 16)`` index into ``shape`` of each lane of a pattern.
+        element: Element of each lane, shape (nb, 16); lanes after the last element of a group repeat it.
+        filled: Number of elements of each block, shape (nb,) int32.
+        pattern: Pattern of each block, shape (nb,) int32; blocks of equal shapes share one.
+        shape: One element of each distinct shape, shape (ns,).
+        pattern_shapes: Index into ``shape`` of each lane of a pattern, shape (np, 16).
     """
 
     element: NDArray[np.int64]
     filled: NDArray[np.int32]
     pattern: NDArray[np.int32]
     shape: NDArray[np.int64]
-    place: NDArray[np.int64]
+    pattern_shapes: NDArray[np.int64]
 
     @property
     def valid(self) -> NDArray[np.bool_]:
-        """Return which lanes ``(nb, 16)`` count."""
+        """Whether each lane holds an element of its own instead of a repeated one, shape (nb, 16)."""
         return np.arange(LANES) < self.filled[:, None]
 
     def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values of shapes ``(ns, m, k)`` as those of patterns, lanes innermost: ``(np, m, 16 k)``."""
-        moved = values[self.place].transpose(0, 2, 3, 1)
+        """Return values of patterns ``(np, m, 16 k)``, lanes innermost, from values of shapes ``(ns, m, k)``."""
+        moved = values[self.pattern_shapes].transpose(0, 2, 3, 1)
         return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
 
 
 def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
-    """Sort elements into blocks of one group ``(ne,)``, equal shapes together."""
+    """Sort elements into blocks, each within one ``group (ne,)``, with equal shapes together."""
     first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
     order = np.lexsort((elements.cells.min(axis=1), shape, group))
     ends = np.flatnonzero(np.diff(group[order], append=-1)) + 1
     parts = [in_blocks(order[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
     element, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    place, pattern = np.unique(shape[element], axis=0, return_inverse=True)
-    return Lanes(element, filled, pattern.reshape(-1).astype(np.int32), first, place)
+    pattern_shapes, pattern = np.unique(shape[element], axis=0, return_inverse=True)
+    return Lanes(element, filled, pattern.reshape(-1).astype(np.int32), first, pattern_shapes)
 
 
 def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Return the elements of each block ``(nb, 16)``, lanes past the last one repeat it, and how many it has."""
+    """Return the elements of each block ``(nb, 16)``, the last one repeated, and their numbers ``(nb,)``."""
     padded = np.arange(-(-len(order) // LANES) * LANES)
     filled = np.minimum(len(order) - padded[::LANES], LANES)
     return order[np.minimum(padded, len(order) - 1)].reshape(-1, LANES), filled.astype(np.int32)
 
 
 def alike(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
-    """Return elements and plastic constants ``(nm, 6)`` with equal materials as one: many parts are of the same."""
+    """Return elements and plastic constants ``(nm, 6)`` with equal materials merged, since many parts share one."""
     constants = np.column_stack([elements.elasticity.reshape(len(plastic), -1), plastic])
     _, first, material = np.unique(constants, axis=0, return_index=True, return_inverse=True)
     material = material.reshape(-1)[elements.material].astype(np.int32)
@@ -85,7 +85,7 @@ def alike(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, N
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
-    """Return tetrahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return blocks of stress-free tetrahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
     gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
     weight = determinant / (6.0 * determinant.shape[1])
@@ -100,7 +100,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return one-point hexahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return blocks of stress-free one-point hexahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     shapes = elements.subset(lanes.shape)
     volume = element_geometry(shapes.points, shapes.cells).volume
     return OnePointBlocks(
@@ -116,13 +116,14 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
 
 
 def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
-    """Return what ``kernels.turned_hexahedron`` needs of each shape: ``(ns, 120)``.
-
-    V C [J], b_p [1/m] of p = 1 to 7, c_k [m], and H [N/m] on the amplitudes, which ``hourglass_control`` has as
-    multiples of the transformed ones.
+    """Return the constants of each shape for ``kernels.turned_hexahedron``.
 
     Args:
-        shapes: An element of each shape.
+        shapes: One element of each shape.
+
+    Returns:
+        V C [J], b_p [1/m] for p = 1 to 7, c_k [m] and the hourglass stiffness H [N/m] in the amplitudes of the modes
+        xy, xz, yz, xyz, shape (ns, 120).
     """
     corners = shapes.points[shapes.cells]
     geometry = element_geometry(shapes.points, shapes.cells)
@@ -133,19 +134,19 @@ def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
     tensor = stiffness.reshape(-1, 4, 3, 4, 3)[:, AMPLITUDES][:, :, :, AMPLITUDES]
     tensor = np.einsum("k,skilj,l->skilj", HANDEDNESS, tensor, HANDEDNESS, optimize=True) / 8.0
     blocks = tensor.transpose(0, 1, 3, 2, 4)
-    own, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
-    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, own, pairs))
+    diagonal, pairs = blocks[:, MODES, MODES][..., SYMMETRIC[0], SYMMETRIC[1]], blocks[:, PAIRS[0], PAIRS[1]]
+    flat = (values.reshape(len(corners), -1) for values in (gradient, transformed, diagonal, pairs))
     return np.column_stack([rigidity, *flat])
 
 
 def in_modes(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the amplitudes ``(ne, 12)`` [m] of ``one_point`` as those of the modes xy, xz, yz, xyz."""
+    """Return amplitudes ``(ne, 12)`` [m] in the modes xy, xz, yz, xyz from amplitudes in the modes of ``one_point``."""
     ordered = amplitudes.reshape(-1, 4, 3)[:, AMPLITUDES] * HANDEDNESS[:, None]
     return np.sqrt(8.0) * ordered.reshape(amplitudes.shape)
 
 
 def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> HexahedronBlocks:
-    """Return fully integrated hexahedra without stress; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return blocks of stress-free, fully integrated hexahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
     weight = np.linalg.det(np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True))
@@ -168,18 +169,18 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
     )
 
 
-def gauss_volumes(place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the volumes at the Gauss points ``(k, 8)`` of hexahedra, but for a factor.
+def gauss_volumes(position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the volumes at the Gauss points ``(k, 8)`` of hexahedra, up to a common factor.
 
     Args:
-        place: ``(k, 7, 3)`` transformed positions, see ``kernels.nonlinear_hexahedron``.
+        position: Transformed positions, see ``kernels.nonlinear_hexahedron``, shape (k, 7, 3) [m].
     """
-    corners = np.einsum("pa,kpi->kai", SIGNS[1:], place)
+    corners = np.einsum("pa,kpi->kai", SIGNS[1:], position)
     return np.linalg.det(np.einsum("kai,gad->kgid", corners, GAUSS_DERIVATIVES, optimize=True))
 
 
 def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:
-    """Return the arrays that blocks of all kinds have."""
+    """Return the arrays common to blocks of all kinds by name; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     return {
         "cells": np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1)),
         "filled": lanes.filled,
@@ -191,12 +192,12 @@ def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]
 
 
 def written_zeros(*shape: int) -> NDArray[np.float64]:
-    """Return zeros in memory of their own; pages never written are all one, which some processors read slowly."""
+    """Return zeros that are written: unwritten pages share one physical page, which some processors read slowly."""
     return np.full(shape, 0.0)
 
 
 def orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return 1, xi, eta, zeta at the Gauss points, orthonormal under weights ``(ns, 8)``: ``(ns, 4, 8)``."""
+    """Return 1, xi, eta, zeta at the Gauss points, orthonormalised with weights ``(ns, 8)``, shape (ns, 4, 8)."""
     functions = np.column_stack([np.ones(8), GAUSS])
     root = np.sqrt(weight)[:, :, None]
     return (np.linalg.qr(functions * root)[0] / root).transpose(0, 2, 1)
@@ -216,7 +217,7 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
-    """Return the state without stress ``(nb, m, 16 * 13)``: no strain, or the unit stretch."""
+    """Return the stress-free state ``(nb, m, 16 * 13)`` of m points, with unit stretch for finite strains."""
     state = written_zeros(blocks, points, STATE_SLOTS)
     state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
     return state

@@ -1,18 +1,19 @@
-"""Numba kernels of elastic boxes that turn by any angle and strain little: in rows of equal ones, or each by itself.
+"""Numba kernels of corotational elastic boxes (finite rotations, small strains), in rows of equal boxes or in blocks.
 
-The mean deformation of a box, F = R U, has the stretch U = 1 + E. The higher modes q_k of its eight nodes are seen from
-the frame that turns with it, q^_k = R^T q_k. In this frame the strain energy is that of the linear box,
-V E : C E / 2 + sum over k, l of q^_k . H_kl q^_l / 2, and the force is its exact derivative. With T = V C : E,
+The mean deformation of a box, F = R U, has the stretch U = 1 + E. The higher modes q_k of its eight nodes have the
+components q^_k = R^T q_k in the corotated frame, where the strain energy equals the energy of the linear box,
+V E : C E / 2 + sum over k, l of q^_k . H_kl q^_l / 2. The force is its exact derivative. With T = V C : E,
 Q^ = H q^ and M = T U,
 
     P = R (T - [w]x),    (tr(U) 1 - U) w = axial(M - M^T) + sum over k of q^_k x Q^_k
 
-is the force on F, R Q^_k the force on q_k; [w]x is the matrix of the cross product. It is there because a change of F
-turns the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy and both momenta are kept.
+is the force on F and R Q^_k the force on q_k; [w]x is the matrix of the cross product. It arises because a change of F
+rotates the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy, linear and angular momentum are
+conserved.
 
-Rows, lines and faces are those of ``kernels.box_rows``, modes those of ``force_congruent``. Sixteen boxes of a row, or
-sixteen of any shapes, stand side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units of lanes:
-component c of the mode of parity p at 3 p + c, then F and R as ``kernels.nonlinear.rotate`` has them.
+Rows, lines and faces are defined in ``kernels.box_rows``, modes in ``force_congruent``. Sixteen boxes of a row, or
+sixteen boxes of any shapes, are computed side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units
+of lanes: component c of the mode of parity p at 3 p + c, then F and R as in ``kernels.nonlinear.rotate``.
 """
 
 import numpy as np
@@ -45,7 +46,13 @@ X, Y, Z, XY, XZ, YZ, XYZ = (3 * LANES * p for p in (1, 2, 4, 3, 5, 6, 7))  # slo
 
 @njit(**LANE_OPTIONS)
 def read_modes(faces, start, w):
-    """Write the modes of sixteen boxes of a row from the face values ``(12 * WIDTH,)`` at its nodes."""
+    """Write the modes of the boxes ``start`` to ``start + 15`` of a row from the face values at its nodes.
+
+    Args:
+        faces: Face values of three components, see ``box_rows.transform_lines``, shape (12 * WIDTH,).
+        start: First of the sixteen boxes in the row.
+        w: Workspace whose modes are written.
+    """
     for k in range(4):
         values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
         for lane in range(LANES):
@@ -58,7 +65,14 @@ def read_modes(faces, start, w):
 
 @njit(**LANE_OPTIONS)
 def add_faces(w, start, count, faces):
-    """Add the forces of the first ``count`` boxes to the face values at a row's nodes."""
+    """Add the forces on the modes of boxes of a row to the face values at its nodes, the transpose of ``read_modes``.
+
+    Args:
+        w: Workspace with the forces on the modes of sixteen boxes.
+        start: First of these boxes in the row.
+        count: Number of these boxes that are added; the others repeat the last box of the row.
+        faces: Face forces of three components, shape (12 * WIDTH,) [N], added to.
+    """
     for k in range(4):
         values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
         for lane in range(count):
@@ -90,7 +104,7 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write F of sixteen boxes; the scales in ``k`` turn modes into gradients, -1 / (4 h) along each direction."""
+    """Write F of sixteen boxes; the scales in ``k``, -1 / (4 h) along each direction, convert modes to gradients."""
     for lane in range(LANES):
         scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
         f = (
@@ -147,7 +161,7 @@ def spin(u, moment):
 
 @njit(**LANE_OPTIONS)
 def resist(k, w):
-    """Replace the higher modes of sixteen boxes by Q^, and write their moments to the slots of mode 0, given R."""
+    """Replace the higher modes of sixteen boxes by Q^ and write their moments q^ x Q^ to mode 0, given R."""
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
         a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
@@ -187,7 +201,7 @@ def write_linear_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def turn_higher(w):
-    """Turn Q^ of sixteen boxes."""
+    """Rotate Q^ of sixteen boxes by R."""
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
         put_three(w, XY + lane, applied(r, three(w, XY + lane)))
@@ -200,8 +214,8 @@ def turn_higher(w):
 def replace_by_forces(k, w):
     """Replace the modes of sixteen boxes by the forces on them, given F and R; ``k (480,)`` as in ``spread_shape``.
 
-    In several short loops that are written out: with too many accesses, or calls too large to be inlined, the compiler
-    makes no vectors of them, and the force takes three times as long.
+    The loops are short and unrolled: with too many accesses, or calls too large to be inlined, the compiler does not
+    vectorise them, and the force takes three times as long.
     """
     resist(k, w)
     write_stress(k, w)
@@ -242,7 +256,7 @@ def box_energies(w, lane, k):
 
 @njit(cache=True)
 def repeat_last(w, count):
-    """Let the lanes past the first ``count`` repeat the last of these."""
+    """Copy the modes of lane ``count - 1`` to all following lanes."""
     for slot in range(0, DEFORMATION, LANES):
         for lane in range(count, LANES):
             w[slot + lane] = w[slot + count - 1]
@@ -285,7 +299,7 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 
 @njit(cache=True)
 def row_energies(rows, scales, constants, displacement):
-    """Return the energies [J] of the mean strains and of the higher modes; arguments as above, no box inside out."""
+    """Return the energies [J] of mean strains and higher modes; arguments as ``add_turned_row_forces``."""
     faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0
     for r in range(len(rows)):
@@ -335,7 +349,7 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
 
 @njit(cache=True)
 def block_energies(cells, filled, constants, displacement):
-    """Return the energies [J] of the mean strains and of the higher modes; arguments as above, no box inside out."""
+    """Return the energies [J] of mean strains and higher modes; arguments as ``add_turned_block_forces``."""
     w = np.zeros(TURNED_SLOTS)
     mean = higher = 0.0
     for b in range(len(cells)):

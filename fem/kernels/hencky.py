@@ -1,7 +1,7 @@
-"""Numba kernels of deformation plasticity (Hencky): the stress as a function of the strain, elements at a displacement.
+"""Numba kernels of deformation plasticity (Hencky): stress as a function of the strain, elements at a displacement.
 
-Under loads that grow in proportion the flow theory of J2 gives what one return from rest along the trial deviator
-gives: with e the deviator of the strain, q_e = 3 G sqrt(2/3 e : e), and p from q_e - 3 G p = Y(p),
+Under proportional loading J2 flow theory gives the same stress as a single radial return from rest. With the deviator e
+of the strain, q_e = 3 G sqrt(2/3 e : e), and p from q_e - 3 G p = Y(p),
 
     s = 2 G (1 - 3 G p / q_e) e,     pressure elastic:
 
@@ -42,12 +42,12 @@ class Shape(NamedTuple):
 
 
 class ElementState(NamedTuple):
-    """What an element, or each of many, is at a displacement.
+    """Stress, internal force and tangent of an element at a displacement; arrays over many elements add a first axis.
 
     Attributes:
-        points: ``(m, 7)`` stress [Pa] and plastic strain of its points.
-        force: ``(k,)`` [N] internal force.
-        tangent: ``(k, k)`` [N/m].
+        points: Stress [Pa] and equivalent plastic strain of the integration points, shape (m, 7).
+        force: Internal force, shape (k,) [N].
+        tangent: Tangent stiffness, shape (k, k) [N/m].
     """
 
     points: NDArray[np.float64]
@@ -87,13 +87,13 @@ def hencky(strain, law, stress, tangent):
 
 @njit(cache=True)
 def soften(deviator, across, along, tangent):
-    """Subtract what flow takes from the tangent: of all deviators, and along the one that is there.
+    """Subtract the softening by plastic flow from the tangent, for all deviators and along the current deviator.
 
     Args:
-        deviator: ``(6,)`` [Pa] elastic one.
-        across: What is lost of 2 G [Pa].
-        along: What is lost besides, over the square of the deviator [1/Pa].
-        tangent: ``(6, 6)`` [Pa].
+        deviator: Elastic stress deviator, shape (6,) [Pa].
+        across: Reduction of 2 G for all deviators [Pa].
+        along: Additional reduction along the deviator, over its square [1/Pa].
+        tangent: Elastic tangent on entry, elastoplastic tangent on return, shape (6, 6) [Pa].
     """
     for i in range(6):
         for j in range(6):
@@ -110,7 +110,7 @@ def add_points(shape, unknowns, law, state):
     """Write the state of an element at unknowns ``(k,)`` [m].
 
     Returns:
-        The largest sum of magnitudes of the forces on an unknown past the nodes'.
+        Largest sum of magnitudes of the force contributions to an incompatible mode [N], the scale of its residual.
     """
     tangent, product, local = np.empty((6, 6)), np.empty((6, len(unknowns))), np.empty(6)
     scale = np.zeros(len(unknowns))
@@ -138,9 +138,9 @@ def add_points(shape, unknowns, law, state):
 
 @njit(cache=True)
 def relax_modes(shape, unknowns, law, state):
-    """Bring the incompatible modes into equilibrium by Newton's method; return whether they are.
+    """Bring the incompatible modes into equilibrium by Newton's method; return whether it converged.
 
-    The energy is convex: a step that ends beyond the least energy on its way is cut where the slope changes sign.
+    The energy is convex, so a step beyond the minimum along its direction is shortened to where the slope changes sign.
     """
     scale, step, start = add_points(shape, unknowns, law, state), np.empty(ALL - NODAL), np.empty(ALL - NODAL)
     rest, modes = state.force[NODAL:], unknowns[NODAL:]
@@ -164,7 +164,7 @@ def relax_modes(shape, unknowns, law, state):
 
 @njit(cache=True)
 def largest_of(values):
-    """Return the largest magnitude, 0 where there is no value; no number where one is none."""
+    """Return the largest magnitude of values, 0 for an empty array, and NaN if a value is NaN."""
     largest = 0.0
     for value in values:
         if abs(value) > largest or np.isnan(value):
@@ -246,7 +246,7 @@ def one_point(shape, displacement, materials, states):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_share(points, stress, laws, share):
-    """Write which share ``(ne,)`` of elastic hourglass forces sections can carry, see ``nonlinear_one_point``.
+    """Write the share ``(ne,)`` of the elastic hourglass forces that sections carry, see ``nonlinear_one_point``.
 
     Args:
         points: ``(ne, 1, 7)`` stress [Pa] and plastic strain of the centres.

@@ -71,7 +71,7 @@ def write_strain_columns(strain, column, gx, gy, gz):
 
 @njit(cache=True)
 def condense(full, kept):
-    """Eliminate the rows of a symmetric matrix past ``kept``, in place (Gauss)."""
+    """Condense a symmetric matrix to its first ``kept`` rows and columns in place (Gaussian elimination)."""
     for pivot in range(full.shape[0] - 1, kept - 1, -1):
         for i in range(pivot):
             factor = full[i, pivot] / full[pivot, pivot]
@@ -114,7 +114,7 @@ def linear_divergence(weights, gradient, basis, result):
 
 
 class StrainBench(NamedTuple):
-    """Arrays of the element at work: three 3 x 3, gradients and divergence ``(8, 8, 3)``, basis ``(4, 8)``."""
+    """Work space of ``write_strains``: three 3 x 3 matrices, gradients and divergence (8, 8, 3), basis (4, 8)."""
 
     jacobian: NDArray[np.float64]
     inverse: NDArray[np.float64]
@@ -126,7 +126,7 @@ class StrainBench(NamedTuple):
 
 @njit(cache=True)
 def new_strain_bench():
-    """Return the arrays of an element."""
+    """Return the work space of ``write_strains``, uninitialised."""
     square, nodal = (3, 3), (8, 8, 3)
     return StrainBench(
         np.empty(square), np.empty(square), np.empty(square), np.empty(nodal), np.empty(nodal), np.empty((4, 8))

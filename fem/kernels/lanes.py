@@ -1,9 +1,9 @@
-"""Lanes: sixteen elements side by side, so that one instruction works on several of them.
+"""Lanes: sixteen elements side by side, so that one vector instruction works on several of them.
 
-An array over a block of elements is flat, ``a[16 * k + lane]``, k counting the entries of one element. Loops over lanes
-are innermost, without branches and with constant bounds: then the compiler turns them into vector instructions (it
-refuses eight lanes, where it takes the test that arrays do not overlap for too expensive). A 3 x 3 matrix is nine
-scalars, row by row.
+An array over a block of elements is flat, ``a[16 * k + lane]``, with k counting the entries of one element. Loops over
+lanes are innermost, without branches and with constant bounds, so that the compiler vectorises them (not with eight
+lanes, for which it considers the check for overlapping arrays too expensive). A 3 x 3 matrix is nine scalars, row by
+row.
 """
 
 from numba import njit

@@ -1,7 +1,7 @@
-"""Numba kernels of many steps in one call: all those of a window, and substeps inside a step.
+"""Numba kernels that take all steps of a window, or all substeps of step levels inside a step, in one call.
 
-Levels inside a step are those of ``fem.model.step_levels``; a level has its state in ``(3, n, 3)``: displacement [m],
-force [N], weighted sum of forces [N].
+Step levels are described in ``fem.model.step_levels``; the state of a level, shape (3, n, 3), holds displacement [m],
+force [N] and weighted sum of forces [N].
 """
 
 from typing import NamedTuple
@@ -31,21 +31,21 @@ from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces
 
 ALL_FINE = -1  # no element is turned inside out
-PACES = 3  # at which force terms may act
+PACES = 3  # number of different intervals, in steps, at which force terms may act
 NAMES = ("congruent", "assembled", "turning_rows", "turning_boxes", "turning", "one_point", "hexahedron")
 
 
 class ForceArrays(NamedTuple):
-    """The arrays of force terms, at most one of each kind, as their kernels take them; empty where there is none.
+    """Kernel arguments of force terms, at most one of each kind; arrays of absent kinds are empty.
 
     Attributes:
         congruent: Nodes, axes, rows, blocks and lines of ``kernels.box_rows``.
         assembled: Pointer, columns and blocks of ``kernels.force.add_block_force``.
         turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
         turning_boxes: Cells, filled and constants of ``box_rotation.add_turned_block_forces``.
-        turning: The same of ``turned_hexahedron.add_turned_forces``.
-        one_point, hexahedron: See ``nonlinear_one_point``, ``nonlinear_hexahedron``.
-        path: Of these.
+        turning: Cells, filled and constants of ``turned_hexahedron.add_turned_forces``.
+        one_point, hexahedron: Blocks of ``nonlinear_one_point`` and ``nonlinear_hexahedron``.
+        path: Kinematics and time step of these blocks.
     """
 
     congruent: tuple[NDArray, ...]
@@ -69,15 +69,15 @@ class PacedForcesType(types.StructRef):
 
 
 class Forces(structref.StructRefProxy):
-    """``ForceArrays`` behind one pointer: by value, each array is seven arguments of each function it goes through."""
+    """``ForceArrays`` behind one pointer; passed by value, each array would be seven arguments of every function."""
 
 
 class PacedForces(structref.StructRefProxy):
     """Force terms by the steps in which they act.
 
     Attributes:
-        arrays: ``PACES`` times ``Forces``; there is one compiled program for all numbers of paces.
-        every: ``(PACES,)`` in how many steps each of them acts once; 0 where there is none.
+        arrays: ``Forces`` of each pace; always ``PACES`` entries, so that one compiled program serves all cases.
+        every: Interval in steps at which the terms of each pace act, shape (PACES,); 0 for an unused pace.
     """
 
 
@@ -98,18 +98,19 @@ def paced_forces_of(arrays, every):
 
 
 class StepArrays(NamedTuple):
-    """What a motion on one rank steps with, see ``ExplicitMotion``; slaves, masters and weights are those of the tie.
+    """Arrays of a motion on one rank, see ``ExplicitMotion``.
 
     Attributes:
-        state: ``(3, n, 3)`` displacement [m], velocity half a step back [m/s], force [N].
-        ahead: ``(n, 3)`` [N], or ``(0, 3)``: see ``ExplicitMotion``.
-        mobility: ``(n, 3)`` [1/kg].
-        counted_mass: ``(n,)`` [kg].
-        slave, master, weight: See ``fem.mesh.tie``; first those of elements that act most often.
-        order: ``(ns,)`` their numbers in the tie.
-        moved: ``(PACES,)`` how many of them elements of each pace and of smaller ones have.
-        ends: ``(PACES,)`` how many of the first nodes have all those of elements of each pace and of smaller ones.
-        slave_force: ``(ns, 3)`` [N] of the elements on them when all of these acted last, in the order of the tie.
+        state: Displacement [m], velocity half a step back [m/s] and force [N], shape (3, n, 3).
+        ahead: Force for the following steps, see ``ExplicitMotion``, shape (n, 3) or (0, 3) [N].
+        mobility: Inverse mass, zero where the velocity is prescribed, shape (n, 3) [1/kg].
+        counted_mass: Nodal mass in the energy balance, shape (n,) [kg].
+        slave, master, weight: Slaves, masters and weights of the tie, see ``fem.mesh.tie``; slaves of elements that act
+            most often come first.
+        order: Number of each slave in the tie, shape (ns,).
+        moved: Number of slaves of elements up to each pace, shape (PACES,).
+        ends: Number of leading nodes that contains all nodes of elements up to each pace, shape (PACES,).
+        slave_force: Latest force of the elements on the slaves, in the order of the tie, shape (ns, 3) [N].
     """
 
     state: NDArray[np.float64]
@@ -126,15 +127,15 @@ class StepArrays(NamedTuple):
 
 
 class Interface(NamedTuple):
-    """An interface that another model moves through some steps, and the impulses that its forces give.
+    """Coupling interface with velocities prescribed by another model, and the impulses of its forces.
 
     Attributes:
-        rows: ``(k,)`` int32 its nodes on this rank.
-        counted: ``(c,)`` int32 those that count on this rank.
-        given: ``(k, 3)`` [m/s] their mean velocity, which they have afterwards.
-        change: ``(m, 3)`` [m/s] of it in each step.
-        weights: ``(m + 1, 2)`` [s], [s^2] of the force before the first step and after each in both impulses.
-        impulses: ``(2, c, 3)`` [N s], [N s^2], added to.
+        rows: Interface nodes on this rank, shape (k,) int32.
+        counted: Interface nodes whose impulse this rank counts, shape (c,) int32.
+        given: Prescribed mean velocity of the nodes, which they keep at the end, shape (k, 3) [m/s].
+        change: Deviation from the mean velocity in each step, shape (m, 3) [m/s].
+        weights: Weights of the force before the first and after each step in both impulses, shape (m + 1, 2) [s, s^2].
+        impulses: Impulse and its first moment in time, shape (2, c, 3) [N s, N s^2], added to.
     """
 
     rows: NDArray[np.int32]
@@ -150,7 +151,7 @@ def add_forces(arrays, displacement, force):
     """Subtract the internal force of all terms, as their ``add`` does.
 
     Returns:
-        ``ALL_FINE``, or the place in ``NAMES`` of a term with an element that is turned inside out; and its block.
+        ``ALL_FINE``, or the index into ``NAMES`` of a term with an inverted element; and the element's block or row.
     """
     nodes, axes, rows, blocks, lines = arrays.congruent
     if len(rows):
@@ -188,8 +189,8 @@ def add_forces(arrays, displacement, force):
 def take_steps(motion, forces, interface, accelerations, step):
     """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
 
-    Nodes on which nothing acts for some steps take these at once. A steady body force does its work on what all masses
-    have moved; what changes beside it is counted step by step.
+    Nodes without forces for some steps take these steps at once. The work of the steady part of the body force follows
+    from the displacement of all masses, the work of its change is summed step by step.
 
     Args:
         motion: ``StepArrays``.
@@ -239,7 +240,7 @@ def take_steps(motion, forces, interface, accelerations, step):
 
 @njit(cache=True)
 def count_impulses(interface, substep, force):
-    """Add to the impulses of an ``Interface`` what a force of the first nodes ``(k, 3)`` gives after a step."""
+    """Add the weighted force ``(k, 3)`` [N] of the leading nodes after a step to the impulses of an ``Interface``."""
     for j in range(2):
         add_impulse(interface.counted, force, interface.weights[substep, j], interface.impulses[j])
 
@@ -257,11 +258,11 @@ def move_nodes(motion, block, body, step):
     Args:
         motion: As in ``take_steps``.
         block: First node, end, steps to be taken and the number of the last of them.
-        body: Accelerations, and what their means over steps have beside the steady part.
-        step: dt [s].
+        body: Body accelerations at the start of each step, and the deviation of their means from the steady part.
+        step: Time step dt [s].
 
     Returns:
-        Work of the latter [J].
+        Work of the deviation [J].
     """
     begin, end, count, substep = block
     velocity, kicks = motion.state[1], np.empty((3, 3))
@@ -275,7 +276,7 @@ def move_nodes(motion, block, body, step):
 
 @njit(cache=True)
 def move_interface(interface, block, velocity):
-    """Prescribe the mean velocities of an ``Interface`` in some steps; ``block`` as above."""
+    """Prescribe the mean velocities of an ``Interface`` over some steps; ``block`` as in ``move_nodes``."""
     begin, end, count, substep = block
     x = y = z = 0.0
     for k in range(substep - count, substep):
@@ -291,9 +292,9 @@ def move_interface(interface, block, velocity):
 
 @njit(inline="always")
 def add_paced_forces(motion, forces, substep, pushed, final):
-    """Add the forces that act after a step for all steps that they act for; if final, those of later ones to ``ahead``.
+    """Add the forces that act after a step, each for its whole interval; return the latest ``add_forces`` and its pace.
 
-    ``pushed (n, 3)`` is zero between calls. Returns what ``add_forces`` returned last, and at which pace.
+    The final step adds the share of later steps to ``ahead``; ``pushed (n, 3)`` is zero between calls.
     """
     force = motion.state[2]
     for pace in range(PACES):
@@ -309,7 +310,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
 
 @njit(cache=True)
 def gather_forces(motion, moved, final):
-    """Move the forces of the first slaves to their masters; of all, if final, keep them, and move what is ahead."""
+    """Move the forces of the leading slaves to their masters; in the final step also store them and move ``ahead``."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
     for i in range(moved if final else 0):
@@ -322,14 +323,14 @@ def gather_forces(motion, moved, final):
 
 @njit(cache=True)
 def begin_substeps(rows, values, state):
-    """Take the displacements of a level from rows of ``values``; force and sum are zero between calls."""
+    """Copy the displacements of a level from rows of ``values``; force and sum are zero between calls."""
     place = state[0]
     for i in range(len(rows)):
         row = rows[i]
         place[i, 0], place[i, 1], place[i, 2] = values[row, 0], values[row, 1], values[row, 2]
 
 
-@njit(cache=True)  # rounds alike wherever a node stands, see kernels.motion.advance
+@njit(cache=True)  # rounding must not depend on the position of a node, see kernels.motion.move
 def take_substep(coefficients, inverse, change, state):
     """Add the weighted force to the sum and zero it; move the free nodes, the first ones.
 
@@ -378,17 +379,16 @@ def end_substeps(rows, foreign, state, values):
 
 @njit(cache=True)
 def run_levels(levels, first, values, force):
-    """Take all substeps of a level, and in each of them those of the levels inside it: add their mean force.
+    """Take all substeps of a level, each with the substeps of the levels inside it, and add their mean force.
 
-    One call where each level has one assembled matrix and no node of another rank. The operations are those of the
-    kernels above, in the same order.
+    For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Of each level, outermost first: rows, foreign, ``(p, 3)`` coefficients, inverse, change, state, see
-            above; pointer, columns and blocks of ``kernels.force.add_block_force``.
-        first: Which of them.
-        values: ``(>= n, 3)`` [m], displacements of the level around.
-        force: ``(>= n, 3)`` [N], forces there.
+        levels: Rows, foreign, coefficients ``(p, 3)``, inverse, change and state of each level, outermost first, as
+            above; then pointer, columns and blocks of ``kernels.force.add_block_force``.
+        first: Index of the level.
+        values: Displacement of the surrounding level, shape (>= n, 3) [m].
+        force: Force of the surrounding level, shape (>= n, 3) [N], added to.
     """
     rows, foreign, coefficients, inverse, change, state, pointer, columns, blocks = levels[first]
     begin_substeps(rows, values, state)

@@ -26,19 +26,19 @@ def advance(state, mobility, acceleration, step):
 
 @njit(cache=True)
 def move(state, mobility, nodes, kicks, steps):
-    """Take steps in the first of which a force acts, and in all of them a body force; only some nodes.
+    """Take steps of some nodes at once: a nodal force acts in the first step, a body force in all of them.
 
-    The loop runs over strips of all components together, which fill vectors; what the body force does comes from
-    strips of its own. No operation may be reordered or fused: the rest of a strip would round otherwise than its
-    vectors, and copies of a node on several ranks drift apart.
+    The loop runs over strips of all components together, which fill vectors; the contributions of the body force are
+    read from separate strips. No operation may be reordered or fused: the remainder of a strip would then round
+    differently from its vectors, and copies of a node on several ranks would drift apart.
 
     Args:
         state: As in ``advance``.
-        mobility: As there.
-        nodes: The first of them, and the end.
-        kicks: ``(3, 3)`` of the body force: velocity in the first step, and in the others [m/s]; displacement [m] from
-            the latter.
-        steps: dt [s] and their number.
+        mobility: As in ``advance``.
+        nodes: First node and end of the range.
+        kicks: Contributions of the body force: velocity in the first step, velocity in the others [m/s], and
+            displacement by the latter [m], shape (3, 3).
+        steps: Time step dt [s] and number of steps.
     """
     step, span = steps[0], steps[0] * steps[1]
     strips = np.empty((3, STRIP))
@@ -59,7 +59,7 @@ def move(state, mobility, nodes, kicks, steps):
 
 @njit(cache=True)
 def kicks_of(accelerations, step, kicks):
-    """Write what ``move`` takes for body forces ``(k, 3)`` [m/s^2] as each of its steps begins."""
+    """Write the ``kicks (3, 3)`` of ``move`` from the body accelerations ``(k, 3)`` [m/s^2] as each step begins."""
     for c in range(3):
         gained = drift = 0.0
         for k in range(1, len(accelerations)):
@@ -70,7 +70,7 @@ def kicks_of(accelerations, step, kicks):
 
 @njit(cache=True, fastmath=FINITE)
 def first_moment(mass, places):
-    """Return the sum of masses ``(n,)`` times places, or velocities, ``(n, 3)``."""
+    """Return the sum of masses ``(n,)`` [kg] times positions [m] or velocities [m/s] ``(n, 3)``: three numbers."""
     x = y = z = 0.0
     for i in range(len(mass)):
         x += mass[i] * places[i, 0]
@@ -81,7 +81,7 @@ def first_moment(mass, places):
 
 @njit(cache=True)
 def work_of_changes(nodes, changes, accelerations, step):
-    """Return the work of a part of the body force in steps that ``move`` has taken at once.
+    """Return the work [J] of a part of the body force in steps that ``move`` has taken at once.
 
     Args:
         nodes: Masses ``(n,)`` [kg] that count, velocities ``(n, 3)`` [m/s] at the end, mobility ``(n, 3)``.
@@ -186,7 +186,7 @@ def add_impulse(rows, force, scale, impulse):
 
 @njit(cache=True)
 def add_ahead(ahead, force):
-    """Add to the force ``(n, 3)`` [N] what has acted for the steps that follow, and zero it."""
+    """Add ``ahead (n, 3)`` [N], the force stored for the following steps, to the force, and zero it."""
     total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
     for i in range(len(rest)):
         total[i] += rest[i]
@@ -195,9 +195,9 @@ def add_ahead(ahead, force):
 
 @njit(cache=True)
 def add_pushed(pushed, every, force, ahead):
-    """Add to the force ``(n, 3)`` what acts once in some steps, to ``ahead`` its share of the others; zero it.
+    """Distribute a force ``pushed (n, 3)`` [N] that acts once in ``every`` steps, and zero it.
 
-    Without ``ahead`` all of it is added to the force.
+    One share is added to the force and the ``every - 1`` others to ``ahead``; all to the force if ``ahead`` is empty.
     """
     own, total, rest = pushed.reshape(-1), force.reshape(-1), ahead.reshape(-1)
     share = 1 if len(rest) else every
@@ -211,7 +211,7 @@ def add_pushed(pushed, every, force, ahead):
 
 @njit(cache=True)
 def add_rows(rows, values, total):
-    """Add some rows of ``values (n, 3)`` to those of a sum; each row once."""
+    """Add some rows of ``values (n, 3)`` to the same rows of ``total``; each row at most once."""
     for i in range(len(rows)):
         for c in range(3):
             total[rows[i], c] += values[rows[i], c]
@@ -219,17 +219,17 @@ def add_rows(rows, values, total):
 
 @njit(cache=True)
 def link_velocities(rows, velocity, force, terms, link):
-    """Find the forces at the interface that give it a wanted velocity at the motion's time, and add them to its forces.
+    """Compute the link forces (Lagrange multipliers) that make interface velocities equal, and add them to the forces.
 
-    v(t) = v(t - dt/2) + dt/2 (f + link) / m must be the target less what the link takes from the other model.
+    v(t) = v(t - dt/2) + dt/2 (f + link) / m equals the target minus the change of the other model by the link.
 
     Args:
-        rows: ``(k,)`` nodes of the interface.
-        velocity: ``(n, 3)`` [m/s] half a step back.
-        force: ``(n, 3)`` [N].
-        terms: ``(4, k, 3)``: dt/2 / m [s/kg]; velocity by which both models part under a unit link [s/kg], infinite
-            where there is none; target [m/s]; weight of the link's work [s].
-        link: ``(n, 3)`` [N], of the step before on entry.
+        rows: Nodes of the interface, shape (k,).
+        velocity: Velocity half a step back, shape (n, 3) [m/s].
+        force: Nodal force, shape (n, 3) [N], added to.
+        terms: dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg], infinite without a link;
+            target velocity [m/s]; weight of the work of the link [s]; shape (4, k, 3).
+        link: Link forces of the previous step on entry, of this step on return, shape (n, 3) [N].
 
     Returns:
         Work of the link over the step, by the mean of both ends [J].
@@ -248,14 +248,14 @@ def link_velocities(rows, velocity, force, terms, link):
 
 @njit(cache=True, error_model="numpy")
 def add_damping(velocity, mobility, acceleration, coefficients, forces):
-    """Add -c m (v + dt/2 (f / m + g)) to damping, and damping to the force f, with what it holds on entry.
+    """Add the mass-proportional force -c m (v + dt/2 (f / m + g)) to the damping, and all damping to the force f.
 
-    The loop runs over strips of all components together, as that of ``motion.advance``; for the same reason no
-    operation may be reordered or fused.
+    The loop runs over strips of all components together, as in ``move``; for the same reason no operation may be
+    reordered or fused.
 
     Args:
         velocity: ``(n, 3)`` [m/s], v half a step back.
-        mobility: ``(n, 3)`` inverse mass [1/kg], zero where nothing follows from forces: there is no drag.
+        mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed, without drag.
         acceleration: ``(3,)`` [m/s^2], g of the body force.
         coefficients: c [1/s] and dt/2 [s].
         forces: ``(n, 3)`` [N] twice: damping, on entry by the stiffness alone, and f without damping.

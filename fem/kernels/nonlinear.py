@@ -6,7 +6,7 @@ s' = C : sym(U' U^-1), and axes of an orthotropic material turn with the body. R
 F, not from a sum of increments: U does not see a rotation, so that a rigid rotation of any size, in one step or many,
 gives no strain but round-off, and errors of rotation do not pile up. The increment over a step is taken at its middle
 (as Hughes & Winget, IJNME 15, 1980): sym((U_1 - U_0) ((U_0 + U_1) / 2)^-1). s is the Kirchhoff stress, whose work s : D
-per initial volume is that of the elastic energy s : C^-1 : s / 2; the nominal stress conjugate to F is P = R s U^-1.
+per initial volume derives from the elastic energy s : C^-1 : s / 2; the nominal stress conjugate to F is P = R s U^-1.
 
 Slots of the workspace ``w`` and of the state, in units of lanes:
 """
@@ -38,11 +38,11 @@ POLAR_CONVERGED = 1e-18  # squared change after which the next one is below roun
 
 
 class Path(NamedTuple):
-    """How a path is followed.
+    """Kinematics and time step of path-dependent elements.
 
     Attributes:
         finite: Whether rotations and strains are finite.
-        step: dt [s], of laws that depend on the rate; infinity stands for slow.
+        step: Time step dt of rate-dependent laws [s]; infinity means quasi-static.
     """
 
     finite: bool

@@ -1,8 +1,8 @@
 """Numba kernels of the fully integrated hexahedron with incompatible modes, material and geometric nonlinearity.
 
 Positions are seen from the frame R that turns with the centre of the element (polar decomposition of the deformation
-there), x^ = R^T x, and so are stresses and strains of all Gauss points. The strain increment of a step is that of its
-middle, with j = dx^/dxi of the positions between both ends (Hughes & Winget, IJNME 15, 1980):
+there), x^ = R^T x, and so are stresses and strains of all Gauss points. The strain increment of a step is taken at its
+midpoint, with j = dx^/dxi of the positions between both ends (Hughes & Winget, IJNME 15, 1980):
 
     d = sym(dj j^-1) + (Pr(t) - t) 1 / 3 + sum_k xi_k / w sym(a_k x n_k),    t = tr(dj j^-1),
 
@@ -161,7 +161,7 @@ def write_strains(edges, points):
     """Write the increments of the compatible strain and their traces at the Gauss points.
 
     Args:
-        edges: Derivatives of the positions in the middle of the step; behind them those of their change.
+        edges: Derivatives of the midpoint positions, followed by the derivatives of their change.
         points: ``(8, 16 * 7)``.
     """
     for g in range(8):
@@ -200,8 +200,7 @@ def move_points(w, points, reciprocal, state, elastic):
 
     Args:
         w: Workspace, with the strains of the modes.
-        points: Strain increments, see ``write_strains``: added to; squares of
-            the equivalent stresses in the place of traces.
+        points: Strain increments of ``write_strains``, added to; squares of the equivalent stresses replace the traces.
         reciprocal: ``(8, 16)`` of the weights.
         state: ``(8, 16 * 7)``.
         elastic: Nine constants.

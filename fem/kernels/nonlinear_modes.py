@@ -24,8 +24,8 @@ from reflowshock.fem.kernels.lanes import (
 )
 from reflowshock.fem.kernels.nonlinear_parent import SIDE
 
-# Slots of the workspace behind F and R and their room: transformed positions in the middle of the step, their change,
-# n_k, sums of xi_k s over the Gauss points before and after the step, of the strains, and what is solved.
+# Slots of the workspace after F and R: transformed midpoint positions, their change, n_k, sums of xi_k s over the Gauss
+# points before and after the step, the same sums of the strains, then residual and operator of the linear system.
 MIDDLE, CHANGE, NORMAL, BEFORE, AFTER, SUMS, RESIDUAL, OPERATOR, ALL_SLOTS = (
     LANES * n for n in (58, 82, 106, 115, 133, 151, 169, 178, 232)
 )
@@ -87,7 +87,7 @@ def strain_of(a, n):
 
 @njit(**LANE_OPTIONS)
 def add_remainder(w, energy):
-    """Subtract the work ``(16,)`` of the mean forces of a step on the modes."""
+    """Subtract the work of the mean forces of a step on the modes from ``energy (16,)`` [J]."""
     for lane in range(LANES):
         total = 0.0
         for k in range(0, 18 * LANES, LANES):
@@ -151,7 +151,14 @@ def less(v, m, u):
 
 @njit(**LANE_OPTIONS)
 def solve_modes(w):
-    """Replace the sums of strains by those of minus the modes that the operator finds to the residual, by blocks."""
+    """Solve operator x = residual for the modes of sixteen elements, and write the strains of their steps -x.
+
+    The nine unknowns of a lane are solved by block elimination with 3 x 3 blocks.
+
+    Args:
+        w: Workspace, flat with ``ALL_SLOTS`` entries: reads the slots ``OPERATOR`` [N/m], ``RESIDUAL`` [N] and
+            ``NORMAL``, and replaces the three strains (six entries each) at ``SUMS``.
+    """
     for lane in range(LANES):
         a12, a23 = nine(w, OPERATOR + 27 * LANES + lane), nine(w, OPERATOR + 36 * LANES + lane)
         a13 = nine(w, OPERATOR + 45 * LANES + lane)

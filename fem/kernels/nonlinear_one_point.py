@@ -6,10 +6,10 @@ incompatible-modes element has (``elements.one_point``), with the potential (g^ 
 also when R turns against g, which adds to the nominal stress P = V R s U^-1 what ``kernels.box_rotation`` has as
 -R [w]x. It keeps energy and angular momentum.
 
-A section that yields carries a limited moment beside its axial force: M / M_p + (N / N_p)^2 <= 1. So the hourglass
-stress, the root mean square sqrt(2 E W / V) of the energy W, is at most sqrt(3)/2 Y (1 - (q / Y)^2), Y the yield stress
-and q the von Mises stress of the centre; what is beyond slips. Without it a plastic hinge of four layers is 29 % too
-strong, with it 3 %. Where the centre flows a little strength is left, or nothing would resist hourglassing.
+A yielding section carries axial force and moment up to M / M_p + (N / N_p)^2 = 1. The hourglass stress, the root mean
+square sqrt(2 E W / V) of the energy W, is therefore limited to sqrt(3)/2 Y (1 - (q / Y)^2), with Y the yield stress and
+q the von Mises stress of the centre; the excess becomes plastic slip. Without this limit a plastic hinge of four layers
+is 29 % too strong, with it 3 %. Where the centre yields, some strength remains to resist hourglassing.
 """
 
 from typing import NamedTuple
@@ -61,7 +61,7 @@ from reflowshock.materials.plasticity import FIRST_YIELD
 
 AMPLITUDES = 12 * LANES
 BENDING_STRENGTH = np.sqrt(0.75)  # 3/2 of the yield stress at the faces of a section, as a root mean square
-LEAST_STRENGTH = 0.05  # of it is left where the centre flows
+LEAST_STRENGTH = 0.05  # share of the bending strength that remains where the centre yields
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -122,13 +122,13 @@ def write_hourglass_energy(w, slip, energy):
 
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
-    """Return the hourglass stress that a section of some yield stress carries beside the stress of its centre."""
+    """Return the largest hourglass stress [Pa] of a section, given its yield stress and von Mises stress [Pa]."""
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 
 
 @njit(**LANE_OPTIONS)
 def may_slip(w, energy, weight, first, young):
-    """Return in how many lanes the hourglass stress is above what a section carries at the first yield stress."""
+    """Return the number of lanes whose hourglass stress exceeds the limit of a section at its first yield stress."""
     count = 0.0
     for lane in range(LANES):
         ratio = w[DEFORMATION + MISES + lane] / first
@@ -140,9 +140,9 @@ def may_slip(w, energy, weight, first, young):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_flow(blocks, b, before, w):
-    """Reduce hourglass forces to what a section can carry; ``before (16,)`` [J] is their energy a step ago.
+    """Reduce hourglass forces to the limit of a section; ``before (16,)`` [J] is their energy before the step.
 
-    Plastic work is the slip times the mean force of the step, taken as if the force did not turn in it.
+    Plastic work is the slip times the mean force of the step, without the rotation of the force within it.
     """
     law, young = blocks.plastic[blocks.material[b]], blocks.modulus[blocks.material[b]]
     state, weight, slip = blocks.state[b, 0], blocks.weight[blocks.pattern[b], 0], blocks.slip[b]
@@ -205,7 +205,7 @@ def move_centre(blocks, b, path, w):
 
 @njit(cache=True)
 def move_hourglass(blocks, b, unit, before, w):
-    """Write the hourglass forces of a block, beside its amplitudes; ``before (16,)`` is overwritten."""
+    """Write amplitudes and hourglass forces of a block; ``before (16,)`` is overwritten."""
     k, energy, slip = blocks.constants[blocks.pattern[b]], blocks.hourglass_energy[b], blocks.slip[b]
     weight, material = blocks.weight[blocks.pattern[b], 0], blocks.material[b]
     write_amplitudes(k, w, unit)

@@ -14,7 +14,7 @@ from reflowshock.fem.kernels.box_rotation import XY, XYZ, XZ, YZ, X, Y, Z
 from reflowshock.fem.kernels.lanes import LANE_OPTIONS, LANES
 
 SIDE = 1.0 / np.sqrt(3.0)  # of the Gauss points
-# Of each direction its own mode, and those that also have the first and the second of the other two.
+# Modes with a derivative along each direction: linear, and bilinear with the first and second other direction.
 LINES = ((X, XY, XZ), (Y, XY, YZ), (Z, XZ, YZ))
 EDGES = 36 * LANES
 # Gauss points in pairs along x, y, z; the pairs in the order of the edges.

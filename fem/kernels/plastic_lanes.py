@@ -2,7 +2,7 @@
 
 The same equation and the same Newton steps in ln x as ``plasticity.plastic_increment``, all lanes together until the
 last one has converged. Logarithm and exponential are polynomials, because calls of library functions keep the compiler
-from vector instructions; they are exact to a few units of the last place, the exponential to those of its argument.
+from vector instructions; they are exact to a few units in the last place, the exponential of its argument.
 """
 
 import math

@@ -1,9 +1,9 @@
-"""Numba kernel of elastic hexahedra of any shape that turn by any angle and strain little: sixteen side by side.
+"""Numba kernels of corotational elastic hexahedra of any shape (finite rotations, small strains), in sixteen lanes.
 
 As ``kernels.box_rotation``, with the mean gradients and the hourglass stiffness of each element. In the transformed
 nodal values q_p, p a parity of ``force_congruent``, the mean deformation is F = 1 + sum over p of q_p (x) b_p, and the
 hourglass part of the mode k of xy, xz, yz, xyz is g_k = q_k - (F - 1) c_k, c_k the transform of the corners. The energy
-is that of the element at rest in the frame that turns with F = R U,
+is the energy of the linear element in the frame that rotates with F = R U,
 
     W = V E : C E / 2 + sum over k, l of g^_k . H_kl g^_l / 2,    E = U - 1, g^_k = R^T g_k,
 
@@ -109,7 +109,7 @@ def add_applied(v, m, a):
 
 @njit(**LANE_OPTIONS)
 def write_resistance(k, w):
-    """Write H g^ of sixteen elements: blocks of the four modes, those beside the diagonal for both their modes."""
+    """Write H g^ of sixteen elements from the symmetric blocks of the four modes; off-diagonal blocks act twice."""
     for lane in range(LANES):
         a, b, c, d = three(w, A + lane), three(w, B + lane), three(w, C + lane), three(w, D + lane)
         at = STIFFNESS + lane

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.forces.energy import InternalForce
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.kernels.motion import add_damping, power
-from reflowshock.fem.loads.load import Kept, Load, Loaded
+from reflowshock.fem.loads.load import Checkpointed, Load, Loaded
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.body import Body
 
@@ -27,7 +27,7 @@ class RayleighDamping(Load):
     """
 
     account: ClassVar[Literal["external", "damping"]] = "damping"
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "force": "nodes"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum", "force": "nodes"}
 
     def __init__(self, mass: float, stiffness: float, terms: Sequence[InternalForce]) -> None:
         """Store the coefficients and the force terms.

@@ -1,4 +1,4 @@
-"""Pressure on a surface that moves: normal to it, and on the area that it has, wherever it goes."""
+"""Follower pressure: normal to the deformed surface and acting on its deformed area."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.loads.load import Kept, Load, Loaded
+from reflowshock.fem.loads.load import Checkpointed, Load, Loaded
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import OutwardFacets
@@ -16,30 +16,30 @@ from reflowshock.fem.model.body import Body
 
 @dataclass
 class FollowerPressure(Load):
-    """A pressure on facets at the places that their nodes have reached; for finite kinematics.
+    """Pressure on facets in the deformed state, for finite kinematics.
 
     Attributes:
-        facets: ``(nf, m)`` local nodes of the facets of this rank's elements.
-        sign: ``(nf,)`` +1 where the normal by the right-hand rule points outwards, else -1.
-        pulse: Pressure [Pa], positive where it pushes into the body.
+        facets: Local nodes of the facets of this rank's elements, shape (nf, m).
+        sign: +1 where the right-hand normal points outwards, else -1, shape (nf,).
+        pulse: Pressure [Pa], positive if it pushes into the body.
     """
 
     facets: NDArray[np.int32]
     sign: NDArray[np.float64]
     pulse: Pulse
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_force": "nodes"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum", "_force": "nodes"}
     work: float = 0.0
     _force: NDArray[np.float64] = field(init=False)
 
     @classmethod
-    def build(cls, body: Body, found: OutwardFacets, pulse: Pulse) -> "FollowerPressure":
-        """Take the facets of this rank's elements."""
-        here = body.local.locate_cells(found.cells) >= 0
-        facets = found.facets[here]
-        return cls(body.local.locate(facets.ravel()).reshape(facets.shape), found.sign[here], pulse)
+    def build(cls, body: Body, outward: OutwardFacets, pulse: Pulse) -> "FollowerPressure":
+        """Return the pressure on those of the facets that belong to elements of this rank."""
+        here = body.local.locate_cells(outward.cells) >= 0
+        facets = outward.facets[here]
+        return cls(body.local.locate(facets.ravel()).reshape(facets.shape), outward.sign[here], pulse)
 
     def add(self, motion: Loaded) -> None:
-        """Add the force of the motion's time and place; collective."""
+        """Add the pressure forces at the time and displacement of the motion; collective."""
         body = motion.body
         areas = area_vectors(body.local.points[self.facets] + motion.displacement[self.facets])
         self._force = np.zeros_like(motion.force)
@@ -49,10 +49,10 @@ class FollowerPressure(Load):
         motion.force += self._force
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract it from a copy."""
+        """Subtract the force of the latest ``add`` from a copy of the motion's force."""
         force -= self._force
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work."""
+        """Add the work of half a step."""
         owned = motion.body.shared.owned
         self.work += 0.5 * motion.step * float(np.sum((self._force * motion.velocity)[owned]))

@@ -1,4 +1,4 @@
-"""Input-G by a large mass at the supports and the force that moves it (H 4.4)."""
+"""Input-G by a large mass at the supports and the force that accelerates it (large-mass method, H 4.4)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,24 +9,25 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from reflowshock.fem.errors import LoadError
-from reflowshock.fem.loads.load import Kept, Load, Loaded
+from reflowshock.fem.loads.load import BodyAcceleration, Checkpointed, Load, Loaded
 from reflowshock.fem.loads.pulse import Pulse
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.checkpoint_state import Rows, State
 
-MASS_RATIO = 1e6  # large mass over the model's: the base deviates from its pulse by about one part in this
+MASS_RATIO = 1e6  # large mass over mass of the model; the relative error of the base motion is about its inverse
 
 
 @dataclass(frozen=True)
 class ShakenBase(Load):
-    """The frame of results of a model that has no node of the large mass: it follows time and acts on nothing.
+    """Moving frame of results for a model without nodes of the large mass; it adds no force.
 
-    The large mass of the other model takes steps of a window; from these integrals it is a part of (pi w / tau)^2 / 12
-    away, with w the window and tau the pulse: below 1e-6 where a pulse has a thousand windows.
+    The base displacement is the exact integral of the pulse. The large mass of the other model takes steps of one
+    window w, so it differs from the integral by (pi w / tau)^2 / 12 relative to the displacement, with tau the duration
+    of the pulse: below 1e-6 from a thousand windows per pulse.
 
     Attributes:
-        direction: ``(3,)`` unit vector against which the base moves.
-        pulse: Acceleration [m/s^2].
+        direction: Unit vector opposite to the acceleration of the base, shape (3,).
+        pulse: Acceleration of the base [m/s^2].
     """
 
     direction: NDArray[np.float64]
@@ -43,25 +44,26 @@ class ShakenBase(Load):
 
 @dataclass
 class LargeMass(Load):
-    """Input-G by a large mass on the support nodes and the force that moves it; displacements are absolute.
+    """Large mass on the support nodes and the force that accelerates it; displacements are absolute.
 
-    The energy balance leaves the large mass out: external work is what its nodes pass on to the model.
+    The energy balance leaves the large mass out: the external work is the work of its nodes on the model.
 
     Attributes:
-        nodes: ``(k,)`` local nodes.
-        mass: ``(k,)`` [kg] added to each.
-        direction: ``(3,)`` unit vector against which the base moves, as ``BodyAcceleration`` pushes the body.
-        pulse: Acceleration [m/s^2].
+        nodes: Local support nodes, shape (k,).
+        mass: Mass added to each node, shape (k,) [kg].
+        direction: Unit vector opposite to the acceleration of the base, shape (3,); ``BodyAcceleration`` has the same.
+        pulse: Acceleration of the base [m/s^2].
     """
 
     nodes: NDArray[np.int32]
     mass: NDArray[np.float64]
     direction: NDArray[np.float64]
     pulse: Pulse
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_base": "same"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum", "_base": "same"}
     work: float = 0.0
     _force: NDArray[np.float64] = field(init=False)
-    _base: NDArray[np.float64] = field(init=False)  # displacement and velocity at the motion's time, half a kick
+    # Displacement of the base at the motion's time, its velocity there, and the velocity change of half a step.
+    _base: NDArray[np.float64] = field(init=False)
 
     @classmethod
     def build(
@@ -69,20 +71,20 @@ class LargeMass(Load):
         comm: MPI.Comm,
         body: Body,
         nodes: NDArray[np.integer],
-        base: tuple[NDArray[np.float64], Pulse],
+        base: BodyAcceleration,
         moved: float | None = None,
     ) -> "LargeMass":
-        """Share ``MASS_RATIO`` times the moved mass among input nodes ``(k,)`` by their masses; collective.
+        """Distribute ``MASS_RATIO`` times the moved mass over nodes, in proportion to their masses; collective.
 
         Args:
             comm: Communicator of the model.
-            body: The model.
-            nodes: Of the model.
-            base: ``direction`` and ``pulse``.
-            moved: Mass [kg] of all models; without it the model is alone.
+            body: Model on this rank.
+            nodes: Global numbers of the support nodes, shape (k,).
+            base: Body acceleration that would act on the model in the frame of its supports.
+            moved: Mass of all models [kg], or None for the mass of this model.
 
         Raises:
-            LoadError: A node does not exist, or is held or tied.
+            LoadError: There are no nodes, or one of them is held or tied.
         """
         local = body.local.locate(nodes)
         local = local[local >= 0]
@@ -98,30 +100,31 @@ class LargeMass(Load):
             )
         )
         if not count or wrong:
-            found = f"{int(wrong)} of their components are held or tied" if count else "there are none"
-            raise LoadError(f"a large mass needs support nodes that are free to move: {found}")
-        return cls(local, body.mass[local] * (MASS_RATIO * (moved or total) / support), *base)
+            reason = f"{int(wrong)} of their components are held or tied" if count else "the model has none"
+            raise LoadError(f"a large mass needs support nodes that are free to move: {reason}")
+        mass = body.mass[local] * (MASS_RATIO * (moved or total) / support)
+        return cls(local, mass, base.direction, base.pulse)
 
     def state(self, body: Body) -> State:
-        """Return also the force at its nodes."""
+        """Return the attributes that change with time, with the force at the nodes of the large mass."""
         return {**super().state(body), "_force": Rows(body.local.nodes[self.nodes], self._force)}
 
     def base_displacement(self, time: float) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the base, integrated in the motion's own steps up to its time."""
+        """Return the displacement ``(3,)`` [m] of the base, integrated in the steps of the motion up to its time."""
         return -self.direction * self._base[0]
 
     def base_velocity(self, time: float) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of the base, integrated in the motion's own steps up to its time."""
+        """Return the velocity ``(3,)`` [m/s] of the base, integrated in the steps of the motion up to its time."""
         return -self.direction * self._base[1]
 
     def begin(self, motion: Loaded) -> None:
-        """Add the masses."""
+        """Add the masses to the motion and set the base to rest."""
         motion.add_mass(self.nodes, self.mass)
         kick = 0.5 * motion.step * self.pulse.value(0.0)
         self._base = np.array([motion.step * kick, -2.0 * kick, kick])
 
     def add(self, motion: Loaded) -> None:
-        """Add the force that gives the masses the base's acceleration against all body forces."""
+        """Add the force that gives the masses the acceleration of the base, and advance the base by a step."""
         value = self.pulse.value(motion.time)
         kick = 0.5 * motion.step * value
         between = self._base[1] + self._base[2]
@@ -130,15 +133,15 @@ class LargeMass(Load):
         motion.force[self.nodes] += self._force
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract it from a copy."""
+        """Subtract the force of the latest ``add`` from a copy of the motion's force."""
         force[self.nodes] -= self._force
 
     def release(self, force: NDArray[np.float64]) -> None:
-        """Subtract all of it: the mass stands for a support."""
+        """Subtract the whole force, because the large mass stands for a support."""
         self.remove(force)
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work of what is left of the force after moving the mass itself."""
+        """Add the work of half a step by the force on the model, i.e. without the inertia of the large mass."""
         owned = motion.body.shared.owned[self.nodes]
         passed = self._force - self.mass[:, None] * (motion.acceleration(self.nodes) - motion.gravity)
         self.work += 0.5 * motion.step * float(np.sum((passed * motion.velocity[self.nodes])[owned]))

@@ -1,8 +1,9 @@
-"""Loads: objects in a list, each with its part in a step and the work that it does.
+"""Loads: objects in a list, each with its forces and the work that they do.
 
-A step asks every load in turn: ``drive`` prescribes velocities, ``add`` adds forces at nodes, ``collect`` takes half a
-step's work. The work of a force over a step is the mean of its values at both ends times the displacement between
-them, so that with ``ExplicitMotion.kinetic_energy`` the energy balance of a linear model is exact at any step.
+A step calls the methods of every load in turn: ``drive`` prescribes velocities, ``add`` adds nodal forces, ``collect``
+adds the work of half a step. The work of a force over a step is the mean of its values at both ends times the
+displacement between them, so that with ``ExplicitMotion.kinetic_energy`` the energy balance of a linear model is exact
+at any step.
 """
 
 from abc import ABC, abstractmethod
@@ -21,25 +22,26 @@ from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
 from reflowshock.fem.parallel.checkpoint_state import Entry, Rows, Same, State, Sum
 
-# A package that is dropped looks towards the ground, so the table's upward acceleration points along -z and the board,
-# seen from the table, is pushed along +z; so does its weight.
+# A dropped package faces the ground, so the upward acceleration of the table points along -z. In the frame of the table
+# the board is therefore pushed along +z, which is also the direction of its weight.
 DOWN = np.array([0.0, 0.0, 1.0])
-Kept = Literal["sum", "same", "nodes"]
+Checkpointed = Literal["sum", "same", "nodes"]
 
 
 class Loaded(ABC):
-    """A motion under loads, explicit or implicit: what loads ask of it, and what follows from their list.
+    """Motion of a model under a list of loads, with explicit or implicit steps.
 
     Attributes:
-        body: The model.
+        body: Model on this rank.
         step: Time step [s].
-        time: [s].
-        displacement: ``(n, 3)`` [m] at ``time``.
-        velocity: ``(n, 3)`` [m/s], of explicit steps at ``time - step / 2``.
-        force: ``(n, 3)`` [N] at ``time``, summed over ranks, slaves' moved to their masters; without body force.
-        gravity: ``(3,)`` [m/s^2], sum of the loads' accelerations at ``time``.
-        mobility: ``(n, 3)`` [1/kg] inverse masses, zero where the velocity is prescribed; of explicit steps.
-        counted_mass: ``(n,)`` [kg] that counts in the energy balance of this rank.
+        time: Time of the displacement [s].
+        displacement: Nodal displacement at ``time``, shape (n, 3) [m].
+        velocity: Nodal velocity, shape (n, 3) [m/s]; explicit steps have it at ``time - step / 2``.
+        force: Nodal force at ``time`` without body forces, shape (n, 3) [N]; summed over ranks, with the forces of
+            slave nodes moved to their masters.
+        gravity: Sum of the body accelerations of the loads at ``time``, shape (3,) [m/s^2].
+        mobility: Inverse mass of explicit steps, zero where the velocity is prescribed, shape (n, 3) [1/kg].
+        counted_mass: Nodal mass in the energy balance of this rank, shape (n,) [kg].
     """
 
     body: Body
@@ -55,11 +57,11 @@ class Loaded(ABC):
 
     @abstractmethod
     def hold(self, nodes: NDArray[np.integer], component: int) -> None:
-        """Let a velocity component of local nodes no longer follow from forces."""
+        """Exclude a velocity component (0, 1 or 2) of local nodes from the equation of motion: it is prescribed."""
 
     @abstractmethod
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
-        """Add masses ``(k,)`` [kg] that the energy balance does not count to local nodes, all of them free."""
+        """Add masses ``(k,)`` [kg] to free local nodes ``(k,)``; the energy balance leaves them out."""
 
     @abstractmethod
     def acceleration(self, nodes: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
@@ -70,11 +72,11 @@ class Loaded(ABC):
         return sum((load.acceleration(time) for load in self._loads), np.zeros(3))
 
     def base_displacement(self) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are given; zero but with a large mass."""
+        """Return the displacement ``(3,)`` [m] of the frame of results; zero unless a large mass moves the base."""
         return sum((load.base_displacement(self.time) for load in self._loads), np.zeros(3))
 
     def base_velocity(self) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of that frame."""
+        """Return the velocity ``(3,)`` [m/s] of the frame of results."""
         return sum((load.base_velocity(self.time) for load in self._loads), np.zeros(3))
 
     def internal_energy(self) -> Energy:
@@ -83,68 +85,70 @@ class Loaded(ABC):
 
 
 class Load:
-    """What acts on one model on one rank; each kind overrides its part. By itself it does nothing.
+    """Base class of the loads of one model on one rank; its methods do nothing, and each kind overrides its part.
 
     Attributes:
-        account: Where the energy balance puts the work.
-        kept: What changes with time, and what it is: a ``sum`` over ranks, the ``same`` on all, or of all ``nodes``.
-        work: Work done on this rank's share of the model so far [J].
+        account: Term of the energy balance that receives the work.
+        checkpointed: Names of the attributes that change with time, each with its kind: a ``sum`` over ranks, the
+            ``same`` on all ranks, or rows of all local ``nodes``.
+        work: Work done so far on this rank's share of the model [J].
     """
 
     account: ClassVar[Literal["external", "damping"]] = "external"
-    kept: ClassVar[Mapping[str, Kept]] = {}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {}
     work: float = 0.0
 
     def acceleration(self, time: float) -> NDArray[np.float64]:
-        """Return the acceleration ``(3,)`` [m/s^2] that acts on every kilogram at a time [s]."""
+        """Return the acceleration ``(3,)`` [m/s^2] of all masses at a time [s], i.e. the body force per mass."""
         return np.zeros(3)
 
     def base_displacement(self, time: float) -> NDArray[np.float64]:
-        """Return the displacement ``(3,)`` [m] of the frame in which results are given, at the motion's time [s]."""
+        """Return the displacement ``(3,)`` [m] of the frame of results at the motion's time [s]."""
         return np.zeros(3)
 
     def base_velocity(self, time: float) -> NDArray[np.float64]:
-        """Return the velocity ``(3,)`` [m/s] of that frame, at the motion's time [s]."""
+        """Return the velocity ``(3,)`` [m/s] of the frame of results at the motion's time [s]."""
         return np.zeros(3)
 
     def begin(self, motion: Loaded) -> None:
-        """Take part in the masses and free components of a motion at rest."""
+        """Add masses to a motion at rest, or prescribe components of its velocity, before the first step."""
 
     def carry(self, body: Body) -> None:
-        """Act in the small steps of levels inside the model, too, once all know what moves; collective."""
+        """Include the response of elements in step levels, after ``begin`` of all loads; collective."""
 
     def drive(self, velocity: NDArray[np.float64], time: float) -> None:
-        """Prescribe rows of the mean velocity ``(n, 3)`` [m/s] of the step that begins at a time [s]."""
+        """Set prescribed rows of the mean velocity ``(n, 3)`` [m/s] of the step that begins at a time [s]."""
 
     def add(self, motion: Loaded) -> None:
         """Add the force at the motion's time to ``motion.force``, which is already summed over ranks."""
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract from a copy of ``motion.force`` what ``add`` added last."""
+        """Subtract the force of the latest ``add`` from a copy of ``motion.force``, shape (n, 3) [N]."""
 
     def release(self, force: NDArray[np.float64]) -> None:
-        """Subtract the force of a support from a copy of ``motion.force``."""
+        """Subtract the load from a copy of ``motion.force`` if it stands for a support."""
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work of the force at the motion's time at its velocity; all forces are complete."""
+        """Add the work of half a step, with force and velocity of the motion, after all forces are added."""
 
     def state(self, body: Body) -> State:
-        """Return all that changes with time, for a checkpoint."""
-        kinds: dict[Kept, Callable[[Any], Entry]] = {"sum": Sum, "same": Same, "nodes": partial(Rows, body.local.nodes)}
-        return {name: kinds[kind](getattr(self, name)) for name, kind in self.kept.items()}
+        """Return the values of the attributes that change with time, for a checkpoint."""
+        nodes = partial(Rows, body.local.nodes)
+        kinds: dict[Checkpointed, Callable[[Any], Entry]] = {"sum": Sum, "same": Same, "nodes": nodes}
+        return {name: kinds[kind](getattr(self, name)) for name, kind in self.checkpointed.items()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from the values of what ``state`` returned."""
+        """Set the attributes of ``state`` from a checkpoint."""
         for name, value in state.items():
             setattr(self, name, value)
 
 
 @dataclass(frozen=True)
 class BodyAcceleration(Load):
-    """A uniform acceleration: gravity, or input-G in the frame of the supports, which are held.
+    """Uniform body acceleration: gravity, or input-G in the frame of the supports, which are held.
 
     Attributes:
-        direction: ``(3,)`` unit vector in which the body is pushed.
+        direction: Unit vector along the force on the body, shape (3,).
         pulse: Acceleration [m/s^2].
     """
 
@@ -157,32 +161,36 @@ class BodyAcceleration(Load):
 
 
 def half_sine_drop(peak: float, duration: float) -> BodyAcceleration:
-    """Return the input-G of a drop with the package facing down: a half sine [m/s^2, s] that pushes along +z."""
+    """Return the half sine of a drop with the package facing down: peak [m/s^2], duration [s]; it acts along +z."""
     return BodyAcceleration(DOWN, HalfSine(peak, duration))
 
 
 @dataclass
 class NodalForces(Load):
-    """Dead forces at nodes: a pattern times a pulse.
+    """Nodal forces of fixed direction: a pattern times a pulse.
 
     Attributes:
-        nodes: ``(k,)`` local nodes.
-        pattern: ``(k, 3)`` force [N] at a pulse of one, summed over ranks and equal on all that hold the node.
-        pulse: Its course.
-        owned: ``(k,)`` whether the node counts on this rank.
+        nodes: Local nodes, shape (k,).
+        pattern: Nodal forces at the pulse value one, shape (k, 3) [N]; summed over ranks, equal on all ranks that hold
+            the node.
+        pulse: Factor of the pattern over time.
+        owned: Whether this rank owns the node and counts its work, shape (k,).
     """
 
     nodes: NDArray[np.int32]
     pattern: NDArray[np.float64]
     pulse: Pulse
     owned: NDArray[np.bool_]
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_factor": "same"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum", "_factor": "same"}
     work: float = 0.0
     _factor: float = 0.0
 
     @classmethod
     def build(cls, body: Body, nodes: NDArray[np.integer], forces: NDArray[np.float64], pulse: Pulse) -> "NodalForces":
-        """Take forces ``(k, 3)`` [N] at input nodes ``(k,)`` to local nodes, slaves' to their masters; collective."""
+        """Return the load of forces ``(k, 3)`` [N] at global nodes ``(k,)``; those on slaves move to their masters.
+
+        Collective over the model.
+        """
         local = body.local.locate(nodes)
         here = np.flatnonzero(local >= 0)
         here = here[body.shared.owned[local[here]]]
@@ -190,26 +198,27 @@ class NodalForces(Load):
         pattern[local[here]] = forces[here]
         body.tie.gather(pattern)
         body.shared.add(pattern)
-        rows, pattern, owned = nodal(body, pattern)
+        rows, pattern, owned = nodal_pattern(body, pattern)
         return cls(rows, pattern, pulse, owned)
 
     def carry(self, body: Body) -> None:
-        """Add what levels make of the pattern."""
+        """Add the reaction of the step levels to the pattern."""
         pattern = np.zeros((len(body.mass), 3))
         pattern[self.nodes] = self.pattern
-        self.nodes, self.pattern, self.owned = nodal(body, pattern + carried(body, pattern, np.zeros(3)))
+        reaction = level_reaction(body, pattern, np.zeros(3))
+        self.nodes, self.pattern, self.owned = nodal_pattern(body, pattern + reaction)
 
     def add(self, motion: Loaded) -> None:
-        """Add the force of the motion's time."""
+        """Add the pattern times the pulse at the motion's time."""
         self._factor = self.pulse.value(motion.time)
         motion.force[self.nodes] += self._factor * self.pattern
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract it from a copy."""
+        """Subtract the force of the latest ``add`` from a copy of the motion's force."""
         force[self.nodes] -= self._factor * self.pattern
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work."""
+        """Add the work of half a step."""
         power = np.sum(self.pattern[self.owned] * motion.velocity[self.nodes[self.owned]])
         self.work += 0.5 * motion.step * self._factor * float(power)
 
@@ -217,38 +226,44 @@ class NodalForces(Load):
 NodalPattern = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]
 
 
-def nodal(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
-    """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows, and which this rank counts."""
+def nodal_pattern(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
+    """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows there, and which are owned."""
     rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
     return rows, pattern[rows], body.shared.owned[rows]
 
 
-def carried(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what levels add to a load ``(n, 3)`` [N] and a fall, see ``SubsteppedElements.carry``; collective."""
+def level_reaction(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the forces ``(n, 3)`` [N] that step levels add to a steady load; collective over the model.
+
+    Args:
+        body: Model on this rank.
+        load: Steady nodal load, shape (n, 3) [N].
+        fall: Steady body acceleration, shape (3,) [m/s^2], see ``SubsteppedElements.carry``.
+    """
     force = sum((levels.carry(load, fall) for levels in levels_of(body.terms)), np.zeros_like(load))
     body.shared.add(force)
     return force
 
 
 class FineSupports(Load):
-    """How supports of elements in levels bear body forces: what levels add to them.
+    """Forces that step levels with supports add under a body acceleration.
 
     Attributes:
-        patterns: Per axis, for a unit acceleration of the body along it: local nodes ``(k,)``, their forces ``(k, 3)``
-            [N] summed over ranks, whether they count on this rank. Most supports bear nothing along most axes.
+        patterns: Forces for a unit body acceleration along each axis: local nodes ``(k,)``, nodal forces ``(k, 3)`` [N]
+            summed over ranks, and whether this rank owns the node. Along most axes most supports add none.
     """
 
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum", "_factor": "same"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum", "_factor": "same"}
 
     def __init__(self) -> None:
-        """Begin without acceleration."""
+        """Start without patterns and acceleration."""
         self.patterns: list[NodalPattern] = []
         self._factor = np.zeros(3)
 
     def carry(self, body: Body) -> None:
-        """Find the patterns."""
-        nothing = np.zeros((len(body.mass), 3))
-        self.patterns = [nodal(body, carried(body, nothing, fall)) for fall in np.eye(3)]
+        """Compute the patterns."""
+        no_load = np.zeros((len(body.mass), 3))
+        self.patterns = [nodal_pattern(body, level_reaction(body, no_load, fall)) for fall in np.eye(3)]
 
     def add(self, motion: Loaded) -> None:
         """Add the force for the motion's body acceleration."""
@@ -257,12 +272,12 @@ class FineSupports(Load):
             motion.force[nodes] += factor * force
 
     def remove(self, force: NDArray[np.float64]) -> None:
-        """Subtract it from a copy."""
-        for factor, (nodes, own, _) in self._acting():
-            force[nodes] -= factor * own
+        """Subtract the force of the latest ``add`` from a copy of the motion's force."""
+        for factor, (nodes, pattern, _) in self._acting():
+            force[nodes] -= factor * pattern
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work."""
+        """Add the work of half a step."""
         for factor, (nodes, force, owned) in self._acting():
             power = np.sum(force[owned] * motion.velocity[nodes[owned]])
             self.work += 0.5 * motion.step * factor * float(power)
@@ -276,23 +291,24 @@ class FineSupports(Load):
 
 @dataclass
 class PrescribedVelocity(Load):
-    """One velocity component of some nodes follows a pulse; its work is the work of the reaction.
+    """Velocity component of some nodes that follows a pulse; its work is the work of the reaction.
 
     Attributes:
-        nodes: ``(k,)`` local nodes.
-        component: 0, 1 or 2.
+        nodes: Local nodes, shape (k,).
+        component: Component 0, 1 or 2 of the velocity.
         pulse: Velocity [m/s].
+        step: Time step of the motion, set by ``begin`` [s].
     """
 
     nodes: NDArray[np.int32]
     component: int
     pulse: Pulse
-    kept: ClassVar[Mapping[str, Kept]] = {"work": "sum"}
+    checkpointed: ClassVar[Mapping[str, Checkpointed]] = {"work": "sum"}
     step: float = field(default=0.0, init=False)
     work: float = field(default=0.0, init=False)
 
     def begin(self, motion: Loaded) -> None:
-        """Take the component out of the free ones.
+        """Prescribe the component in the motion.
 
         Raises:
             LoadError: A node is held or tied in this component.
@@ -305,17 +321,17 @@ class PrescribedVelocity(Load):
         motion.hold(self.nodes, self.component)
 
     def drive(self, velocity: NDArray[np.float64], time: float) -> None:
-        """Set the mean velocity of the step, so that displacements are exact."""
+        """Set the mean velocity of the step, so that displacements at its end are exact."""
         velocity[self.nodes, self.component] = self.mean(time)
 
     def mean(self, time: float) -> float:
-        """Return the mean velocity [m/s] of the step that begins at a time [s]; before the start, the mirror image."""
+        """Return the mean velocity [m/s] of the step that begins at a time [s]; before zero, the pulse is mirrored."""
         if time < -0.5 * self.step:
             return 2.0 * self.pulse.value(0.0) - self.mean(0.0)
         return (self.pulse.integral(time + self.step) - self.pulse.integral(time)) / self.step
 
     def collect(self, motion: Loaded) -> None:
-        """Add half a step's work of the reaction m a - f - m g."""
+        """Add the work of the reaction m a - f - m g over half a step."""
         before, after = self.mean(motion.time - self.step), self.mean(motion.time)
         acceleration = (after - before) / self.step - motion.gravity[self.component]
         mass = motion.counted_mass[self.nodes]

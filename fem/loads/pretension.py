@@ -1,4 +1,4 @@
-"""The force that linear elements have at no displacement: constant, at the nodes."""
+"""Constant internal force of prestressed linear elements."""
 
 from dataclasses import dataclass, field
 
@@ -10,12 +10,12 @@ from reflowshock.fem.forces.energy import Energy
 
 @dataclass(frozen=True, slots=True)
 class Pretension:
-    """A constant internal force; a ``force.ForceTerm`` beside those of the elements, which give its change.
+    """Internal force of prestressed elements at zero displacement, as a ``force.ForceTerm``; others add its change.
 
     Attributes:
-        force: ``(n, 3)`` [N] of this rank's elements.
-        stored: Elastic energy [J] of these elements at no displacement.
-        history: Empty: nothing changes.
+        force: Internal nodal force of this rank's elements at zero displacement, shape (n, 3) [N].
+        stored: Elastic energy of these elements at zero displacement [J].
+        history: Empty, because the force is constant.
     """
 
     force: NDArray[np.float64]
@@ -23,9 +23,9 @@ class Pretension:
     history: dict[str, NDArray] = field(default_factory=dict)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the force, whatever the displacement."""
+        """Subtract the constant internal force from a nodal force ``(n, 3)`` [N]; the displacement is not used."""
         force -= self.force
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
-        """Return the energy at the beginning, and the work against the force since."""
+        """Return the stored energy plus the work against the constant force at a displacement ``(n, 3)`` [m]."""
         return Energy(strain=self.stored + float(np.vdot(self.force, displacement)))

@@ -1,4 +1,4 @@
-"""Pulses: the course in time of a load, with its first and second integral, which are exact."""
+"""Pulses: the value of a load over time, with exact first and second integrals."""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -23,7 +23,7 @@ SERVICE_CONDITIONS: dict[str, tuple[float, float]] = {
 
 
 class Pulse(Protocol):
-    """A value over time, from rest at time zero."""
+    """Value of a load over time, with its integrals from time zero."""
 
     def value(self, time: float) -> float:
         """Return the value at a time [s]."""
@@ -37,11 +37,11 @@ class Pulse(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class HalfSine:
-    """A sin(pi t / tau) up to the time tau, then nothing.
+    """Half sine: A sin(pi t / tau) up to the time tau, then zero.
 
     Attributes:
-        peak: A, in the unit of the load.
-        duration: tau [s].
+        peak: Amplitude A, in the unit of the load.
+        duration: Duration tau [s].
     """
 
     peak: float
@@ -52,7 +52,7 @@ class HalfSine:
         return float(self.peak * np.sin(np.pi * time / self.duration)) if 0.0 < time < self.duration else 0.0
 
     def integral(self, time: float) -> float:
-        """Return the integral up to a time [s]; 2 A tau / pi for all of it."""
+        """Return the integral up to a time [s]; 2 A tau / pi from tau on."""
         angle = np.pi * min(max(time, 0.0), self.duration) / self.duration
         return float(self.peak * self.duration / np.pi * (1.0 - np.cos(angle)))
 
@@ -66,11 +66,11 @@ class HalfSine:
 
 @dataclass(frozen=True, slots=True)
 class Haversine:
-    """A sin^2(pi t / tau) up to the time tau, then nothing: it starts and ends without a kink.
+    """Haversine: A sin^2(pi t / tau) up to the time tau, then zero; it starts and ends with zero slope.
 
     Attributes:
-        peak: A, in the unit of the load.
-        duration: tau [s].
+        peak: Amplitude A, in the unit of the load.
+        duration: Duration tau [s].
     """
 
     peak: float
@@ -81,7 +81,7 @@ class Haversine:
         return float(self.peak * np.sin(np.pi * time / self.duration) ** 2) if 0.0 < time < self.duration else 0.0
 
     def integral(self, time: float) -> float:
-        """Return the integral up to a time [s]; A tau / 2 for all of it."""
+        """Return the integral up to a time [s]; A tau / 2 from tau on."""
         inside, rate = min(max(time, 0.0), self.duration), 2.0 * np.pi / self.duration
         return float(0.5 * self.peak * (inside - np.sin(rate * inside) / rate))
 
@@ -94,13 +94,13 @@ class Haversine:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A constant value from time zero on, up to a duration [s]."""
+    """Constant value from time zero up to a duration [s]."""
 
     peak: float
     duration: float = np.inf
 
     def value(self, time: float) -> float:
-        """Return the value at a time [s]; at time zero it acts already."""
+        """Return the value at a time [s]; unlike the other pulses it acts at time zero."""
         return self.peak if 0.0 <= time < self.duration else 0.0
 
     def integral(self, time: float) -> float:
@@ -115,11 +115,11 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Tabulated:
-    """Values at times, linear between them, zero before the first and after the last.
+    """Tabulated values, linear in between, zero before the first and after the last time.
 
     Attributes:
-        times: ``(n,)`` [s], increasing, not negative.
-        values: ``(n,)``.
+        times: Increasing times from zero or later, shape (n,) [s].
+        values: Values in the unit of the load, shape (n,).
     """
 
     times: NDArray[np.float64]
@@ -151,22 +151,22 @@ class Tabulated:
 
     def integral(self, time: float) -> float:
         """Return the integral up to a time [s]."""
-        place, past = self._place(time)
-        return float(self._integrals[place] + 0.5 * past * (self.values[place] + self.value(self.times[place] + past)))
+        row, past = self._row(time)
+        return float(self._integrals[row] + 0.5 * past * (self.values[row] + self.value(self.times[row] + past)))
 
     def double_integral(self, time: float) -> float:
         """Return the second integral up to a time [s]."""
-        place, past = self._place(time)
-        last = self.value(self.times[place] + past)
-        inside = self._integrals[place] * past + past**2 * (2.0 * self.values[place] + last) / 6.0
+        row, past = self._row(time)
+        last = self.value(self.times[row] + past)
+        inside = self._integrals[row] * past + past**2 * (2.0 * self.values[row] + last) / 6.0
         beyond = self.integral(time) * max(time - float(self.times[-1]), 0.0)
-        return float(self._doubles[place] + inside + beyond)
+        return float(self._doubles[row] + inside + beyond)
 
-    def _place(self, time: float) -> tuple[int, float]:
-        """Return the last tabulated time that has passed, and the time [s] since then inside the table."""
+    def _row(self, time: float) -> tuple[int, float]:
+        """Return the row of the latest tabulated time up to a time [s], and the time since then inside the table."""
         inside = min(max(time, float(self.times[0])), float(self.times[-1]))
-        place = int(np.searchsorted(self.times, inside, side="right")) - 1
-        return place, inside - float(self.times[place])
+        row = int(np.searchsorted(self.times, inside, side="right")) - 1
+        return row, inside - float(self.times[row])
 
 
 def service_condition(name: str) -> HalfSine:

@@ -44,7 +44,7 @@ def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, sh
     elif not len(tables.shaken):
         loads.append(ShakenBase(DOWN, pulse.pulse))
     else:
-        loads.append(LargeMass.build(comm, body, tables.shaken, (DOWN, pulse.pulse), mass))
+        loads.append(LargeMass.build(comm, body, tables.shaken, BodyAcceleration(DOWN, pulse.pulse), mass))
     if any(shock.damping.coefficients):
         loads.append(RayleighDamping.build(body, *shock.damping.coefficients))
     return loads

@@ -1,4 +1,4 @@
-"""The course of a drop shock: from its parameters to the acceleration of the table. Loads no MPI: plans read it."""
+"""Acceleration pulse of a drop shock from its parameters; imports no MPI because plans use it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,12 @@ from reflowshock.fem.problem.shock import Shock
 
 @dataclass(frozen=True, slots=True)
 class ShockPulse:
-    """The course of the shock, and whether weight acts beside it.
+    """Pulse of the shock, and the decision on gravity.
 
     Attributes:
-        pulse: Upward acceleration of the table [m/s^2].
-        source: Where it comes from, in words.
-        gravity: Whether weight acts, and why.
+        pulse: Upward acceleration of the drop table [m/s^2].
+        source: Source of the pulse as text.
+        gravity: Decision on gravity during the shock.
     """
 
     pulse: Pulse
@@ -26,17 +26,17 @@ class ShockPulse:
 
 
 def shock_pulse(shock: Shock) -> ShockPulse:
-    """Return the pulse of a shock.
+    """Return the pulse of a shock and the decision on gravity.
 
     Raises:
-        PulseError: A table cannot be read.
+        PulseError: The table of the pulse cannot be read.
     """
     pulse, source = input_pulse(shock)
-    return ShockPulse(pulse, source, WeightEffect.beside(shock.gravity, pulse.peak, STANDARD_GRAVITY))
+    return ShockPulse(pulse, source, WeightEffect.by_peak(shock.gravity, pulse.peak, STANDARD_GRAVITY))
 
 
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
-    """Return the acceleration of the drop table [m/s^2], and where it comes from; errors as ``shock_pulse``."""
+    """Return the acceleration pulse of the drop table [m/s^2] and its source as text; raises as ``shock_pulse``."""
     if shock.table is not None:
         return read_pulse(Path(shock.table), "acceleration", shock.table_column), f"table {Path(shock.table).name}"
     if shock.service_condition is not None:

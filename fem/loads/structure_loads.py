@@ -56,7 +56,7 @@ def _input_g(model: LoadedModel, name: str, load: InputG, pulse: Pulse) -> Load:
         return BodyAcceleration(-unit(load.direction), pulse)  # inertia acts against the acceleration of the supports
     supports = [model.tables.nodes_of[model.problem.supports[name].on] for name in shaken_supports(model.problem)]
     nodes = np.unique(np.concatenate(supports))
-    return LargeMass.build(model.comm, model.body, nodes, (-unit(load.direction), pulse))
+    return LargeMass.build(model.comm, model.body, nodes, BodyAcceleration(-unit(load.direction), pulse))
 
 
 def _gravity(model: LoadedModel, name: str, load: Gravity, pulse: Pulse) -> Load:

@@ -98,7 +98,14 @@ def solder_levels(
 
 
 def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
-    """Return the levels between the layers of a joint of a height [m], from 0 upwards, shape (layers + 1,) [m].
+    """Return the heights of the planes between the element layers of a joint, graded towards the pads.
+
+    Args:
+        height: Height of the joint [m].
+        numerics: Number of layers, and thickness and number of the layers at the pads, if these are prescribed.
+
+    Returns:
+        Heights from 0 to ``height``, shape (layers + 1,) [m].
 
     Raises:
         ValueError: No growth ratio within the limits fits between the layers at the pads.

@@ -68,7 +68,14 @@ def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.nd
 
 
 def check_surface(surface: ClosedSurface) -> None:
-    """Raise SurfaceError unless the surface is watertight, outward oriented and without degenerate triangles."""
+    """Check that a surface encloses a body, before it is measured or meshed.
+
+    Args:
+        surface: Closed surface of a joint.
+
+    Raises:
+        SurfaceError: The surface is not watertight, faces inwards, or has a degenerate triangle.
+    """
     edges = np.vstack([surface.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     ordered = np.unique(edge_numbers(edges))
     if len(ordered) != len(edges) or not np.array_equal(ordered, np.unique(edge_numbers(edges[:, ::-1]))):

@@ -183,7 +183,7 @@ class DropletTension(Effect[Droplet]):
     number = "1 / sqrt(We), We = rho U^2 D / gamma: square root of surface energy over kinetic energy"
     threshold = LITTLE_TENSION
     influence = "the number, for the spread of an impact; without an impact nothing else acts"
-    place = "reflowshock.particles.sph.liquid_surface.LiquidSurface"
+    implementation = "reflowshock.particles.sph.liquid_surface.LiquidSurface"
     switch = "droplet.effects.surface_tension = auto, on, off"
     source = "Pasandideh-Fard et al. 1996: D_max / D = sqrt((We + 12) / (3 (1 - cos theta) + 4 We / sqrt(Re)))"
 
@@ -206,7 +206,7 @@ class DropletGravity(Effect[Droplet]):
     number = "Bo = rho g D^2 / gamma"
     threshold = NEGLIGIBLE_SHAPE_CHANGE / SHAPE_CHANGE_BY_BOND
     influence = "0.2 Bo, of the height"
-    place = "reflowshock.particles.sph.flow.law_of"
+    implementation = "reflowshock.particles.sph.flow.law_of"
     switch = "droplet.effects.gravity = auto, on, off"
     source = "Bashforth & Adams 1883, tables"
 

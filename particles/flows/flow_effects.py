@@ -31,7 +31,7 @@ class FlowViscosity(FlowEffect):
     number = "1 / sqrt(Re), Re = rho U L / mu: boundary layer over length"
     threshold = THIN_LAYER
     influence = "the number; walls of a dam break are smooth, without such a layer"
-    place = "reflowshock.particles.sph.pair_terms.shear_viscosity"
+    implementation = "reflowshock.particles.sph.pair_terms.shear_viscosity"
     switch = "<scene>.effects.viscosity = auto, on, off"
     source = "Morris et al. 1997; Cleary 1998"
 
@@ -52,7 +52,7 @@ class ArtificialViscosity(FlowEffect):
     adds = "alpha h c0 (rho_0 / rho) sum pi_ij grad W V: nu = alpha h c0 / 8 in a plane"
     number = "alpha"
     influence = "nu t / L^2, nu = alpha h c0 / 8"
-    place = "reflowshock.particles.sph.pair_terms.artificial_viscosity"
+    implementation = "reflowshock.particles.sph.pair_terms.artificial_viscosity"
     switch = "<scene>.numerics.artificial_viscosity"
     source = "Monaghan 1992; Antuono et al. 2012"
 
@@ -73,7 +73,7 @@ class ShearDependence(FlowEffect):
     name = "shear_dependent_viscosity"
     adds = "mu(sqrt(2 D : D)) in place of mu: power law or Carreau"
     influence = "of the largest viscosity over the least one; not predicted"
-    place = "reflowshock.particles.sph.flow.shear_law"
+    implementation = "reflowshock.particles.sph.flow.shear_law"
     switch = "<scene>.rheology"
     source = "Carreau 1972; Bird, Armstrong, Hassager 1987"
 

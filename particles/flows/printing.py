@@ -226,7 +226,7 @@ class InkFreezing(Effect[Printing]):
     )
     threshold = LITTLE_FROZEN
     influence = "the number; without freezing light cures the drops"
-    place = "reflowshock.particles.sph.heat.Heat"
+    implementation = "reflowshock.particles.sph.heat.Heat"
     switch = "printing.effects.freezing = auto, on, off"
     source = "Neumann's solution, as in Carslaw & Jaeger 1959; Cleary & Monaghan 1999; Voller & Prakash 1987"
 

@@ -18,12 +18,12 @@ class GravityEffect(LiquidEffect):
     number = f"{SHAPE_CHANGE_BY_BOND:g} Bo, Bo = rho g L H / gamma"
     threshold = NEGLIGIBLE_SHAPE_CHANGE
     influence = f"{SHAPE_CHANGE_BY_BOND:g} Bo of the shape, up to (large contact angles)"
-    place = "reflowshock.particles.physics.forces.Gravity"
+    implementation = "reflowshock.particles.physics.forces.Gravity"
     switch = "solder.effects.gravity (of a scene: gravity) = auto, on, off"
     source = "Bashforth & Adams 1883, heights of sessile drops"
     needs_wall = True
     without_wall = "no wall: the drop falls as a whole, which does not change its shape"
-    section_place = "reflowshock.particles.section.forces.PolylineWeight"
+    section_implementation = "reflowshock.particles.section.forces.PolylineWeight"
     is_measured = True
 
     @property

@@ -11,7 +11,7 @@ class InertiaEffect(MotionEffect):
     adds = "rho Dv/Dt"
     number = "T / max(sqrt(rho L^3 / gamma), rho L^2 / (5 mu)), process over slowest time"
     influence = "exp(-T / slowest time): what is left of the motion"
-    place = "reflowshock.particles.physics.operators.Inertia"
+    implementation = "reflowshock.particles.physics.operators.Inertia"
     switch = "solder.effects.inertia = auto, on, off"
     source = "Lamb 1932, art. 355, decay of mode 2"
 

@@ -13,9 +13,9 @@ class SurfaceTensionEffect(LiquidEffect):
     threshold = LARGEST_BOND
     acts = "below"
     influence = "1 / sqrt(1 + Bo) of the shape: the capillary length over the size"
-    place = "reflowshock.particles.physics.forces.SurfaceTension"
+    implementation = "reflowshock.particles.physics.forces.SurfaceTension"
     switch = "solder.effects.surface_tension = auto, on, off"
-    section_place = "reflowshock.particles.section.forces.PolylineTension"
+    section_implementation = "reflowshock.particles.section.forces.PolylineTension"
     source = "de Gennes, Brochard-Wyart & Quere 2004, 2.1"
 
     def auto(self, liquid: LiquidScene) -> Decision:

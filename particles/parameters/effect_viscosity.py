@@ -11,7 +11,7 @@ class ViscosityEffect(MotionEffect):
     adds = "-div(2 mu D(v))"
     number = "as inertia; Oh = mu / sqrt(rho gamma L) is given"
     influence = "exp(-T / slowest time): at rest it does nothing"
-    place = "reflowshock.particles.physics.operators.Viscosity"
+    implementation = "reflowshock.particles.physics.operators.Viscosity"
     switch = "solder.effects.viscosity = auto, on, off"
     source = "Lamb 1932, art. 355"
 

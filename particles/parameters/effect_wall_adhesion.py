@@ -13,10 +13,10 @@ class WallAdhesionEffect(LiquidEffect):
     threshold = LARGEST_BOND
     acts = "below"
     influence = "1 / sqrt(1 + Bo) of the shape, unless theta = 90 deg"
-    place = "reflowshock.particles.physics.forces.Wetting"
+    implementation = "reflowshock.particles.physics.forces.Wetting"
     switch = "solder.effects.wall_adhesion = auto, on, off"
     needs_wall = True
-    section_place = "reflowshock.particles.section.forces.PolylineWetting"
+    section_implementation = "reflowshock.particles.section.forces.PolylineWetting"
     source = "Young 1805; Brakke 1992"
 
     def auto(self, liquid: LiquidScene) -> Decision:

@@ -91,7 +91,7 @@ class LiquidScene:
 
 
 class LiquidEffect(Effect[LiquidScene]):
-    """Effect of a reflow: ``place`` names its ``Acting`` class, and ``SolderEffects`` holds its switch.
+    """Effect of a reflow: ``implementation`` names its ``Acting`` class, and ``SolderEffects`` holds its switch.
 
     Attributes:
         of_motion: Whether the effect vanishes at rest.
@@ -99,7 +99,7 @@ class LiquidEffect(Effect[LiquidScene]):
         without_wall: Reason why the effect is off without a wall.
         is_axisymmetric: Whether a drop keeps its axis and its planes of symmetry. Otherwise it has no Young-Laplace
             reference and cannot be computed in part or in section.
-        section_place: Dotted name of the ``Acting`` class for a drop in section; by default ``place``.
+        section_implementation: Dotted name of the ``Acting`` class for a drop in section; by default ``implementation``.
         is_measured: Whether ``benchmarks/effects.py`` measures the cost of the effect per step.
     """
 
@@ -108,7 +108,7 @@ class LiquidEffect(Effect[LiquidScene]):
     needs_wall = False
     without_wall = "no wall"
     is_axisymmetric = True
-    section_place: str = ""
+    section_implementation: str = ""
     is_measured = False
 
     @property

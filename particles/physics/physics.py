@@ -130,7 +130,7 @@ class Physics:
 
 
 class Acting(Protocol):
-    """Class that implements an effect; ``LiquidEffect.place`` names it."""
+    """Class that implements an effect; ``LiquidEffect.implementation`` names it."""
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:

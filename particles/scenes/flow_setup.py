@@ -52,8 +52,8 @@ def build_physics(
     """
     physics = Physics((), (Mass(solder.density),), (), (), lines)
     for effect in acting(effects):
-        place = effect.section_place if in_section and effect.section_place else effect.place
-        acting_class: type[Acting] = resolve_name(place)
+        section_name = effect.section_implementation if in_section else ""
+        acting_class: type[Acting] = resolve_name(section_name or effect.implementation)
         physics = acting_class.added_to(physics, solder)
         if not effect.is_axisymmetric:
             physics = replace(physics, is_axisymmetric=False)

@@ -78,7 +78,7 @@ def test_irrelevant_effect_changes_almost_nothing(name, tmp_path):
 
 @pytest.mark.parametrize("name", registry())
 def test_object_is_at_its_registered_location(name):
-    module, _, attribute = registry()[name].place.rpartition(".")
+    module, _, attribute = registry()[name].implementation.rpartition(".")
     assert hasattr(import_module(module), attribute)
 
 
@@ -107,7 +107,7 @@ def steps_of(motion) -> dict:
 @off(*(effect.name for effect in LIQUID_EFFECTS))
 def _(effect, _folder):
     """A step makes the same calls as with lists without the object and enters none of its code."""
-    module, _, kind = effect.place.rpartition(".")
+    module, _, kind = effect.implementation.rpartition(".")
     # Wetting pins vertices by all other forces, so their lists cannot be compared.
     is_force = not effect.of_motion and effect.name != "wall_adhesion"
     others = scene.RESTING | ({"wall_adhesion": False} if is_force else {})
@@ -117,8 +117,8 @@ def _(effect, _folder):
         scene.flow_with(others | {effect.name: acts}).step()  # compile before counting
     counts = [scene.calls(flow.step) for flow in (taken, left_out, acting)]
     assert counts[0] == counts[1]
-    assert not scene.enters(counts[1], effect.place)
-    assert scene.enters(counts[2], effect.place)
+    assert not scene.enters(counts[1], effect.implementation)
+    assert scene.enters(counts[2], effect.implementation)
 
 
 @on("gravity")
@@ -162,7 +162,7 @@ def _(effect, _folder):
     assert not decide_drop(heavy, is_free=False)[effect.name]["on"]
     flow = scene.flow_with(scene.RESTING, solder=heavy)
     pushes = {type(force).__name__: np.linalg.norm(force.force(flow.body)) for force in flow.physics.forces}
-    kind = effect.place.rpartition(".")[2]
+    kind = effect.implementation.rpartition(".")[2]
     assert pushes[kind] < 0.1 * pushes["Gravity"]
 
 
@@ -190,7 +190,7 @@ def _(effect, folder):
     assembly = small_structure(folder)
     rigid = RigidPlates(assembly)
     called = scene.calls(lambda: rigid.solve(473.15, 0.0, np.zeros((4, 2, 6)), np.zeros(1)))
-    assert not scene.enters(called, effect.place)
+    assert not scene.enters(called, effect.implementation)
     assert open_structure.__module__ == "reflowshock.workflow.reflow.between"
 
 
@@ -296,7 +296,7 @@ def _(effect, _folder):
 @on("gravity_in_the_shock")
 def _(_effect, _folder):
     body, step = scene.strip()
-    left_out = WeightEffect.beside("auto", 1500 * G, G)
+    left_out = WeightEffect.by_peak("auto", 1500 * G, G)
     assert not left_out["on"] and left_out["influence"] < NEGLIGIBLE_WEIGHT
     both = [scene.moved(body, step, scene.loads_of(body, scene.shock(gravity=g)), 3e-4)[1] for g in ("off", "on")]
     assert 0.0 < both[1] / both[0] - 1.0 < 1.2 * left_out["influence"]

@@ -65,7 +65,8 @@ def loads_of(kind: str, body: Body, mesh: MeshData, stiffness: float) -> list[Lo
         return [PrescribedVelocity(low_nodes(body, mesh), 0, Constant(1.0)), BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
         low = mesh.facet_nodes("low")
-        return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse)), BodyAcceleration(ALONG, Constant(9.81))]
+        large_mass = LargeMass.build(MPI.COMM_SELF, body, low, BodyAcceleration(ALONG, pulse))
+        return [large_mass, BodyAcceleration(ALONG, Constant(9.81))]
     return [BodyAcceleration(ALONG, pulse), RayleighDamping(2e4, stiffness, body.terms)]
 
 
@@ -136,7 +137,8 @@ def test_large_mass_is_direct_acceleration():
         body, critical = dns_body(mesh, STEEL)
         low = mesh.facet_nodes("low")
         load = BodyAcceleration(ALONG, pulse) if method == "direct" else None
-        motion = motion_of(body, 0.9 * critical, [load or LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse))])
+        acting = load or LargeMass.build(MPI.COMM_SELF, body, low, BodyAcceleration(ALONG, pulse))
+        motion = motion_of(body, 0.9 * critical, [acting])
         tip = body.local.locate(mesh.facet_nodes("high"))
         rows = []
         for _ in range(300):

@@ -74,7 +74,7 @@ def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
     if kind == "direct":
         return [BodyAcceleration(ALONG, pulse)]
     if kind == "large_mass":
-        return [LargeMass.build(MPI.COMM_SELF, body, low, (ALONG, pulse))]
+        return [LargeMass.build(MPI.COMM_SELF, body, low, BodyAcceleration(ALONG, pulse))]
     if kind == "pressure":
         nodes, areas = outward_areas(mesh, "high")
         return [NodalForces.build(body, nodes, -areas, smooth_pulse(1e6, 0.6 * duration))]

@@ -53,7 +53,7 @@ def test_rigid_package_on_joints_has_the_height_of_one_joint(tmp_path, count):
     structure = Bow(SQUARE[:count], rigid_modes(SQUARE[:count], ("z",), count * load))
     fine = SOLDER.model_copy(update={"numerics": SolderNumerics(spacing=5e-5, time_step_limit=100)})
     reflow = coupled(tmp_path, structure, solder=fine)
-    assert len(reflow.joints.left) == 1
+    assert len(reflow.joints.groups) == 1
     assert reflow.places["J0"].gap == pytest.approx(exact_height(load), rel=5e-3)
     assert reflow.seen[-1].residual <= 1e-3
     assert reflow.state.wrenches[:, 1, 2].sum() == pytest.approx(count * load, abs=1e-3 * count * PULL)

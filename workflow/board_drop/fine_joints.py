@@ -42,7 +42,7 @@ class CoarseJoints(Effect["DropScene"]):
     name = "coarse_joints"
     adds = "eight hexahedra per joint instead of the fine mesh"
     influence = "0.1 % of the fine joints' stress (cases/bga_drop, measured)"
-    place = "reflowshock.workflow.board_drop.fine_joints.FineJoints"
+    implementation = "reflowshock.workflow.board_drop.fine_joints.FineJoints"
     switch = "shock.coupling.fine_joints = all, critical, names"
     source = "cases/bga_drop/README.md"
     toggle = Toggle(FINE, "critical", "all")

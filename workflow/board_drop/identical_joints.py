@@ -33,7 +33,7 @@ class IdenticalJoints(Effect["DropScene"]):
     name = "identical_joints"
     adds = "a second shock with identical joints"
     influence = "none on the result: a comparison"
-    place = "reflowshock.workflow.board_drop.identical_joints.identical_sphere"
+    implementation = "reflowshock.workflow.board_drop.identical_joints.identical_sphere"
     switch = "shock.identical_joints = true, false"
     source = "truncated spheres"
     toggle = Toggle(KEY, True, False)

@@ -26,6 +26,8 @@ def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
     """Return the effects of a run with their predicted influence, where there is a prediction."""
     predicted = shock_effects(case)
-    by_name = {name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects}
+    by_name: dict[str, Any] = {
+        name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects
+    }
     influence = {name: {"influence": item["influence"]} for name, item in by_name.items() if "influence" in item}
     return {name: record | influence.get(name, {}) for name, record in effects.items()}

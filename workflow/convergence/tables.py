@@ -85,9 +85,13 @@ def short(quantity: str) -> str:
 
 
 def usual_reference(accuracy: Accuracy) -> str:
-    """Return the reference of most total errors."""
-    against = Counter(m.errors[accuracy.judged].against for m in compared(accuracy))
-    return against.most_common(1)[0][0] if against else ""
+    """Return the most frequent reference of the total errors of an accuracy study, as text.
+
+    Args:
+        accuracy: Accuracy study; without a measured error the result is empty.
+    """
+    references = Counter(m.errors[accuracy.judged].against for m in compared(accuracy))
+    return references.most_common(1)[0][0] if references else ""
 
 
 def _remark(measurement: Measurement, accuracy: Accuracy, usual: str) -> str:

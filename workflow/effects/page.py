@@ -13,7 +13,13 @@ from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, measured
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.process.terminal import new_table, styled
 
-FIELDS = (("adds", "adds"), ("number", "number"), ("influence", "influence"), ("switch", "key"), ("place", "object"))
+FIELDS = (
+    ("adds", "adds"),
+    ("number", "number"),
+    ("influence", "influence"),
+    ("switch", "key"),
+    ("implementation", "object"),
+)
 
 
 def show_registry(console: Console) -> None:

@@ -1,6 +1,6 @@
-"""Entry point of the ranks that reflow joints: `mpirun -n N python -m workflow.reflow FOLDER WORK`, see `ranks.py`.
+"""Entry point of the ranks that reflow joints, see ``ranks.py``: ``mpirun -n N python -m workflow.reflow FOLDER WORK``.
 
-Exit code 1 when a joint fails, upon which mpirun ends all.
+The exit code is 1 if a joint fails; mpirun then ends all ranks.
 """
 
 import os
@@ -9,11 +9,12 @@ from pathlib import Path
 
 from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
-from reflowshock.workflow.reflow.rank import find, main
+from reflowshock.workflow.reflow.rank import function_of, main
 
 if __name__ == "__main__":
-    own = without_mpi_job(os.environ)  # PETSc's MPI is to be each rank's own: else it would wait for those without work
+    # Each rank initialises MPI alone, because PETSc would otherwise wait for ranks without work.
+    environment = without_mpi_job(os.environ)
     os.environ.clear()
-    os.environ.update(own | {"NUMBA_NUM_THREADS": "1"})
+    os.environ.update(environment | {"NUMBA_NUM_THREADS": "1"})
     choose_kernel_folder()
-    sys.exit(main(Path(sys.argv[1]), find(sys.argv[2])))
+    sys.exit(main(Path(sys.argv[1]), function_of(sys.argv[2])))

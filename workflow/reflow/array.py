@@ -1,4 +1,4 @@
-"""The joints of an array in exchanges with a structure: those that are alike once, each kept in a file of its own."""
+"""Joints of an array in exchanges with a structure: each distinct joint is computed once and saved in its own file."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.workflow.reflow.joints import Alike, distinct_joints
+from reflowshock.workflow.reflow.joints import JointGroup, distinct_joints
 from reflowshock.workflow.reflow.pool import JointPool, Shares
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class CarriedGroup:
     """Group of equal joints after an exchange, with its present file and the file of its first reflow."""
 
-    group: Alike
+    group: JointGroup
     now: Source
     first: Source
 
@@ -56,7 +56,7 @@ class CarriedReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return what jobs and results consist of."""
+    """Return the types that jobs and results may contain."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot
@@ -65,45 +65,45 @@ def records() -> tuple[type, ...]:
 
 
 class JointArray:
-    """Joints of an array (`coupling.Joints`); equal joints stay one group while their geometries are equal.
+    """Joints of an array (``coupling.Joints``); equal joints stay one group while their geometries are equal.
 
     Attributes:
-        left: Groups after the last exchange; a restarted run sets it to the stored groups.
+        groups: Groups after the last exchange; a restarted run sets it to the stored groups.
     """
 
     def __init__(self, solder: Solder, files: Path, pool: JointPool, progress: Callable[[Shares], None]) -> None:
         """Start without joints.
 
         Args:
-            solder: of one joint.
-            files: folder of the joints' files.
-            pool: what computes.
-            progress: called with name -> fraction done, of the first joint of those that are alike.
+            solder: Solder of one joint.
+            files: Folder of the joints' files.
+            pool: Processes or ranks that compute the joints.
+            progress: Function that is called with the fraction done by the name of the first joint of a group.
         """
         self._solder, self._files, self._pool, self._progress = solder, files, pool, progress
-        self.left: list[Left] = []
+        self.groups: list[CarriedGroup] = []
 
     def exchange(self, number: int, places: "Mapping[str, JointGeometry]") -> dict[str, Floats]:
-        """Bring all joints to rest in their places; see `coupling.Joints`."""
-        jobs, left = {}, []
-        for before, group in self._parted(places):
+        """Bring all joints to rest between displaced pads; see ``coupling.Joints``."""
+        jobs, groups = {}, []
+        for before, group in self._split(places):
             now = Source(group.name, number, group.geometry)
             jobs[group.name] = CarriedReflow(self._files, self._solder, before.now if before else None, now)
-            left.append(Left(group, now, before.first if before else now))
-        found: dict[str, Carried] = self._pool.run(carry, jobs, self._progress)
-        self.left = left
+            groups.append(CarriedGroup(group, now, before.first if before else now))
+        results: dict[str, Carried] = self._pool.run(carry, jobs, self._progress)
+        self.groups = groups
         self._tidy(number)
         return {
-            name: lies.wrenches(found[one.group.name].wrenches)
-            for one in left
-            for name, lies in one.group.members.items()
+            name: orientation.wrenches(results[carried.group.name].wrenches)
+            for carried in groups
+            for name, orientation in carried.group.members.items()
         }
 
-    def _parted(self, places: "Mapping[str, JointGeometry]") -> "Iterator[tuple[Left | None, Alike]]":
-        """Yield all joints that are alike, and where they were left: groups part, but never join."""
-        if not self.left:
+    def _split(self, places: "Mapping[str, JointGeometry]") -> "Iterator[tuple[CarriedGroup | None, JointGroup]]":
+        """Yield the present groups, each with its group of the last exchange; groups split, but never merge."""
+        if not self.groups:
             yield from ((None, group) for group in distinct_joints(places))
-        for before in self.left:
+        for before in self.groups:
             for group in distinct_joints({name: places[name] for name in before.group.members}):
                 yield before, group
 
@@ -114,13 +114,16 @@ class JointArray:
                 path.unlink()
 
     def shapes(self) -> "dict[str, JointShape]":
-        """Return the shapes in their last places and canonical orientation, by the first of the joints alike."""
-        jobs = {one.group.name: CarriedReflow(self._files, self._solder, one.first, one.now) for one in self.left}
+        """Return the final shapes in canonical orientation, by the name of the first joint of a group."""
+        jobs = {
+            carried.group.name: CarriedReflow(self._files, self._solder, carried.first, carried.now)
+            for carried in self.groups
+        }
         return self._pool.run(finish, jobs, self._progress)
 
 
 def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
-    """Carry one joint on, in a process of the pool."""
+    """Carry a joint to its next position; this function runs in a process of the pool."""
     from reflowshock.particles.scenes.carried_joint import carry_joint
 
     before = None if job.before is None else job.checkpoint(job.before)
@@ -128,7 +131,7 @@ def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
 
 
 def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShape":
-    """Return the shape of one joint, in a process of the pool, starting from its first reflow."""
+    """Return the shape of a joint with its history since the first reflow; runs in a process of the pool."""
     from reflowshock.particles.scenes.carried_joint import carried_shape
 
     assert job.before is not None

@@ -40,14 +40,17 @@ def thermal_effects(case: "PackageCase", thermal: Thermal, temperatures: Sequenc
 def open_structure(
     case: "PackageCase", thermal: Thermal, mesh: Path, pads: "list[PadSite]", flexible: bool
 ) -> "AbstractContextManager[HeatedStructure]":
-    """Return board and package as a structure, in a process of its own where it bends; a context that ends it.
+    """Return board and package as a structure: finite elements in a separate process, or rigid plates.
 
     Args:
-        case: the case.
-        thermal: its course of temperatures.
-        mesh: board and package, flat.
-        pads: between them.
-        flexible: whether they bend.
+        case: Case of a package.
+        thermal: Temperatures of the case.
+        mesh: File with the flat mesh of board and package.
+        pads: Pad table.
+        flexible: Whether board and package bend.
+
+    Returns:
+        Context that yields the structure and ends its process.
     """
     from reflowshock.fem.statics.pads import Pads
     from reflowshock.fem.statics.plates import RigidPlates
@@ -63,7 +66,13 @@ def open_structure(
 
 
 def frozen_displacement(case: "PackageCase", structure: "HeatedStructure", displacement: np.ndarray) -> np.ndarray:
-    """Return the displacement `(n, 3)` with the lift of a prescribed warpage: rigid plates have it from the start."""
+    """Return a displacement plus the lift of a prescribed warpage, which rigid plates have from the start.
+
+    Args:
+        case: Case of a package.
+        structure: Board and package.
+        displacement: Displacement of the nodes, shape (n, 3) [m].
+    """
     from reflowshock.meshing.board.pads import lift
 
     raised = displacement.copy()

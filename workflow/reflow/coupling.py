@@ -24,26 +24,29 @@ if TYPE_CHECKING:
     from reflowshock.fem.statics.state import HeatedState, HeatedStructure, RigidModes
     from reflowshock.particles.core.geometry import JointGeometry
 
-LONGEST_MOTION = 0.1  # of the smallest gap, in one exchange
-SAMPLES = 41  # heights at which a package that floats is tried
+LONGEST_MOTION = 0.1  # largest motion in one exchange, as a share of the smallest gap
+SAMPLES = 41  # heights among which the equilibrium of a floating package is bracketed
 MOST_EXCHANGES = 40
 
 Floats = NDArray[np.float64]
 
 
 class NotInBalance(RuntimeError):
-    """The exchanges of a load step did not reach the tolerance."""
+    """Error for a load step whose exchanges do not reach the tolerance."""
 
 
 class Joints(Protocol):
-    """The joints of an array, wherever they are computed."""
+    """Interface of the joints of an array in the coupling."""
 
     def exchange(self, number: int, places: "Mapping[str, JointGeometry]") -> Mapping[str, Floats]:
-        """Bring all joints to rest in their places; return the wrenches `(2, 6)` of each on its pads, in its frame.
+        """Bring all joints to rest between displaced pads.
 
         Args:
-            number: of the exchange, from 0 on without a gap; the last one may be asked for again.
-            places: joint name -> geometry.
+            number: Number of the exchange, counted from 0; the last exchange may be repeated.
+            places: Present geometry by joint name.
+
+        Returns:
+            Wrenches of each joint on its two pads, in the frame of the joint, shape (2, 6) [N, N m].
         """
 
 
@@ -64,12 +67,12 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """What one exchange left.
+    """Residuals of an exchange, relative to the pull of surface tension.
 
     Attributes:
-        load_step: number of the load step.
-        force_residual: largest change of a wrench on the structure; 0 where wrenches do not bend it.
-        rigid_residual: largest imbalance of a package that floats; 0 where it does not.
+        load_step: Number of the load step, counted from 0.
+        force_residual: Largest change of a wrench on the structure; 0 in one-way coupling.
+        rigid_residual: Largest imbalance of a floating package; 0 if the package does not float.
     """
 
     load_step: int
@@ -78,23 +81,23 @@ class Exchange:
 
     @property
     def residual(self) -> float:
-        """The larger one."""
+        """Larger of both residuals."""
         return max(self.force_residual, self.rigid_residual)
 
 
 @dataclass(slots=True)
 class Coupled:
-    """Where the coupling is: all that a run needs to continue.
+    """State of the coupling, from which a run can continue.
 
     Attributes:
-        wrenches: `(joints, 2, 6)` [N, N m] of the last exchange, in space.
-        rigid: `(k,)` [m, rad] of the structure's last state.
-        balance: search for the rigid motions.
-        load_step: number of the load step.
-        state: of the structure, in the exchange that is going on or was the last one.
-        pending: whether the joints have not answered to this state yet.
-        exchanges: all that are done.
-        pad_motion: `(joints, 2, 6)` of each load step that is in balance.
+        wrenches: Wrenches of the joints on their pads in the last exchange, in space, shape (joints, 2, 6) [N, N m].
+        rigid: Rigid motions of the package, shape (k,) [m, rad].
+        balance: Quasi-Newton iteration for the rigid motions.
+        load_step: Number of the load step, counted from 0.
+        state: State of the structure in the present or last exchange; None before the first.
+        pending: Whether the joints have not been computed for this state yet.
+        exchanges: Completed exchanges.
+        pad_motion: Motion of the pads in each completed load step, shape (joints, 2, 6) [m, rad].
     """
 
     wrenches: Floats
@@ -109,16 +112,16 @@ class Coupled:
 
 @dataclass(frozen=True, slots=True)
 class Coupling:
-    """Solder and structure through all load steps.
+    """Staggered coupling of solder and structure over all load steps.
 
     Attributes:
-        structure: board and package.
-        joints: of the array.
-        drawn: joint name -> geometry as drawn, in the order of the structure's pads.
-        scale: what is small.
-        bends: whether the solder's wrenches bend the structure.
-        save: called with the state before the joints are asked, and in the end.
-        tell: called with each exchange that is done.
+        structure: Board and package.
+        joints: Joints of the array.
+        drawn: Geometry as drawn by joint name, in the order of the structure's pads.
+        scale: Scales and tolerance of the residuals.
+        bends: Whether the solder's wrenches bend the structure (two-way coupling).
+        save: Function that saves the state, called before the joints are computed and at the end.
+        report: Function that is called with each completed exchange.
     """
 
     structure: "HeatedStructure"
@@ -127,17 +130,20 @@ class Coupling:
     scale: Scale
     bends: bool
     save: Callable[[Coupled], None]
-    tell: Callable[[Exchange], None]
+    report: Callable[[Exchange], None]
 
     def run(self, coupled: Coupled, steps: Sequence[LoadStep]) -> Coupled:
-        """Take all load steps that are left.
+        """Compute the remaining load steps.
 
         Args:
-            coupled: where to begin or to continue; changed in place.
-            steps: the load steps.
+            coupled: Initial state, or the state of an interrupted run; changed in place.
+            steps: All load steps.
+
+        Returns:
+            The state after the last load step.
 
         Raises:
-            NotInBalance: names load step, temperature and residuals.
+            NotInBalance: A load step does not converge; the message gives its temperature and residuals.
         """
         while coupled.load_step < len(steps):
             self._balance(coupled, steps[coupled.load_step])
@@ -149,6 +155,7 @@ class Coupling:
         return coupled
 
     def _balance(self, coupled: Coupled, step: LoadStep) -> None:
+        """Repeat exchanges until a load step is in balance."""
         while True:
             if not coupled.pending:
                 bending = coupled.wrenches if self.bends else np.zeros_like(coupled.wrenches)
@@ -156,13 +163,13 @@ class Coupling:
                 coupled.pending = True
                 self.save(coupled)
             exchange = self._exchange(coupled)
-            self.tell(exchange)
+            self.report(exchange)
             if exchange.residual <= self.scale.tolerance:
                 return
-            done = [past for past in coupled.exchanges if past.load_step == coupled.load_step]
-            if len(done) >= MOST_EXCHANGES:
+            count = sum(completed.load_step == coupled.load_step for completed in coupled.exchanges)
+            if count >= MOST_EXCHANGES:
                 raise NotInBalance(
-                    f"load step {coupled.load_step + 1} at {step.temperature:.1f} K: after {len(done)} exchanges "
+                    f"load step {coupled.load_step + 1} at {step.temperature:.1f} K: after {count} exchanges "
                     f"forces still change by {exchange.force_residual:.2e} and the package is out of balance by "
                     f"{exchange.rigid_residual:.2e} of the pull of surface tension, allowed {self.scale.tolerance:g}"
                 )
@@ -170,43 +177,43 @@ class Coupling:
     def _exchange(self, coupled: Coupled) -> Exchange:
         """Compute the joints' wrenches, record the residuals, and choose the next trial."""
         assert coupled.state is not None
-        answer = self._answer(coupled.state.pad_motion, len(coupled.exchanges))
-        change = np.abs(answer - coupled.wrenches) / self.scale.pull
+        wrenches = self._wrenches(coupled.state.pad_motion, len(coupled.exchanges))
+        change = np.abs(wrenches - coupled.wrenches) / self.scale.pull
         modes = self.structure.rigid_modes
-        imbalance = modes.imbalance(answer)
+        imbalance = modes.imbalance(wrenches)
         exchange = Exchange(
             coupled.load_step,
             float(change.max()) if self.bends else 0.0,
             float((np.abs(imbalance) / self.scale.rigid).max(initial=0.0)),
         )
         coupled.exchanges.append(exchange)
-        coupled.wrenches, coupled.pending = answer, False
+        coupled.wrenches, coupled.pending = wrenches, False
         if exchange.rigid_residual > self.scale.tolerance:
             coupled.rigid = coupled.balance.next(coupled.rigid, imbalance)
         return exchange
 
-    def _answer(self, pad_motion: Floats, number: int) -> Floats:
-        """Wrenches `(joints, 2, 6)` in space of the joints between pads that have moved."""
+    def _wrenches(self, pad_motion: Floats, number: int) -> Floats:
+        """Return the wrenches of the joints on displaced pads, in space, shape (joints, 2, 6) [N, N m]."""
         from scipy.spatial.transform import Rotation
 
-        found = self.joints.exchange(number, placed(self.drawn, pad_motion))
-        local = np.array([found[name] for name in self.drawn]).reshape(-1, 2, 2, 3)
+        by_joint = self.joints.exchange(number, placed(self.drawn, pad_motion))
+        local = np.array([by_joint[name] for name in self.drawn]).reshape(-1, 2, 2, 3)
         turns = Rotation.from_rotvec(pad_motion[:, 0, 3:]).as_matrix()
         return np.einsum("jik,jswk->jswi", turns, local).reshape(-1, 2, 6)
 
 
 def placed(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[str, JointGeometry]":
-    """Return each joint between pads that have moved, seen from its board's pad.
+    """Return the geometry of each joint between displaced pads, in the frame of its pad on the board.
 
     Args:
-        drawn: joint name -> geometry as drawn.
-        pad_motion: `(joints, 2, 6)` [m, rad].
+        drawn: Geometry as drawn by joint name.
+        pad_motion: Motion of both pads of each joint, shape (joints, 2, 6) [m, rad].
     """
     from reflowshock.particles.core.plate import joint_plates, placed_geometry
 
     return {
         name: placed_geometry(
-            geometry, [plate.moved(own) for plate, own in zip(joint_plates(geometry), motion, strict=True)]
+            geometry, [plate.moved(pad) for plate, pad in zip(joint_plates(geometry), motion, strict=True)]
         )
         for (name, geometry), motion in zip(drawn.items(), pad_motion, strict=True)
     }
@@ -217,9 +224,9 @@ def scale_of(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "Rigi
     radii = np.array([(geometry.radius_board, geometry.radius_package) for geometry in geometries])
     force = np.pi * radii * solder.surface_tension
     pull = np.repeat(np.stack((force, force * radii), axis=-1), 3, axis=-1)
-    way = np.linalg.norm(modes.pad_motion[:, :, 1, :3], axis=-1)
+    shift = np.linalg.norm(modes.pad_motion[:, :, 1, :3], axis=-1)
     turn = np.linalg.norm(modes.pad_motion[:, :, 1, 3:], axis=-1) * radii[:, 1]
-    return Scale(pull, (np.maximum(way, turn) * force[:, 1]).sum(axis=1), tolerance)
+    return Scale(pull, (np.maximum(shift, turn) * force[:, 1]).sum(axis=1), tolerance)
 
 
 def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidModes") -> Coupled:
@@ -257,9 +264,9 @@ def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> f
         return axial_force(geometry, solder, gap) - load
 
     gaps = geometry.gap * np.linspace(0.4, 1.6, SAMPLES)
-    left = np.array([excess(gap) for gap in gaps])
-    found = np.flatnonzero((left[:-1] > 0.0) & (left[1:] <= 0.0))
-    if not len(found):
+    forces = np.array([excess(gap) for gap in gaps])
+    crossings = np.flatnonzero((forces[:-1] > 0.0) & (forces[1:] <= 0.0))
+    if not len(crossings):
         return geometry.gap
-    first = found[np.argmin(np.abs(gaps[found] - geometry.gap))]
+    first = crossings[np.argmin(np.abs(gaps[crossings] - geometry.gap))]
     return float(brentq(excess, gaps[first], gaps[first + 1], rtol=1e-6))

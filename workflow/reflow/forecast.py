@@ -71,20 +71,20 @@ def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
 def problems(
     solder: Solder, geometries: "Mapping[str, JointGeometry]", thermal: Thermal, pitch: float
 ) -> Iterator[Problem]:
-    """Find what load steps cannot take: flow that matters, since each is the solder at rest, and no room for it.
+    """Yield problems of load steps, which compute the solder at rest: relevant inertia or viscosity, and lack of space.
 
     Args:
-        solder: the solder.
-        geometries: joint name to geometry as drawn.
-        thermal: the course of temperatures.
-        pitch: distance of neighbouring joints [m].
+        solder: Solder of one joint.
+        geometries: Geometry as drawn by joint name.
+        thermal: Temperatures, and motion of the package.
+        pitch: Distance of neighbouring joints [m].
     """
     yield from _no_time(solder, geometries)
     yield from _no_room(solder, min(geometry.gap for geometry in geometries.values()), thermal, pitch)
 
 
 def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iterator[Problem]:
-    """Find a package that is moved so far down that the solder has no room between the plates, pitch by pitch."""
+    """Yield the problem of a package that is lowered until the solder of a joint would fill its cell of the array."""
     lowest = thermal.lowest_corner
     needed = solder.volume / pitch**2
     if thermal.corner_displacement is None or lowest >= 0.0 or gap + lowest > needed:
@@ -96,7 +96,7 @@ def _no_room(solder: Solder, gap: float, thermal: Thermal, pitch: float) -> Iter
 
 
 def _no_time(solder: Solder, geometries: "Mapping[str, JointGeometry]") -> Iterator[Problem]:
-    """Find a motion that matters where load steps have no time; by the scheme ispg it may be asked for all the same."""
+    """Yield problems of inertia and viscosity that matter or, except with the scheme ispg, are switched on."""
     from reflowshock.particles.parameters.effects import AT_REST, decide_effects
 
     if solder.numerics.scheme == "ispg":

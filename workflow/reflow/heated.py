@@ -1,4 +1,4 @@
-"""Reflow of an array coupled with board and package that warm up, float or are moved."""
+"""Reflow of an array coupled with board and package, which are heated, float or are moved."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from reflowshock.fem.problem.thermal import KELVIN, Thermal
 from reflowshock.workflow.case.run import Run, at_most, metric
 from reflowshock.workflow.package.case import PackageCase, joint_geometries
 from reflowshock.workflow.process.terminal import ProgressBar, progress_bar
-from reflowshock.workflow.reflow.array import JointArray, Left, Source
+from reflowshock.workflow.reflow.array import CarriedGroup, JointArray, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
 from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed, scale_of, start
 from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
-from reflowshock.workflow.reflow.joints import Alike
+from reflowshock.workflow.reflow.joints import JointGroup
 from reflowshock.workflow.reflow.pool import Shares
 from reflowshock.workflow.reflow.processes import open_pool
 from reflowshock.workflow.reflow.rigid_balance import RigidBalance
@@ -39,15 +39,15 @@ class Heated:
         shapes: Shape by name of the first joint of a group.
         coupled: Final state of the coupling.
         steps: Load steps.
-        structure: Arrays of board and package by name in `structure.npz`.
+        structure: Arrays of ``structure.npz`` by name.
         effects: Decisions on temperature and plates.
-        metrics: Metrics of the coupling, as in `summary.json`.
-        health: Health checks of the coupling, as in `summary.json`.
-        continued: Description of the exchange from which a run continued.
+        metrics: Metrics of the coupling, as in ``summary.json``.
+        health: Health checks of the coupling, as in ``summary.json``.
+        continued: Description of the exchange from which a run continued; empty for a run from the start.
     """
 
     geometries: "dict[str, JointGeometry]"
-    groups: "list[Alike]"
+    groups: "list[JointGroup]"
     shapes: "dict[str, JointShape]"
     coupled: Coupled
     steps: list[LoadStep]
@@ -59,17 +59,17 @@ class Heated:
 
 
 def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]", mesh: Path) -> Heated:
-    """Take the solder through all load steps.
+    """Compute solder and structure in all load steps.
 
     Args:
-        run: the run, with the products of the geometry.
-        thermal: course of temperatures.
-        pads: as drawn, with a prescribed warpage where the plates are rigid.
-        mesh: of board and package, flat.
+        run: Run with the products of the stage geometry.
+        thermal: Temperatures, and motion of the package.
+        pads: Pad table as drawn, with the prescribed warpage.
+        mesh: File with the flat mesh of board and package.
 
     Raises:
-        NotInBalance: a load step did not come into balance.
-        ReflowError: the reflow of a joint failed; it is named.
+        NotInBalance: A load step does not converge.
+        ReflowError: A joint failed; the message gives its name.
     """
     case, drawn, steps = run.case, joint_geometries(pads), load_steps(thermal)
     effects = thermal_effects(case, thermal, [step.temperature for step in steps])
@@ -79,19 +79,19 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         open_pool(run, len(pads)) as pool,
         progress_bar(f"reflow of {len(pads)} joints in {len(steps)} load steps") as bar,
     ):
-        telling = Telling(bar, steps)
-        joints = JointArray(case.solder, run.checkpoints("reflow"), pool, telling.joints)
+        display = CouplingProgress(bar, steps)
+        joints = JointArray(case.solder, run.checkpoints("reflow"), pool, display.joints)
         scale = scale_of(list(drawn.values()), case.solder, structure.rigid_modes, thermal.tolerance)
-        saved = Saved(run.checkpoints("reflow"), all_inputs(case, pads))
+        saved = CouplingFile(run.checkpoints("reflow"), all_inputs(case, pads))
         coupled = saved.read(joints) or _start(structure, drawn, case, steps[0])
-        begun = len(coupled.exchanges)
-        coupling = Coupling(structure, joints, drawn, scale, bends, saved.writer(joints), telling.exchange)
+        completed = len(coupled.exchanges)
+        coupling = Coupling(structure, joints, drawn, scale, bends, saved.writer(joints), display.exchange)
         coupling.run(coupled, steps)
         metrics, health = _judge(coupling, coupled, steps, thermal)
         assert coupled.state is not None
         return Heated(
             geometries=placed(drawn, coupled.state.pad_motion),
-            groups=[one.group for one in joints.left],
+            groups=[carried.group for carried in joints.groups],
             shapes=joints.shapes(),
             coupled=coupled,
             steps=steps,
@@ -102,23 +102,23 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
                 "package": structure.package,
             },
             effects=dict(effects),
-            metrics=metrics | {"distinct_joints_computed": metric(len(joints.left))},
+            metrics=metrics | {"distinct_joints_computed": metric(len(joints.groups))},
             health=health,
-            continued=f"exchange {begun + 1}" if begun else "",
+            continued=f"exchange {completed + 1}" if completed else "",
         )
 
 
 def _start(
     structure: "HeatedStructure", drawn: "dict[str, JointGeometry]", case: PackageCase, first: LoadStep
 ) -> Coupled:
-    """Begin with pads where the structure has them without solder."""
+    """Return the initial state, with the pads where the structure has them without solder."""
     modes = structure.rigid_modes
-    alone = structure.solve(first.temperature, first.corner, *_nothing(structure))
+    alone = structure.solve(first.temperature, first.corner, *_no_loads(structure))
     return start(list(placed(drawn, alone.pad_motion).values()), case.solder, modes)
 
 
-def _nothing(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
-    """No wrenches, no rigid motions."""
+def _no_loads(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
+    """Return zero wrenches, shape (joints, 2, 6), and zero rigid motions, shape (k,)."""
     motion = structure.rigid_modes.pad_motion
     return np.zeros(motion.shape[1:]), np.zeros(len(motion))
 
@@ -136,65 +136,73 @@ def _records() -> tuple[type, ...]:
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.orientation import Orientation
 
-    return Coupled, RigidBalance, HeatedState, Exchange, Left, Source, Alike, JointGeometry, Orientation
+    return Coupled, RigidBalance, HeatedState, Exchange, CarriedGroup, Source, JointGroup, JointGeometry, Orientation
 
 
-class Saved:
-    """The file of the coupling: a run that continues takes up the exchange that was going on."""
+class CouplingFile:
+    """File with the state of the coupling, from which a run continues the interrupted exchange."""
 
     def __init__(self, folder: Path, inputs: tuple) -> None:
-        """Name the file and all that it depends on."""
+        """Name the file.
+
+        Args:
+            folder: Folder of the checkpoints.
+            inputs: All inputs of the state, see ``all_inputs``; a file of other inputs is ignored.
+        """
         from reflowshock.particles.core.checkpoint import Checkpoint
 
         self._file = Checkpoint(folder / "coupling", inputs)
 
     def read(self, joints: JointArray) -> Coupled | None:
-        """Return where the coupling was, and set the joints to that; None where nothing was saved."""
-        known = self._file.read(_records())
-        if known is None:
+        """Return the saved state and set the groups of the joints; return None without a saved state."""
+        saved = self._file.read(_records())
+        if saved is None:
             return None
-        joints.left = known["left"]
-        return known["coupled"]
+        joints.groups = saved["groups"]
+        return saved["coupled"]
 
     def writer(self, joints: JointArray) -> Callable[[Coupled], None]:
-        """Return what saves where coupling and joints are."""
-        return lambda coupled: self._file.write({"coupled": coupled, "left": joints.left})
+        """Return a function that saves the state of the coupling and the groups of the joints."""
+        return lambda coupled: self._file.write({"coupled": coupled, "groups": joints.groups})
 
 
-class Telling:
+class CouplingProgress:
     """Progress on the terminal: load step, temperature, exchange, residual, and joints in progress."""
 
     def __init__(self, bar: ProgressBar, steps: list[LoadStep]) -> None:
         """Start at the first load step."""
-        self._bar, self._steps, self._done, self._number = bar, steps, 0, 0
+        self._bar, self._steps, self._completed, self._number = bar, steps, 0, 0
         self._residual = ""
 
     def joints(self, shares: Shares) -> None:
         """Show the progress of the joints of an exchange."""
-        step = self._steps[min(self._done, len(self._steps) - 1)]
+        step = self._steps[min(self._completed, len(self._steps) - 1)]
         finished = sum(share >= 1.0 for share in shares.values())
         busy = [f"{name} {share:.0%}" for name, share in shares.items() if 0.0 < share < 1.0]
         self._bar(
-            self._done / len(self._steps),
-            f"load step {self._done + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} °C, "
+            self._completed / len(self._steps),
+            f"load step {self._completed + 1} of {len(self._steps)}, {step.temperature - KELVIN:.0f} °C, "
             f"exchange {self._number + 1}{self._residual}: {finished} of {len(shares)} joints {' '.join(busy)}",
         )
 
     def exchange(self, exchange: Exchange) -> None:
         """Record the residual of an exchange."""
-        if exchange.load_step != self._done:
-            self._done, self._number = exchange.load_step, 0
+        if exchange.load_step != self._completed:
+            self._completed, self._number = exchange.load_step, 0
         self._number += 1
         self._residual = f", residual {exchange.residual:.1e}"
 
 
 def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal: Thermal) -> tuple[dict, dict]:
-    """Metrics: residuals of all load steps, standoffs with and without the solder's forces; one way, no check."""
+    """Return metrics, and the health check of the residual unless nothing was iterated.
+
+    The metrics are the residuals of all load steps, and the standoffs with and without the forces of the solder.
+    """
     assert coupled.state is not None
     structure, drawn = coupling.structure, coupling.drawn
     last = final_exchanges(coupled)
     residual = max(exchange.residual for exchange in last)
-    without, _ = _nothing(structure)
+    without, _ = _no_loads(structure)
     alone = structure.solve(steps[-1].temperature, steps[-1].corner, without, coupled.rigid)
     spreads = [
         float(np.ptp([joint.gap for joint in placed(drawn, state.pad_motion).values()]))
@@ -220,7 +228,7 @@ def final_exchanges(coupled: Coupled) -> list[Exchange]:
 
 
 def _structure(coupled: Coupled, steps: list[LoadStep], names: list[str]) -> dict[str, np.ndarray]:
-    """Collect what `structure.npz` holds of the load steps."""
+    """Return the arrays of the load steps for ``structure.npz``."""
     last = final_exchanges(coupled)
     counts = np.bincount([exchange.load_step for exchange in coupled.exchanges], minlength=len(steps))
     return {

@@ -1,4 +1,4 @@
-"""Reflow of many joints: those that are alike once, several at a time."""
+"""Reflow of many joints: each distinct geometry is computed once, several at a time."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-ALIKE = 1e-9  # of joints that count as equal: differences of gap, radii, offset, and tilt times radius [m]
+SAME = 1e-9  # [m] largest difference of gap, radii, offset, and tilt times radius between equal joints
 
 
 @dataclass(frozen=True, slots=True)
 class JointReflow:
-    """One reflow: geometry, solder, and the file from which it continues if it is there."""
+    """Job of a pool: geometry and solder of a joint, and the checkpoint from which it continues if that exists."""
 
     geometry: "JointGeometry"
     solder: Solder
@@ -31,7 +31,7 @@ class JointReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return what jobs and results consist of."""
+    """Return the types that jobs and results may contain."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
@@ -39,12 +39,12 @@ def records() -> tuple[type, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
-    """Joints that are alike but for how they lie.
+class JointGroup:
+    """Joints of equal geometry, except for their orientation.
 
     Attributes:
-        geometry: of the first of them, in canonical orientation.
-        members: name of each -> how it lies, seen from there.
+        geometry: Geometry in canonical orientation.
+        members: Orientation of each joint relative to this geometry, by joint name.
     """
 
     geometry: "JointGeometry"
@@ -56,39 +56,40 @@ class Alike:
         return next(iter(self.members))
 
 
-def distinct_joints(geometries: "Mapping[str, JointGeometry]") -> list[Alike]:
-    """Group joints that are equal to ALIKE but for a turn about z and a mirror image, in the given order.
+def distinct_joints(geometries: "Mapping[str, JointGeometry]") -> list[JointGroup]:
+    """Group joints whose geometries are equal except for a rotation about z and a reflection.
 
     Args:
-        geometries: joint name -> geometry.
+        geometries: Geometry by joint name; groups and their members keep this order.
     """
     from reflowshock.particles.scenes.orientation import canonical, sizes
 
-    found: list[Alike] = []
+    groups: list[JointGroup] = []
     for name, geometry in geometries.items():
         upright, orientation = canonical(geometry)
         size = sizes(upright)
-        twin = next((group for group in found if abs(sizes(group.geometry) - size).max() < ALIKE), None)
+        twin = next((group for group in groups if abs(sizes(group.geometry) - size).max() < SAME), None)
         if twin is None:
-            found.append(Alike(upright, {name: orientation}))
+            groups.append(JointGroup(upright, {name: orientation}))
         else:
             twin.members[name] = orientation
-    return found
+    return groups
 
 
 def joint_records(
-    groups: Sequence[Alike], geometries: "Mapping[str, JointGeometry]", shapes: "Mapping[str, JointShape]"
+    groups: Sequence[JointGroup], geometries: "Mapping[str, JointGeometry]", shapes: "Mapping[str, JointShape]"
 ) -> dict:
-    """Return per joint its shape, place and metrics.
+    """Return the record of each joint for ``joints.json``.
 
     Args:
-        groups: joints that are alike.
-        geometries: joint name -> geometry.
-        shapes: name of the first of each group -> shape in canonical orientation.
+        groups: Groups of equal joints.
+        geometries: Geometry by joint name.
+        shapes: Shape in canonical orientation, by the name of the first joint of a group.
 
     Returns:
-        Joint name -> ``shape``, ``turn`` [rad] and ``mirror`` (how it lies seen from that shape: mirrored first, y to
-        -y, then turned about z), ``place`` of the package's pad over the board's, ``verdict``, ``metrics``.
+        Record by joint name, in the order of the geometries: ``shape``, the name of the first joint of its group;
+        ``mirror`` and ``turn`` [rad], a reflection of y followed by a rotation about z, which give the joint from that
+        shape; ``place``, the position of the package's pad relative to the board's; ``verdict`` and ``metrics``.
     """
     from reflowshock.particles.scenes.products import untimed
 
@@ -110,37 +111,40 @@ def joint_records(
 
 
 def mark_bridges(records: dict[str, dict], pads: "Sequence[PadSite]", mirrored: bool) -> "list[Contact]":
-    """Give joints that touch others the verdict "bridged" and the names of those others.
+    """Set the verdict of touching joints to "bridged", and list the joints that each touches.
 
     Args:
-        records: what `joint_records` returned; changed in place.
-        pads: the pad table.
-        mirrored: whether the array goes on beyond the planes of symmetry x = 0 and y = 0.
+        records: Records from ``joint_records``, changed in place.
+        pads: Pad table.
+        mirrored: Whether the array continues beyond the planes of symmetry x = 0 and y = 0.
 
     Returns:
-        The pairs that touch, the largest overlap first.
+        Pairs of touching joints, the largest overlap first.
     """
     from reflowshock.particles.scenes.bridge import contacts, neighbours
 
-    places = {pad.name: (pad.x, pad.y) for pad in pads}
-    widths = {name: records[name]["metrics"]["max_width"]["value"] for name in places}
-    found = contacts(places, widths, mirrored)
-    for name, others in neighbours(found).items():
-        records[name] |= {"verdict": "bridged", "touches": others}
-    return found
+    positions = {pad.name: (pad.x, pad.y) for pad in pads}
+    widths = {name: records[name]["metrics"]["max_width"]["value"] for name in positions}
+    touching = contacts(positions, widths, mirrored)
+    for name, touched in neighbours(touching).items():
+        records[name] |= {"verdict": "bridged", "touches": touched}
+    return touching
 
 
 def bridge_shapes(
-    found: "Sequence[Contact]", geometries: "Mapping[str, JointGeometry]", solder: Solder
+    touching: "Sequence[Contact]", geometries: "Mapping[str, JointGeometry]", solder: Solder
 ) -> "dict[str, JointShape]":
-    """Flow the two joints that overlap most into one: its shape under both names, "A9+A10"; nothing where none touch.
+    """Compute the common shape of the two joints that overlap most, under both names, such as "A9+A10".
 
-    The bridge is a picture of what happens: its joints are taken as upright and in line, and relax to rest.
+    The shape illustrates the bridge: both joints are assumed upright and in line, and the liquid relaxes to rest.
 
     Args:
-        found: the pairs that touch, the largest overlap first.
-        geometries: joint name -> geometry, of those that were reflowed.
-        solder: of one joint.
+        touching: Pairs of touching joints, the largest overlap first.
+        geometries: Geometry by name of the joints that were reflowed.
+        solder: Solder of one joint.
+
+    Returns:
+        Shape by name; empty if no joints touch or the shape cannot be computed.
     """
     from reflowshock.particles.scenes.bridge import solve_bridge
     from reflowshock.particles.scenes.reflow import solve_joint
@@ -148,15 +152,15 @@ def bridge_shapes(
     from reflowshock.particles.surface.cloud_level_set import CannotRebuild
 
     bridges, relaxing = {}, _relaxing(solder)
-    reflowed = [pair for pair in found if pair.first in geometries and pair.second in geometries]
+    reflowed = [pair for pair in touching if pair.first in geometries and pair.second in geometries]
     for pair in reflowed[:1]:
         ends = [replace(geometries[end], offset=(0.0, 0.0), tilt=(0.0, 0.0)) for end in (pair.first, pair.second)]
         name = f"{pair.first}+{pair.second}"
         try:
             alone = [solve_joint(end, relaxing) for end in ends]
             bridges[name] = solve_bridge(ends, alone, pair.distance, relaxing)
-        except (CannotRebuild, NotAtRest) as error:  # the verdict stands without it
-            logger.warning("%s are bridged, but their common body was not found: %s", name, error)
+        except (CannotRebuild, NotAtRest) as error:  # the shape is not needed for the verdict
+            logger.warning("%s are bridged, but their common shape was not computed: %s", name, error)
     return bridges
 
 
@@ -168,7 +172,12 @@ def _relaxing(solder: Solder) -> Solder:
 
 
 def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[str] = ("bridged", "open")) -> None:
-    """Raise ReflowError where joints are bridged or open: they have no shape of their own between their pads."""
+    """Raise ReflowError if a joint cannot be meshed because of its verdict.
+
+    Args:
+        records: Record by joint name, see ``joint_records``.
+        verdicts: Verdicts of joints that cannot be meshed.
+    """
     for verdict in verdicts:
         names = [name for name, record in records.items() if record["verdict"] == verdict]
         if names:
@@ -182,23 +191,23 @@ def solve_joints(
     progress: Callable[[float], None],
     checkpoints: Path,
 ) -> "tuple[dict[str, JointShape], int]":
-    """Solve the reflow of each geometry; joints that an earlier run finished or began continue from their checkpoints.
+    """Compute the reflow of each geometry, continuing from checkpoints of an earlier run.
 
     Args:
-        geometries: name of a joint -> geometry.
-        solder: volume, fluid and process.
-        pool: what computes.
-        progress: called with the share of the whole that is done, 0 to 1.
-        checkpoints: folder of the checkpoints.
+        geometries: Geometry by joint name.
+        solder: Solder of one joint.
+        pool: Processes or ranks that compute the joints.
+        progress: Function that is called with the fraction done of all joints, 0 to 1.
+        checkpoints: Folder of the checkpoints.
 
     Returns:
-        Name -> shape, in the given order, and the number of joints that continued.
+        Shape by joint name, in the order of the geometries, and the number of joints that continued.
 
     Raises:
-        ReflowError: names the first joint that failed, and how.
+        ReflowError: A joint failed; the message gives its name and error.
     """
     jobs = {name: JointReflow(geometry, solder, checkpoints / name) for name, geometry in geometries.items()}
-    results = pool.run(_solve, jobs, lambda done: progress(sum(done.values()) / len(done)))
+    results = pool.run(_solve, jobs, lambda shares: progress(sum(shares.values()) / len(shares)))
     return {name: shape for name, (shape, _) in results.items()}, sum(continued for _, continued in results.values())
 
 

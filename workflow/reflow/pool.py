@@ -1,4 +1,4 @@
-"""What brings the joints of an array to rest, several at a time: processes of this machine, or MPI ranks anywhere."""
+"""Interface of the pools that reflow several joints at a time: processes of this machine, or MPI ranks."""
 
 from collections.abc import Callable, Mapping
 from types import TracebackType
@@ -11,11 +11,11 @@ Shares = Mapping[str, float]
 
 
 class ReflowError(RuntimeError):
-    """The reflow of a joint failed; the message names the joint."""
+    """Error for a joint whose reflow failed; the message names the joint."""
 
 
 class JointPool(Protocol):
-    """A context whose end leaves nothing running."""
+    """Pool of processes or ranks; leaving its context ends all of them."""
 
     def __enter__(self) -> Self: ...
 
@@ -26,17 +26,17 @@ class JointPool(Protocol):
     def run(
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
     ) -> dict[str, Result]:
-        """Do a piece of work for each joint.
+        """Run the work of each joint.
 
         Args:
-            work: function of a module, called with a job and a function that takes the fraction done; jobs and results
-                are data and the records that the module's function `records` lists.
-            jobs: name of a joint -> job.
-            progress: called with name -> fraction done.
+            work: Function of a module. It takes a job and a function that reports the fraction done, and returns the
+                result. Jobs and results may contain data and the types that the module's function ``records`` lists.
+            jobs: Job by joint name.
+            progress: Function that is called with the fraction done by joint name.
 
         Returns:
-            Name -> result, in the given order.
+            Result by joint name, in the order of the jobs.
 
         Raises:
-            ReflowError: names the first joint that failed, and how.
+            ReflowError: A joint failed; the message gives its name and error.
         """

@@ -1,4 +1,4 @@
-"""Processes that bring joints to rest, several joints at a time; `open_pool` chooses them or MPI ranks."""
+"""Reflow of several joints at a time in processes of this machine; ``open_pool`` chooses processes or MPI ranks."""
 
 import os
 import queue
@@ -14,20 +14,20 @@ from reflowshock.workflow.package.case import PackageCase
 from reflowshock.workflow.reflow.pool import Job, JointPool, ReflowError, Report, Result, Shares
 from reflowshock.workflow.reflow.ranks import Ranks
 
-POLL = 0.2  # seconds between two looks at the progress
+POLL = 0.2  # seconds between two updates of the progress
 
-_progress: Any = None  # the queue of a worker process: a pool has no other place for it
+_progress: Any = None  # queue of a worker process, which a pool can only keep in a global variable
 
 
 class Processes:
-    """Processes of this machine, a `pool.JointPool`; they live as long as it is entered."""
+    """Processes of this machine as a ``pool.JointPool``; they end with its context."""
 
     def __init__(self, cores: int, joints: int) -> None:
-        """Prepare the processes.
+        """Create the pool.
 
         Args:
-            cores: how many processes at most; with fewer joints each has several threads.
-            joints: how many there are to compute at a time.
+            cores: Largest number of processes; with fewer joints each process has several threads.
+            joints: Number of joints of an exchange.
         """
         workers = max(1, min(cores, joints))
         self._reports = SPAWN.Queue()
@@ -39,46 +39,47 @@ class Processes:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Wait for the processes; where something failed, end them."""
+        """Wait for the processes, or end them after an error."""
         self._pool.__exit__(kind, error, trace)
 
     def run(
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
     ) -> dict[str, Result]:
-        """Do a piece of work for each joint; see `pool.JointPool`."""
+        """Run the work of each joint; see ``pool.JointPool.run``."""
         futures = {self._pool.submit(_work, work, name, job): name for name, job in jobs.items()}
         self._wait(futures, progress)
         return {name: future.result() for future, name in futures.items()}
 
     def _wait(self, futures: Mapping[Future, str], progress: Callable[[Shares], None]) -> None:
-        """Wait for all jobs, passing on how far they are; raise as soon as one fails."""
-        done = dict.fromkeys(futures.values(), 0.0)
+        """Wait for all jobs and report their progress; raise as soon as one fails."""
+        shares = dict.fromkeys(futures.values(), 0.0)
         pending: Sequence[Future] | set[Future] = set(futures)
         while pending:
             finished, pending = wait(pending, POLL, FIRST_COMPLETED)
-            self._take_reports(done)
+            self._take_reports(shares)
             for future in finished:
                 error = future.exception()
                 if isinstance(error, BrokenProcessPool):
                     raise ReflowError(f"joint {futures[future]}: its process has ended with {self._pool.ending()}")
                 if error is not None:
                     raise ReflowError(f"joint {futures[future]}: {type(error).__name__}: {error}") from error
-                done[futures[future]] = 1.0
-            progress(done)
+                shares[futures[future]] = 1.0
+            progress(shares)
 
-    def _take_reports(self, done: dict[str, float]) -> None:
+    def _take_reports(self, shares: dict[str, float]) -> None:
+        """Update the fraction done of each joint from the queue."""
         while True:
             try:
                 name, fraction = self._reports.get_nowait()
             except queue.Empty:
                 return
-            if name in done:  # else a late word of an exchange before
-                done[name] = max(done[name], fraction)
+            if name in shares:  # late reports of the previous exchange are ignored
+                shares[name] = max(shares[name], fraction)
 
 
 def _start_worker(reports: Any, threads: int) -> None:
     global _progress
-    os.environ["NUMBA_NUM_THREADS"] = str(threads)  # numba, which is loaded after this, would take all cores
+    os.environ["NUMBA_NUM_THREADS"] = str(threads)  # before numba is loaded, which would use all cores
     _progress = reports
 
 
@@ -87,11 +88,11 @@ def _work(work: Callable[[Any, Report], Result], name: str, job: Any) -> Result:
 
 
 def open_pool(run: Run[PackageCase], joints: int) -> JointPool:
-    """Return MPI ranks where the case asks for them, else processes on the cores of this machine.
+    """Return MPI ranks if the case sets ``reflow.ranks``, otherwise processes of this machine.
 
     Args:
-        run: case, cores, where checkpoints are.
-        joints: how many there are to compute at a time.
+        run: Case, cores and folder of the checkpoints.
+        joints: Number of joints of an exchange.
     """
     ranks = run.case.reflow.ranks
     if ranks is None:

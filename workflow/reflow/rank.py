@@ -1,6 +1,6 @@
-"""One MPI rank: takes jobs from a folder until none is left or one fails; see `ranks.py`.
+"""One MPI rank: runs jobs from a folder until none is left or one fails; see ``ranks.py``.
 
-Jobs and results are data files. The command line names the function that runs them; no file does.
+Jobs and results are data files. The function that runs them is named on the command line, never in a file.
 """
 
 import json
@@ -15,26 +15,30 @@ from typing import Any
 from reflowshock.data_file import read_data, write_data
 
 JOB, TAKEN, RESULT = ".job", ".taken", ".result"
-PAUSE = 0.2  # seconds between two words of the progress
+PAUSE = 0.2  # seconds between two lines of progress
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class JobResult:
     """Result of a job: a value, or the message of its error."""
 
     value: Any = None
     error: str = ""
 
 
-class Voice:
+class ProgressReporter:
     """Reporter of a joint's progress to the launcher, one line at a time and rate-limited."""
 
     def __init__(self, name: str) -> None:
-        """Begin with the next word."""
+        """Start with the next report.
+
+        Args:
+            name: Name of the joint.
+        """
         self._name, self._last = name, 0.0
 
     def __call__(self, fraction: float) -> None:
-        """Tell it, if there was a pause or this is the end."""
+        """Print the fraction done, unless the last line is recent and the job is unfinished."""
         if fraction >= 1.0 or monotonic() - self._last >= PAUSE:
             self._last = monotonic()
             sys.stdout.write(json.dumps({self._name: fraction}) + "\n")
@@ -42,24 +46,24 @@ class Voice:
 
 
 def name_of(work: Callable) -> str:
-    """Return the name by which another process finds a function of a module."""
+    """Return the name of a function of a module, from which another process can import it."""
     return f"{work.__module__}:{work.__qualname__}"
 
 
-def find(name: str) -> Callable:
-    """Return the function of which `name_of` has given the name."""
+def function_of(name: str) -> Callable:
+    """Import the function with a name from ``name_of``."""
     module, _, function = name.partition(":")
-    found: Callable = getattr(import_module(module), function)
-    return found
+    imported: Callable = getattr(import_module(module), function)
+    return imported
 
 
 def records_of(work: Callable) -> tuple[type, ...]:
-    """Return the records that may be in the files of jobs and results: its module lists them."""
-    return (Done, *sys.modules[work.__module__].records())
+    """Return the types that the files of jobs and results may contain, as listed by the module of the function."""
+    return (JobResult, *sys.modules[work.__module__].records())
 
 
-def take(path: Path) -> bool:
-    """Take a job, unless another rank has."""
+def claim(path: Path) -> bool:
+    """Claim a job; return False if another rank has claimed it."""
     try:
         path.with_suffix(TAKEN).touch(exist_ok=False)
     except FileExistsError:
@@ -67,20 +71,28 @@ def take(path: Path) -> bool:
     return True
 
 
-def done(path: Path, work: Callable) -> Done:
-    """Do a job."""
+def run_job(path: Path, work: Callable) -> JobResult:
+    """Run the job in a file and return its value, or the message of its error."""
     try:
-        return Done(work(read_data(path, records_of(work)), Voice(path.stem)))
-    except Exception as error:  # whatever it is, the launcher must hear of it
-        return Done(error=f"{type(error).__name__}: {error}")
+        return JobResult(work(read_data(path, records_of(work)), ProgressReporter(path.stem)))
+    except Exception as error:  # the launcher reports any error
+        return JobResult(error=f"{type(error).__name__}: {error}")
 
 
 def main(folder: Path, work: Callable) -> int:
-    """Do jobs until none is left or one fails; return the exit code."""
-    for path in filter(take, sorted(folder.glob(f"*{JOB}"))):
-        result = done(path, work)
+    """Run jobs until none is left or one fails.
+
+    Args:
+        folder: Folder with the files of jobs and results.
+        work: Function that runs a job.
+
+    Returns:
+        Exit code: 1 if a job failed, else 0.
+    """
+    for path in filter(claim, sorted(folder.glob(f"*{JOB}"))):
+        result = run_job(path, work)
         write_data(path.with_suffix(RESULT), {}, result)
         if result.error:
             return 1
-        Voice(path.stem)(1.0)
+        ProgressReporter(path.stem)(1.0)
     return 0

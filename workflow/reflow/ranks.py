@@ -1,8 +1,8 @@
-"""MPI ranks, of any number of machines with a common file system, that bring joints to rest.
+"""Reflow of joints on MPI ranks, on any number of machines with a common file system.
 
-The joints do not know each other, so no rank sends anything: jobs, what they gave and their checkpoints are files of
-data. Each piece of work is a program of its own, since a rank that waited for the next one would look for it in vain
-for as long as a network file system keeps a listing (30 s as usual); its start takes a second or two.
+Joints are independent, so ranks exchange no messages: jobs, results and checkpoints are data files. Each exchange
+starts a new MPI program, which takes a second or two. Waiting ranks would notice the next jobs only after the network
+file system has refreshed its listing of the folder (usually 30 s).
 """
 
 import json
@@ -16,17 +16,17 @@ from pathlib import Path
 from reflowshock.data_file import NotData, read_data, write_data
 from reflowshock.workflow.process.launch import DIE_WITH_PARENT, LaunchError, launch, mpi_command
 from reflowshock.workflow.reflow.pool import Job, ReflowError, Report, Result, Shares
-from reflowshock.workflow.reflow.rank import JOB, RESULT, TAKEN, Done, name_of, records_of
+from reflowshock.workflow.reflow.rank import JOB, RESULT, TAKEN, JobResult, name_of, records_of
 
 
 @dataclass(frozen=True, slots=True)
 class Ranks:
-    """MPI ranks, a `pool.JointPool`; each takes the next job as it becomes free.
+    """MPI ranks as a ``pool.JointPool``; each free rank takes the next job.
 
     Attributes:
-        count: how many at most.
-        oversubscribe: whether there may be more than cores.
-        folder: for jobs and results; all ranks see it, and it is removed in the end.
+        count: Largest number of ranks.
+        oversubscribe: Whether there may be more ranks than cores.
+        folder: Folder for jobs and results, visible to all ranks and removed at the end.
     """
 
     count: int
@@ -43,20 +43,20 @@ class Ranks:
     def run(
         self, work: Callable[[Job, Report], Result], jobs: Mapping[str, Job], progress: Callable[[Shares], None]
     ) -> dict[str, Result]:
-        """Do a piece of work for each joint; see `pool.JointPool`."""
+        """Run the work of each joint; see ``pool.JointPool.run``."""
         if not jobs:
             return {}
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         for name, job in jobs.items():
             write_data(self.folder / f"{name}{JOB}", {}, job)
-        done = dict.fromkeys(jobs, 0.0)
+        shares = dict.fromkeys(jobs, 0.0)
 
-        def take(line: str) -> None:
-            with suppress(ValueError, TypeError):  # not of a rank, or torn where many speak at once
-                said = json.loads(line)
-                done.update({name: float(said[name]) for name in said if name in done})
-                progress(done)
+        def read_progress(line: str) -> None:
+            with suppress(ValueError, TypeError):  # another output, or lines of several ranks that are mixed
+                reported = json.loads(line)
+                shares.update({name: float(reported[name]) for name in reported if name in shares})
+                progress(shares)
 
         program = [
             *DIE_WITH_PARENT,
@@ -67,24 +67,26 @@ class Ranks:
             name_of(work),
         ]
         try:
-            launch(mpi_command(min(self.count, len(jobs)), program, self.oversubscribe), take, self.folder / "log.txt")
+            command = mpi_command(min(self.count, len(jobs)), program, self.oversubscribe)
+            launch(command, read_progress, self.folder / "log.txt")
         except LaunchError as error:
             raise self._failure(work, jobs, error) from error
-        return {name: self._done(work, name).value for name in jobs}
+        return {name: self._result(work, name).value for name in jobs}
 
-    def _done(self, work: Callable, name: str) -> Done:
+    def _result(self, work: Callable, name: str) -> JobResult:
+        """Read the result of a joint."""
         try:
-            done: Done = read_data(self.folder / f"{name}{RESULT}", records_of(work))
+            result: JobResult = read_data(self.folder / f"{name}{RESULT}", records_of(work))
         except NotData as error:
             raise ReflowError(f"joint {name}: {error}") from error
-        return done
+        return result
 
     def _failure(self, work: Callable, jobs: Mapping[str, object], error: LaunchError) -> ReflowError:
-        """Say which joint failed and how; where none did, which were under way."""
+        """Return the error with the joint that failed, or else with the joints that are unfinished."""
         ended = [name for name in jobs if (self.folder / f"{name}{RESULT}").exists()]
         for name in ended:
-            failed = self._done(work, name).error
-            if failed:
-                return ReflowError(f"joint {name}: {failed}")
+            message = self._result(work, name).error
+            if message:
+                return ReflowError(f"joint {name}: {message}")
         busy = [name for name in jobs if name not in ended and (self.folder / f"{name}{TAKEN}").exists()]
         return ReflowError(f"{error}; unfinished joints: {', '.join(busy) or 'none'}")

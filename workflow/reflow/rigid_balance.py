@@ -1,7 +1,7 @@
-"""Newton's method for the rigid motions of a package that floats: where weight and solder forces are in balance.
+"""Quasi-Newton method for the rigid motions of a floating package at which weight and solder forces balance.
 
-The derivative starts from an estimate of the joints' stiffness and learns from each exchange (Broyden 1965). All is
-over lengths: turns count with the mean way of the pads, moments over it.
+The stiffness starts from an estimate for the joints and is updated after each exchange (Broyden 1965). Rotations are
+scaled to lengths by the mean displacement of the pads, and moments to forces.
 """
 
 from dataclasses import dataclass
@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-LEARNED = 1e-8  # motions below tell more of the joints' rounding than of their stiffness [m]
-SOFTEST = 1e-6  # of the stiffest motion; softer ones, such as the turn of a single joint about its axis, are let be
+SMALLEST_MOTION = 1e-8  # [m] after smaller motions, forces differ by rounding more than by stiffness
+SOFTEST = 1e-6  # share of the largest stiffness; softer motions, such as the spin of a single joint, are not corrected
 
 
 @dataclass(slots=True)
 class RigidBalance:
-    """The search for the balance.
+    """State of the quasi-Newton iteration.
 
     Attributes:
-        levers: `(k,)` 1 for shifts, for turns the mean way of the pads in a unit of it [m].
-        largest: longest motion in one exchange [m].
-        stiffness: `(k, k)` derivative of the imbalance, over lengths [N/m].
-        last: motion [m] and imbalance [N] of the exchange before, over lengths; none before the first.
+        levers: Scale of each motion, shape (k,): 1 for translations, mean displacement of the pads per radian for
+            rotations [m].
+        largest: Largest motion in one exchange [m].
+        stiffness: Derivative of the scaled imbalance by the scaled motion, shape (k, k) [N/m].
+        last: Scaled motion [m] and scaled imbalance [N] of the previous exchange, both of shape (k,); None before the
+            first exchange of a load step.
     """
 
     levers: Floats
@@ -33,7 +35,7 @@ class RigidBalance:
 
     @classmethod
     def start(cls, names: tuple[str, ...], pad_motion: Floats, joints: Floats, largest: float) -> "RigidBalance":
-        """Start from the joints' stiffness.
+        """Return the initial state, with the estimated stiffness of the joints.
 
         Args:
             names: Names of the motions; rotations begin with "turn".
@@ -42,28 +44,28 @@ class RigidBalance:
             largest: Longest motion in one exchange [m].
         """
         package = pad_motion[:, :, 1]
-        arms = np.sqrt((package[..., :3] ** 2).sum(axis=-1).mean(axis=1))  # of turns [m/rad]; of shifts 1
+        arms = np.sqrt((package[..., :3] ** 2).sum(axis=-1).mean(axis=1))  # [m/rad] for rotations
         levers = np.array([arm if name.startswith("turn") else 1.0 for name, arm in zip(names, arms, strict=True)])
         stiffness = np.einsum("kja,jab,mjb->km", package, joints, package) / np.outer(levers, levers)
         return cls(levers, largest, stiffness)
 
     def next(self, rigid: Floats, imbalance: Floats) -> Floats:
-        """Return rigid motions `(k,)` [m, rad] nearer to the balance; learns from those tried last.
+        """Return the next rigid motions, shape (k,) [m, rad], and update the stiffness.
 
         Args:
-            rigid: motions that were tried.
-            imbalance: `(k,)` [N, N m] that they left.
+            rigid: Rigid motions of the last exchange, shape (k,) [m, rad].
+            imbalance: Imbalance at these motions, shape (k,) [N, N m].
         """
-        place, force = rigid * self.levers, imbalance / self.levers
+        motion, force = rigid * self.levers, imbalance / self.levers
         if self.last is not None:
-            moved, change = place - self.last[0], force - self.last[1]
-            if np.linalg.norm(moved) > LEARNED:
+            moved, change = motion - self.last[0], force - self.last[1]
+            if np.linalg.norm(moved) > SMALLEST_MOTION:
                 self.stiffness += np.outer(change - self.stiffness @ moved, moved) / (moved @ moved)
-        self.last = (place, force)
+        self.last = (motion, force)
         step = -np.linalg.lstsq(self.stiffness, force, rcond=SOFTEST)[0]
         longest = float(np.abs(step).max(initial=0.0))
-        return (place + step * min(1.0, self.largest / max(longest, self.largest))) / self.levers
+        return (motion + step * min(1.0, self.largest / max(longest, self.largest))) / self.levers
 
     def forget(self) -> None:
-        """Another load step begins: what the last exchange left says nothing of this one."""
+        """Discard the last exchange at the start of a load step, whose loads differ."""
         self.last = None

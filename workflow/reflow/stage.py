@@ -1,4 +1,4 @@
-"""The stage `reflow`: joints between rigid plates, or coupled with board and package that warm up."""
+"""Stage ``reflow``: joints between rigid plates, or coupled with board and package during heating."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,28 +32,32 @@ class Reflowed:
         geometries: Geometry by joint name.
         groups: Groups of equal joints.
         shapes: Shape by name of the first joint of a group.
-        found: Metrics and health checks, without the shapes.
-        structure: Arrays of `structure.npz`; empty between rigid plates at rest.
+        findings: Metrics and health checks of the computation, without those of the shapes.
+        structure: Arrays of ``structure.npz``; empty between rigid plates at rest.
     """
 
     pads: "list[PadSite]"
     geometries: "Mapping[str, JointGeometry]"
-    groups: list[pool.Alike]
+    groups: list[pool.JointGroup]
     shapes: "dict[str, JointShape]"
-    found: Findings
+    findings: Findings
     structure: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def reflow(run: Run[PackageCase], folder: Path) -> Findings:
-    """Melt the solder of the array; write shapes, records of joints, pads as solidified."""
+    """Reflow the solder of the array; write shapes, records of the joints, and the pad table at solidification."""
     from reflowshock.meshing.board.pads import lifted, read_pads, write_pads
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.scenes.products import write_shapes
 
     case, solder = run.case, run.case.solder
     drawn = read_pads(run.folder / "geometry/pads.json")
-    lying = lifted(drawn, case.package, case.warpage)
-    result = _between_plates(run, lying) if case.thermal is None else _heated(run, lying, folder / "heated.msh")
+    lifted_pads = lifted(drawn, case.package, case.warpage)
+    result = (
+        _between_plates(run, lifted_pads)
+        if case.thermal is None
+        else _heated(run, lifted_pads, folder / "heated.msh")
+    )
     flowed = {name: result.geometries[name] for group in result.groups for name in group.members}
     joints = pool.joint_records(result.groups, flowed, result.shapes) | given_records(case.package, result.pads, flowed)
     joints = {pad.name: joints[pad.name] for pad in result.pads}
@@ -64,47 +68,47 @@ def reflow(run: Run[PackageCase], folder: Path) -> Findings:
     if result.structure:
         _write_structure(folder, result.structure)
     highest = max(result.geometries.values(), key=lambda geometry: geometry.gap)
-    found = findings.of_reflow(joints, decide_effects(highest, solder))
+    of_shapes = findings.of_reflow(joints, decide_effects(highest, solder))
     return Findings(
-        found.metrics | result.found.metrics,
-        found.health | result.found.health,
-        found.effects | result.found.effects,
-        result.found.continued,
+        of_shapes.metrics | result.findings.metrics,
+        of_shapes.health | result.findings.health,
+        of_shapes.effects | result.findings.effects,
+        result.findings.continued,
     )
 
 
 def _between_plates(run: Run[PackageCase], pads: "list[PadSite]") -> Reflowed:
-    """Each distinct joint once, between plates that are where the pad table has them; none whose surface is given."""
+    """Reflow each distinct joint between rigid plates at the pads, except joints with a given surface."""
     geometries = joint_geometries(pads)
-    given = run.case.package.surfaces
-    groups = pool.distinct_joints({name: geometries[name] for name in geometries if name not in given})
+    surfaces = run.case.package.surfaces
+    groups = pool.distinct_joints({name: geometries[name] for name in geometries if name not in surfaces})
     distinct = {group.name: group.geometry for group in groups}
     with (
         open_pool(run, len(distinct)) as workers,
         progress_bar(f"reflow of {len(distinct)} distinct joints") as progress,
     ):
         shapes, continued = pool.solve_joints(distinct, run.case.solder, workers, progress, run.checkpoints("reflow"))
-    found = Findings(continued=f"{continued} of {len(distinct)} joints" if continued else "")
-    return Reflowed(pads, geometries, groups, shapes, found)
+    computation = Findings(continued=f"{continued} of {len(distinct)} joints" if continued else "")
+    return Reflowed(pads, geometries, groups, shapes, computation)
 
 
 def _heated(run: Run[PackageCase], pads: "list[PadSite]", mesh: Path) -> Reflowed:
-    """All joints through the load steps of temperature, with board and package, which are meshed for it."""
+    """Reflow all joints in load steps of temperature, coupled with a mesh of board and package."""
     from reflowshock.meshing.board.assembly import write_heated_assembly
 
     assert run.case.thermal is not None
     write_heated_assembly(run.case.package, run.case.board, mesh)
     heated = reflow_heated(run, run.case.thermal, pads, mesh)
     solid = [
-        replace(pad, gap=place.gap, offset=place.offset, tilt=place.tilt)
-        for pad, place in zip(pads, heated.geometries.values(), strict=True)
+        replace(pad, gap=geometry.gap, offset=geometry.offset, tilt=geometry.tilt)
+        for pad, geometry in zip(pads, heated.geometries.values(), strict=True)
     ]
-    found = Findings(heated.metrics, heated.health, heated.effects, heated.continued)
-    return Reflowed(solid, heated.geometries, heated.groups, heated.shapes, found, heated.structure)
+    computation = Findings(heated.metrics, heated.health, heated.effects, heated.continued)
+    return Reflowed(solid, heated.geometries, heated.groups, heated.shapes, computation, heated.structure)
 
 
 def _write_structure(folder: Path, structure: Mapping[str, np.ndarray]) -> None:
-    """Write displacements of board and package: `structure.npz`, and `structure.vtu` for ParaView."""
+    """Write the displacements of board and package to ``structure.npz``, and to ``structure.vtu`` for ParaView."""
     import meshio
     from scipy.spatial import cKDTree
 

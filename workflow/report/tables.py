@@ -171,7 +171,13 @@ def mode_name(mode: str) -> str:
 
 
 def named_quantity(metrics: dict, name: str) -> str:
-    """Return a metric as text: errors in per cent, strains in microstrain, others as ``quantity``."""
+    """Format the value of a named metric for a reader, with its unit.
+
+    Args:
+        metrics: Metrics of a run by name, each a record with ``value`` and ``unit``.
+        name: Name of the metric, which must exist and decides on the format: errors and the shape effect in per cent,
+            strains in microstrain, others in the usual unit of their quantity.
+    """
     if name == SHAPE_EFFECT:
         return f"{100.0 * metrics[name]['value']:+.3g} %"
     if "_error" in name:

@@ -67,16 +67,18 @@ class Bars:
 
 
 def peak(time: NDArray[np.float64], value: NDArray[np.float64], about: float, width: float) -> tuple[float, float]:
-    """Return the largest magnitude near a time, interpolated by a parabola through three samples.
+    """Find the peak of a sampled signal, the value of largest magnitude, within a window of time.
+
+    The peak is interpolated by a parabola through the largest sample and its neighbours.
 
     Args:
         time: Evenly spaced times, shape (n,) [s].
-        value: Samples, shape (n,).
-        about: Centre of the search [s].
-        width: Half width of the search [s].
+        value: Samples of the signal, shape (n,), in any unit.
+        about: Centre of the window [s].
+        width: Half width of the window [s].
 
     Returns:
-        Time [s] and value of the peak; nan if the samples end before the search window.
+        Time [s] of the peak, and the signed value there; both nan if the samples end before the window.
     """
     inside = np.flatnonzero(np.abs(time - about) <= width)
     if about + width > time[-1] or len(inside) < 3:

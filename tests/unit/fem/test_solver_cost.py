@@ -48,7 +48,7 @@ def test_few_explicit_steps_are_cheaper_and_many_are_not():
 
 def test_what_only_explicit_steps_can_do():
     forecast = forecast_solvers(scene(dynamics={"duration": 1e-3, "kinematics": "finite"}), 48, 10, 1000)
-    assert forecast.sentence == "Only the explicit solver does finite rotations (dynamics.kinematics)."
+    assert forecast.sentence == "Only the explicit solver supports finite rotations (dynamics.kinematics)."
     layers = {"joint": {"material": "SAC305", "thickness": 1e-3, "cells": 2}}
     forecast = forecast_solvers(scene(structure=structure_tables_of()["structure"] | {"layers": layers}), 48, 10, 1000)
     assert forecast.only_explicit == ("plasticity (layers joint)",)

@@ -154,6 +154,6 @@ def test_the_command_prints_the_registry_and_a_scene():
 
 @pytest.mark.parametrize("effect", registry().values(), ids=lambda effect: effect.name)
 def test_entries_are_complete(effect):
-    texts = (effect.adds, effect.number, effect.influence, effect.place, effect.switch, effect.source)
+    texts = (effect.adds, effect.number, effect.influence, effect.implementation, effect.switch, effect.source)
     assert all(texts)
     assert effect.stage in ("reflow", "shock", "particles") and effect.acts in ("above", "below")

@@ -13,7 +13,7 @@ from reflowshock.particles.steps.shape import JointShape, Snapshot
 from reflowshock.workflow.reflow import array, rank
 from reflowshock.workflow.reflow import joints as reflow_pool
 from reflowshock.workflow.reflow.pool import ReflowError
-from reflowshock.workflow.reflow.rank import JOB, RESULT, Done, find, name_of, records_of
+from reflowshock.workflow.reflow.rank import JOB, RESULT, JobResult, function_of, name_of, records_of
 from reflowshock.workflow.reflow.ranks import Ranks
 from tests.support import rank_work
 from tests.support.forged_files import DAMAGES
@@ -32,7 +32,7 @@ JOBS = {
 def test_a_job_arrives_as_it_was_sent(tmp_path, work):
     path = tmp_path / f"A1{JOB}"
     write_data(path, {}, JOBS[work])
-    assert find(name_of(work)) is work
+    assert function_of(name_of(work)) is work
     received = read_data(path, records_of(work))
     assert received == JOBS[work]
     assert repr(received) == repr(JOBS[work])  # a checkpoint belongs to what this says
@@ -52,7 +52,7 @@ def test_results_arrive_as_they_were_sent(tmp_path):
         metrics={"volume": (7.2e-11, "m^3"), "width_error": (float("nan"), "")},
         verdict="ok",
     )
-    write_data(tmp_path / "shape", {}, Done((shape, True)))
+    write_data(tmp_path / "shape", {}, JobResult((shape, True)))
     received, continued = read_data(tmp_path / "shape", records_of(reflow_pool._solve)).value
     assert continued is True
     assert (received.verdict, repr(received.metrics)) == (shape.verdict, repr(shape.metrics))
@@ -61,7 +61,7 @@ def test_results_arrive_as_they_were_sent(tmp_path):
     np.testing.assert_array_equal(received.rings[1], shape.rings[1])
     np.testing.assert_array_equal(received.snapshots[0].triangles, triangles)
     assert received.triangles.dtype == np.int32
-    write_data(tmp_path / "carried", {}, Done(Carried(np.eye(6)[:2], 7)))
+    write_data(tmp_path / "carried", {}, JobResult(Carried(np.eye(6)[:2], 7)))
     carried = read_data(tmp_path / "carried", records_of(array.carry)).value
     assert carried.steps == 7
     np.testing.assert_array_equal(carried.wrenches, np.eye(6)[:2])
@@ -73,9 +73,9 @@ def test_a_broken_or_forged_job_fails_and_is_not_executed(tmp_path, damage):
     write_data(path, {}, JOBS[reflow_pool._solve])
     path.write_bytes(damage(path.read_bytes(), marker))
     assert rank.main(tmp_path, rank_work.solve) == 1
-    done = read_data(path.with_suffix(RESULT), (Done,))
-    assert done.value is None
-    assert done.error.startswith(f"NotData: {path} ")
+    result = read_data(path.with_suffix(RESULT), (JobResult,))
+    assert result.value is None
+    assert result.error.startswith(f"NotData: {path} ")
     assert not marker.exists()
 
 
@@ -85,7 +85,7 @@ def test_a_broken_or_forged_result_names_its_joint(tmp_path, monkeypatch, damage
 
     def launch(*_) -> None:
         path = tmp_path / "jobs" / f"A1{RESULT}"
-        write_data(path, {}, Done((None, True)))
+        write_data(path, {}, JobResult((None, True)))
         path.write_bytes(damage(path.read_bytes(), marker))
 
     monkeypatch.setattr("reflowshock.workflow.reflow.ranks.launch", launch)

@@ -4,18 +4,18 @@ from types import SimpleNamespace
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.reflow.heated import Saved, all_inputs
+from reflowshock.workflow.reflow.heated import CouplingFile, all_inputs
 from tests.support.workflow_command import SMALL_CASE
 
 HEATED = ["warpage.corner=0 mm", "thermal.peak=245 degC"]
 
 
-def test_a_file_of_a_case_that_has_changed_is_not_taken_up(tmp_path):
+def test_the_file_of_a_changed_case_is_ignored(tmp_path):
     def saved(*settings):
         case = read_case(SMALL_CASE, [*HEATED, *settings])
-        return Saved(tmp_path, all_inputs(case, pad_table(case.package, case.board, case.warpage)))
+        return CouplingFile(tmp_path, all_inputs(case, pad_table(case.package, case.board, case.warpage)))
 
-    joints = SimpleNamespace(left=["where they are"])
+    joints = SimpleNamespace(groups=["present groups"])
     saved().writer(joints)("coupled")
     assert saved().read(joints) == "coupled"
     changes = (
