@@ -1,1 +1,1 @@
-"""Base of all particle methods: cells, neighbours, grid, clouds, plates, checkpoints; start with `body.py`."""
+"""Base of all particle methods: cells, neighbours, grid, clouds, plates, checkpoints; start with ``body.py``."""

@@ -2,7 +2,7 @@
 
 The cell (x, y, z) of a grid with n_y and n_z cells along y and z has the number (x n_y + y) n_z + z: cells that follow
 each other along z follow each other in memory. Points of one cell keep their order, so the result depends neither on
-the number of threads nor on the device. `cuda_cells.py` sorts on a GPU.
+the number of threads nor on the device. ``cuda_cells.py`` sorts on a GPU.
 """
 
 from math import inf, isfinite

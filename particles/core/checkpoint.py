@@ -1,6 +1,6 @@
 """Checkpoint of a run in one file: written atomically, and read only if it belongs to the same inputs and code.
 
-A state consists of plain data (`data_file.py`): arrays, numbers and records, from which the run continues with
+A state consists of plain data (``data_file.py``): arrays, numbers and records, from which the run continues with
 identical bits. No content of a file is executed.
 """
 
@@ -35,7 +35,7 @@ class Checkpoint:
 
         Args:
             path: File; its folder is created with the first checkpoint.
-            inputs: All inputs of the run; plain data with a complete `repr`.
+            inputs: All inputs of the run; plain data with a complete ``repr``.
             interval: Wall time between two checkpoints [s].
         """
         self.path, self.interval, self.continued = path, interval, False
@@ -43,7 +43,7 @@ class Checkpoint:
         self._written = monotonic()
 
     def read(self, records: Collection[type] = ()) -> Any | None:
-        """Return the state, or None if there is none; a damaged or foreign file is ignored with a warning.
+        """Return the saved state, or None without a file; a damaged or foreign file is ignored with a warning.
 
         Args:
             records: Dataclasses that the state may contain; no others are created.

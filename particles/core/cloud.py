@@ -26,7 +26,7 @@ class Cloud:
     """Particles that fill a liquid body, its free surface and its contact lines.
 
     Attributes:
-        points: Positions, shape (n, 3) [m]; the first `surface_count` are the vertices of the free surface.
+        points: Positions, shape (n, 3) [m]; the first ``surface_count`` are the vertices of the free surface.
         surface_count: Number of surface particles, rings included.
         triangles: Triangles of the free surface, outward oriented, open at the walls, shape (t, 3).
         rings: Contact lines, each of shape (k,), counter-clockwise seen from +z.

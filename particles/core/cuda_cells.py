@@ -1,4 +1,4 @@
-"""Counting sort of particles into the cells of a uniform grid on a CUDA device; see `cells.py`.
+"""Counting sort of particles into the cells of a uniform grid on a CUDA device; see ``cells.py``.
 
 Load this module only where a case asks for a GPU. A loop runs one thread for each particle, cell or part of the cells.
 """
@@ -48,7 +48,7 @@ def blocks_for(count: int) -> int:
 
 
 def launch(kernel: Any, count: int, *arguments: Any) -> None:
-    """Run a kernel of `loop_over` with these arguments; an empty loop is not launched."""
+    """Run a kernel of ``loop_over`` with these arguments; an empty loop is not launched."""
     if count:
         kernel[blocks_for(count), THREADS_PER_BLOCK](count, arguments)
 
@@ -57,7 +57,7 @@ def launch(kernel: Any, count: int, *arguments: Any) -> None:
 def raise_to(values, i, value):
     """Set ``values[i]`` to the larger of itself and ``value``, atomically.
 
-    The simulator replaces ``cuda`` only in the module of `loop_over`, so loops of other modules call this function.
+    The simulator replaces ``cuda`` only in the module of ``loop_over``, so loops of other modules call this function.
     """
     cuda.atomic.max(values, i, value)
 

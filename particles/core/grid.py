@@ -52,7 +52,7 @@ class Grid:
         return (points - self.origin) / self.spacing
 
     def positions(self, indices: Floats) -> Floats:
-        """Return the positions of fractional node indices (n, 3), shape (n, 3) [m]; the inverse of `indices`."""
+        """Return the positions of fractional node indices (n, 3), shape (n, 3) [m]; the inverse of ``indices``."""
         return self.origin + self.spacing * indices
 
     def part_around(self, points: Floats, margin: int) -> tuple["Grid", tuple[slice, slice, slice]]:

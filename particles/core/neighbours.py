@@ -51,7 +51,7 @@ def write_near(point, limits, radius, cells, row):
         point: Coordinates (x, y, z) [m].
         limits: Number of a point that is left out (-1 for none), and the number from which on all are left out.
         radius: Search radius [m].
-        cells: `CellList` of the points.
+        cells: ``CellList`` of the points.
         row: Output, shape (room,); its last entry may be overwritten by a point that is too far away.
     """
     starts, numbers, coordinates, shape = cells.starts, cells.permutation, cells.coordinates, cells.shape
@@ -164,7 +164,7 @@ def tabulate_near(
         centres: Coordinates, shape (m, 3) [m], finite.
         points: Coordinates, shape (n, 3) [m], finite.
         radius: Search radius [m].
-        movers: As for `find_near`.
+        movers: As for ``find_near``.
         rows: Table of an earlier call, shape (m, k), overwritten and returned if it has room enough.
 
     Returns:
@@ -218,7 +218,7 @@ def have_moved(points: Sequence[Floats] | Floats, built_at: Sequence[Floats] | F
 
 @njit(cache=True)
 def _have_moved(points, built_at, skin):
-    """Return the answer of `have_moved` for three arrays each."""
+    """Return the answer of ``have_moved`` for three arrays each."""
     count, (low_x, low_y, low_z), (high_x, high_y, high_z) = len(points[0]), (inf, inf, inf), (-inf, -inf, -inf)
     for i in range(count):
         x, y, z = points[0][i] - built_at[0][i], points[1][i] - built_at[1][i], points[2][i] - built_at[2][i]
@@ -236,7 +236,7 @@ def _have_moved(points, built_at, skin):
 class NeighbourList:
     """Neighbours within a radius plus a skin, rebuilt when a particle has moved half the skin (Verlet 1967).
 
-    Rows may hold pairs up to `radius + skin` apart: every kernel gives a pair beyond `radius` the weight zero.
+    Rows may hold pairs up to ``radius + skin`` apart: every kernel gives a pair beyond ``radius`` the weight zero.
 
     Attributes:
         radius: Search radius [m].
@@ -247,7 +247,7 @@ class NeighbourList:
     """
 
     def __init__(self, radius: float, skin: float) -> None:
-        """Set the radius and the skin [m]; the first `update` builds the list."""
+        """Set the radius and the skin [m]; the first ``update`` builds the list."""
         self.radius = radius
         self.skin = skin
         self.builds = 0
@@ -256,11 +256,11 @@ class NeighbourList:
         self.indices: Indices = np.empty(0, np.int32)
 
     def saved(self) -> dict[str, Any]:
-        """Return the data from which `restore` rebuilds the list, for a checkpoint."""
+        """Return the data from which ``restore`` rebuilds the list, for a checkpoint."""
         return {"built_at": self._built_at, "builds": self.builds}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Rebuild the list from the data that `saved` returned."""
+        """Rebuild the list from the data that ``saved`` returned."""
         self._built_at, self.builds = saved["built_at"], saved["builds"]
         if len(self._built_at):
             self.offsets, self.indices = find_neighbours(self._built_at, self.radius + self.skin)

@@ -38,7 +38,7 @@ class Plate:
         origin: Centre of the pad, shape (3,) [m].
         frame: Orthonormal rows, two tangents and the normal, which is +z for a horizontal plate, shape (3, 3).
         side: +1 if the normal points out of the liquid, as on the package, -1 if into it, as on the board.
-        pads: Pads, if a scene has several; that of a single joint or drop is at the origin.
+        pads: Pads, if a scene has several; the pad of a single joint or drop is at the origin.
     """
 
     origin: Floats
@@ -61,7 +61,7 @@ class Plate:
         return (points - self.origin) @ self.frame.T
 
     def place(self, local: Floats) -> Floats:
-        """Return points given in the plate's frame (k, 3) in global coordinates [m]; the inverse of `local`."""
+        """Return points given in the plate's frame (k, 3) in global coordinates [m]; the inverse of ``local``."""
         return self.origin + local @ self.frame
 
     def rigid_velocity(self, twist: Floats, points: Floats) -> Floats:
@@ -74,12 +74,12 @@ class Plate:
         return twist[:3] + np.cross(twist[3:], points - self.origin)
 
     def moved(self, motion: Floats) -> "Plate":
-        """Return the plate displaced by `motion[:3]` [m] and rotated about its origin by `motion[3:]` [rad]."""
+        """Return the plate displaced by ``motion[:3]`` [m] and rotated about its origin by ``motion[3:]`` [rad]."""
         rotation = Rotation.from_rotvec(motion[3:]).as_matrix()
         return replace(self, origin=self.origin + motion[:3], frame=self.frame @ rotation.T)
 
     def motion_to(self, other: "Plate") -> Floats:
-        """Return the motion (6,) [m, rad] for which `moved` returns the other plate."""
+        """Return the motion (6,) [m, rad] for which ``moved`` returns the other plate."""
         rotation = Rotation.from_matrix(other.frame.T @ self.frame).as_rotvec()
         return np.concatenate((other.origin - self.origin, rotation))
 

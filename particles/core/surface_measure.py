@@ -14,7 +14,7 @@ from scipy import sparse
 from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.plate import Plate
 
-# Share of the isotropic stiffness in `area_stiffness`.
+# Isotropic share of the stiffness in ``area_stiffness``; the rest acts across each triangle.
 ALL_WAYS = 0.7
 
 
@@ -47,9 +47,9 @@ def triangle_areas(points, triangles):
 
 
 def area_gradient(points: Floats, triangles: Indices, weights: Floats | None = None) -> Floats:
-    """Return the gradient of `surface_area` with respect to each point, shape (n, 3) [m].
+    """Return the gradient of ``surface_area`` with respect to each point, shape (n, 3) [m].
 
-    It equals K x with the stiffness matrix of `cotangent_laplacian`; degenerate triangles contribute nothing.
+    It equals K x with the stiffness matrix of ``cotangent_laplacian``; degenerate triangles contribute nothing.
     ``weights`` (t,) multiply the areas of triangles.
     """
     return _area_gradient(points, triangles, np.ones(len(triangles)) if weights is None else weights)
@@ -57,7 +57,7 @@ def area_gradient(points: Floats, triangles: Indices, weights: Floats | None = N
 
 @njit(cache=True)
 def _area_gradient(points, triangles, weights):
-    """`area_gradient`, compiled once: with weights."""
+    """Return ``area_gradient`` with explicit weights, so that numba compiles one signature."""
     result = np.zeros_like(points)
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -76,7 +76,7 @@ def _area_gradient(points, triangles, weights):
 
 @njit(cache=True)
 def _volume_and_gradient(points, triangles, gradient):
-    """Sum of the tetrahedra (origin, triangle); adds its gradient."""
+    """Return the volume of the tetrahedra (origin, triangle) [m^3] and add its gradient to ``gradient``."""
     total = 0.0
     for t in range(triangles.shape[0]):
         for k in range(3):
@@ -94,7 +94,10 @@ def _volume_and_gradient(points, triangles, gradient):
 
 @njit(cache=True)
 def _wall_volume_and_gradient(points, ring, sixth, gradient):
-    """Tetrahedra (origin, mean of the line, segment), times six and a sixth with a sign; adds their gradient."""
+    """Return the volume between the origin and the polygon of a ring [m^3] and add its gradient to ``gradient``.
+
+    The tetrahedra span the origin, the mean of the ring and a segment. ``sixth`` is 1/6 with the sign of the side.
+    """
     count = ring.shape[0]
     centre, normals = np.zeros(3), np.zeros(3)
     for k in range(count):
@@ -133,14 +136,22 @@ def ring_area(points: Floats, ring: Indices) -> float:
 
 
 def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
-    """Return the gradient of `ring_area` with respect to the vertices of the ring, shape (k, 3) [m]."""
+    """Return the gradient of ``ring_area`` with respect to the vertices of the ring, shape (k, 3) [m]."""
     x, normal = points[ring], _area_vector(points, ring)
     normal /= np.linalg.norm(normal)
     return 0.5 * np.cross(ahead(x) - behind(x), normal)
 
 
 def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
-    """Triangles around the mean of a contact line that close the body on a wall, `(k, 3, 3)`, outward oriented."""
+    """Return the corners of outward triangles that close the body on a wall, shape (k, 3, 3) [m].
+
+    The triangles form a fan around the mean of the contact line.
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        ring: Vertices of the contact line, shape (k,).
+        plate: Wall of the contact line.
+    """
     x = points[ring]
     after = ahead(x)
     centre = np.broadcast_to(x.mean(axis=0), x.shape)
@@ -150,10 +161,19 @@ def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
 def volume_and_gradient(
     points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]
 ) -> tuple[float, Floats]:
-    """Volume enclosed by the surface and the polygons of the contact lines [m^3], and its gradient `(n, 3)` [m^2].
+    """Return the volume enclosed by the surface and the polygons of the contact lines, and its gradient.
 
-    Divergence theorem: 3 V = integral of x . n over the free surface and over the walls. A wall is where its contact
-    line is: the gradient's part along the wall's normal is the work of the pressure on the wall that moves.
+    Divergence theorem: 3 V = integral of x . n over the free surface and over the walls. A wall has the position of its
+    contact line, so the normal component of the gradient is the work of the pressure on a moving wall.
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Outward triangles of the free surface, shape (t, 3).
+        rings: Vertices of each contact line.
+        plates: Wall of each contact line.
+
+    Returns:
+        Volume [m^3] and its gradient with respect to the points, shape (n, 3) [m^2].
     """
     gradient = np.zeros_like(points)
     volume = _volume_and_gradient(points, triangles, gradient)
@@ -163,7 +183,7 @@ def volume_and_gradient(
 
 
 def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
-    """Centre `(3,)` [m] of the volume in a closed surface, by tetrahedra with the origin."""
+    """Return the centre of the volume in a closed surface, shape (3,) [m], by tetrahedra with the origin."""
     corner = points[triangles]
     volumes = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
     return (volumes @ corner.sum(axis=1)) / (4.0 * volumes.sum())
@@ -171,9 +191,15 @@ def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
 
 @njit(cache=True)
 def surface_flux(points, triangles, velocity):
-    """Volume that each vertex of the surface sweeps in a unit of time, `(k,)` [m^3/s], for `velocity (k, 3)`.
+    """Return the volume rate swept by each vertex of the surface, shape (k,) [m^3/s].
 
-    A third of the area vectors of its triangles times the velocity: over a closed surface the sum is dV/dt.
+    It is a third of the area vectors of the vertex's triangles times its velocity; over a closed surface the sum is
+    dV/dt.
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Outward triangles, shape (t, 3).
+        velocity: Velocities of the first k points, shape (k, 3) [m/s].
     """
     flux = np.zeros(velocity.shape[0])
     for t in range(triangles.shape[0]):
@@ -185,13 +211,13 @@ def surface_flux(points, triangles, velocity):
 
 
 def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]) -> float:
-    """Volume enclosed by the surface and the walls [m^3]."""
+    """Return the volume enclosed by the surface and the walls [m^3]; arguments as for ``volume_and_gradient``."""
     return volume_and_gradient(points, triangles, rings, plates)[0]
 
 
 @njit(cache=True)
 def cotangents(points, triangles):
-    """Cotangent of the angle at each corner of each triangle, `(t, 3)`."""
+    """Return the cotangent of the angle at each corner of each triangle, shape (t, 3)."""
     result = np.empty(triangles.shape)
     for t in range(triangles.shape[0]):
         for k in range(3):
@@ -205,9 +231,9 @@ def cotangents(points, triangles):
 
 
 def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse.csr_matrix:
-    """Stiffness K of the surface Laplacian, `(size, size)`, no unit.
+    """Return the dimensionless stiffness matrix K of the surface Laplacian, shape (size, size).
 
-    Symmetric, positive semidefinite; K x is exactly the gradient of the area of the triangulation
+    K is symmetric and positive semidefinite; K x is exactly the gradient of the area of the triangulation
     (Pinkall & Polthier 1993).
     """
     half = 0.5 * cotangents(points, triangles)
@@ -220,12 +246,17 @@ def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse
 
 
 def area_stiffness(points: Floats, triangles: Indices, count: int) -> sparse.bsr_matrix:
-    """Stiffness `(3 count, 3 count)`, by point, no unit, that stands for the second derivative of the area.
+    """Return a positive approximation of the second derivative of the area, shape (3 count, 3 count), ordered by point.
 
-    A share of `cotangent_laplacian` in all directions, the rest across each triangle. Along a flat surface its area
-    does not resist, at edges it resists in all directions. For swings of a ball at its volume in mode n = 2 the
-    stiffness is 0.99 times the second derivative (1.25 with all directions alone, 0.38 with none), 1.14 for n = 3; for
-    waves of the grid it is 1.
+    A share of ``cotangent_laplacian`` acts in all directions, the rest across each triangle: the area of a flat surface
+    does not resist tangential motion, but edges resist in all directions. For oscillations of a ball at constant volume
+    in mode n = 2, the stiffness is 0.99 times the second derivative (1.25 with the isotropic part alone, 0.38 without
+    it); it is 1.14 times for n = 3 and 1 for waves of the grid.
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        count: Number of points on the surface, which come first.
     """
     starts, columns = _links(triangles, count)
     blocks = _resisting_blocks(points, triangles, 0.5 * cotangents(points, triangles), starts, columns)
@@ -234,7 +265,10 @@ def area_stiffness(points: Floats, triangles: Indices, count: int) -> sparse.bsr
 
 @njit(cache=True)
 def _links(triangles, count):
-    """Points that share a triangle with each of `count` ones, itself too, ascending: starts `(count + 1,)`, columns."""
+    """Return the points that share a triangle with each of ``count`` points, itself included, in ascending order.
+
+    The result has the form of sparse rows: starts, shape (count + 1,), and columns.
+    """
     room = np.ones(count + 1, np.int64)
     room[0] = 0
     for t in range(triangles.shape[0]):
@@ -259,7 +293,7 @@ def _links(triangles, count):
 
 @njit(cache=True)
 def _inserted(values, first, end, value):
-    """Put a value into ascending ones from a first place to an end, if it is not there; return their end."""
+    """Insert a value into the ascending values from ``first`` to ``end`` unless present; return the new end."""
     at = end
     while at > first and values[at - 1] > value:
         at -= 1
@@ -273,7 +307,7 @@ def _inserted(values, first, end, value):
 
 @njit(cache=True)
 def _resisting_blocks(points, triangles, weights, starts, columns):
-    """Blocks `(k, 3, 3)` of such a stiffness at the links of points: the columns of each, ascending."""
+    """Return the blocks of ``area_stiffness`` at the entries (starts, columns) of its sparse rows, shape (k, 3, 3)."""
     blocks, own = np.zeros((columns.shape[0], 3, 3)), np.empty((3, 3))
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])

@@ -2,7 +2,7 @@
 
 A plane of symmetry is a free-slip wall with a contact angle of 90 degrees, where adhesion gives no force. It contains
 the origin, so its contribution to the volume integral of x . n vanishes. Clouds are cut at the planes, particles on a
-plane stay on it, and contact lines are completed by their mirror images. Results are those of the whole body.
+plane stay on it, and contact lines are completed by their mirror images. Results refer to the whole body.
 """
 
 from collections.abc import Sequence

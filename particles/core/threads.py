@@ -1,17 +1,17 @@
-"""Number of threads of loops over particles: with few particles a thread, threads mostly wait for each other."""
+"""Number of threads of loops over particles; with few particles per thread, threads mostly wait for each other."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from numba import get_num_threads, set_num_threads
 
-# Particles that pay for one more thread.
+# Number of particles for which an additional thread reduces the run time.
 PARTICLES_PER_THREAD = 4000
 
 
 @contextmanager
 def threads_for(particles: int) -> Iterator[None]:
-    """Limit the number of threads to what pays for a number of particles, within a ``with`` block."""
+    """Limit the number of threads within a ``with`` block to one per ``PARTICLES_PER_THREAD`` particles."""
     before = get_num_threads()
     set_num_threads(max(1, min(before, particles // PARTICLES_PER_THREAD)))
     try:

@@ -2,7 +2,7 @@
 
 The winding number of a node is the sum of the signed crossings of the surface with the vertical ray above it. It does
 not depend on the nearest triangle, so it stays correct where the surface is folded or sheets of it have crossed, as
-they do for some steps where a narrow groove closes. `on_grid` fills an array; `WindingNumbers` stores only the
+they do for some steps where a narrow groove closes. ``on_grid`` fills an array; ``WindingNumbers`` stores only the
 crossings on a grid without bounds.
 """
 
@@ -34,7 +34,8 @@ def _edge_side(points, a, b, x, y):
 def _crossing(points, a, b, c, column):
     """Return 1, -1 or 0 if the vertical at (x, y) leaves the body through a triangle, enters or misses; and the height.
 
-    The height is limited to that of the triangle: a steep one has hardly any area seen from above, so rounding matters.
+    The height is limited to the range of the triangle: a steep triangle has hardly any area seen from above, so that
+    rounding matters.
     """
     x, y = column
     sign = _edge_side(points, a, b, x, y) + _edge_side(points, b, c, x, y) + _edge_side(points, c, a, x, y)

@@ -129,7 +129,7 @@ def consistent_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_m
 def _unresolved(
     gradient: tuple[sparse.csr_matrix, ...], weights: Floats, average: sparse.csr_matrix
 ) -> sparse.csr_matrix:
-    """Return the integral of the squared pressure gradient less that of its mean at the particles, shape (n, n) [m]."""
+    """Return the integral of the squared pressure gradient not resolved by the particle means, shape (n, n) [m]."""
     share = average @ sparse.diags(weights)
     volumes = np.asarray(share.sum(axis=1)).ravel()
     inverse = sparse.diags(np.divide(1.0, volumes, out=np.zeros_like(volumes), where=volumes > 0.0))

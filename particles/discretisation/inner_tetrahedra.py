@@ -3,7 +3,7 @@
 The boundary of the Delaunay tetrahedra of all particles, less those outside the surface (by winding number), differs
 from the surface where that is not Delaunay itself. The difference is a closed surface, or ends on a wall. Its cone is
 added: tetrahedra from one of its vertices. Some of these are inverted and count negatively, so that the volume and its
-gradient are exactly those of the surface.
+gradient equal the volume within the surface and its gradient exactly.
 """
 
 import numpy as np

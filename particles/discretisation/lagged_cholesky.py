@@ -17,7 +17,7 @@ MAX_ITERATIONS = 500
 # Relative residual above which a solve has failed.
 RESIDUAL_LIMIT = 1e-4
 # Number of iterations above which the factors are renewed. A step takes six iterations with new factors, twelve with
-# those of the last step and twice as many with older ones; new factors cost fifteen iterations with 1331 pressures.
+# the factors of the last step and 24 with older factors; new factors cost fifteen iterations with 1331 pressures.
 MANY_ITERATIONS = 8
 # Number of iterations with old factors after which new ones cost less than to continue.
 TOO_MANY_ITERATIONS = 30

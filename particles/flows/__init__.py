@@ -1,1 +1,1 @@
-"""Scenes of flowing liquids for any particle method: parameters, start, walls, exact flows; start with `flow.py`."""
+"""Scenes of flowing liquids for any particle method: parameters, start, walls, exact flows; start with ``flow.py``."""

@@ -1,8 +1,8 @@
 """Collocated (strong-form) operators by moving least squares with mirrored walls, for eqs 12 to 28 of Hu et al.
 
-With the linear basis, values and derivatives are those of the MLS shape functions (as printed). With the quadratic
-basis particles carry their own values, and derivatives are those of a fitted Taylor expansion. At a wall a scalar is
-even; of a velocity the tangential components are even and the normal one is odd (free slip).
+With the linear basis, MLS shape functions give values and derivatives (as printed). With the quadratic basis particles
+carry their own values, and a fitted Taylor expansion gives the derivatives. At a wall, scalars and tangential
+velocities are even, and normal velocities are odd (free slip).
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 Strong form at the particles by moving least squares, with an explicit pressure of the surface tension on the free
 surface, so that the time step is bound by the capillary limit. Differences from the paper: walls are mirrored (its
 Neumann rows make Krylov solvers fail); the normal viscous stress is part of the pressure on the free surface (without
-it nothing damps an oscillation); and the pressure at a contact line is that of the surface energy, whose natural
+it nothing damps an oscillation); and the pressure at a contact line derives from the surface energy, whose natural
 condition is the contact angle (overwriting the normal is less accurate).
 
 The scheme is kept for comparison. It loses volume in each step, which the flow restores. With the quadratic basis a

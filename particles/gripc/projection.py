@@ -1,7 +1,7 @@
 """Projection of the printed ISPG scheme, in strong form.
 
 Velocity prediction (Hu et al., eqs 3 and 12 to 17), rotational pressure correction (eqs 5 to 7 and 20 to 24), and the
-momentum-consistent smoothing of velocities (eqs 27 to 29), which dissipates what the approximation cannot resolve.
+momentum-consistent smoothing of velocities (eqs 27 to 29), which dissipates unresolved velocities.
 """
 
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ class Material:
 def predict_velocity(operators: Operators, material: Material, velocity: Floats, slope: Floats, basis: str) -> Floats:
     """Solve rho/dt (v* - v) = mu lap v* - grad p at the particles for the coefficients of v*, shape (3 n,) [m/s].
 
-    The printed weak form tests this with as many functions as it has integration points (direct nodal integration), so
-    that a square matrix N^T m on both sides cancels. The stress on the free surface enters by its pressure only.
+    The printed weak form has one test function per integration point (direct nodal integration), so that a square
+    matrix N^T m on both sides cancels. The stress on the free surface enters by its pressure only.
 
     Args:
         operators: Operators at the particles.

@@ -28,7 +28,7 @@ from reflowshock.particles.surface.edge_changes import NewSurface, collapse_shor
 # In spacings. Halves of a split edge are far from collapsing, and diagonals of a cube's faces, 1.41, are not split.
 LONGEST_EDGE, SHORTEST_EDGE = 1.6, 0.4
 GAP, NEAREST = 1.5, 0.2
-# Radius without a particle that makes a gap. The centre of a cubic lattice cell, 0.87 from the corners, is no gap.
+# Radius of an empty ball that counts as a gap; the centre of a cubic lattice cell is only 0.87 from the corners.
 EMPTY = 0.95
 # Largest distance of the particles on either side of a gap, over twice ``EMPTY``.
 WIDEST_GAP = 1.2

@@ -11,14 +11,14 @@ except for friction, B the rates of the nodal volumes and g the required rates. 
 - Surface tension and pressure act together through m/dt + dt K. With a pressure that accelerates the masses alone
   (eq 25), tension lags by dt^3 K m^-1 grad dp/dt, and oscillations grow, the more the finer the particles.
 - Friction acts on a velocity already accelerated by balanced forces (m a). Under new forces and the old pressure that
-  velocity would be rough, and S would dissipate a multiple of what it should.
+  velocity would be rough, and S would dissipate several times too much.
 - N gives gradients, and the velocity N v that slips on walls with friction, so that wall stress also reaches the
   particles next to the wall. Moving particles with N v and applying forces as N^T f (eqs 12, 27) hides zigzag modes of
   the surface: N reduces them to a thousandth, they hardly decay, and the drop is not at rest at its least energy.
-- Masses are those of the mean of the nodal volumes V and N^T V. A linear pressure pushes a surface particle with 1.3
+- Masses follow from the mean of the nodal volumes V and N^T V. A linear pressure pushes a surface particle with 1.3
   and 0.9 times these two; masses of V alone roughen the velocity.
-- B has a row V_I div for every particle, those on the free surface included. What nodal integration misses of the rate
-  of the enclosed volume is distributed over all rows, so that a uniform pressure balances a surface at rest exactly.
+- B has a row V_I div for every particle, those on the free surface included. The difference to the rate of the
+  enclosed volume is distributed over all rows, so that a uniform pressure balances a surface at rest exactly.
 - B^T p is the pressure gradient integrated by parts: with forces that derive from an energy, no mode of the linearised
   scheme grows. The collocated gradient (eq 17) has growing modes at any time step.
 
@@ -97,7 +97,7 @@ class GalerkinEquations:
         drag: Friction coefficients of the particles on walls, shape (n,) [kg/s].
         inertia: Factored effective mass m / dt + dt K.
         walls: Wall velocities at the particles on them, zero elsewhere, shape (n, 3) [m/s].
-        unbalanced: Gradient of the enclosed volume less that of the sum of nodal volumes, shape (n, 3) [m^2].
+        unbalanced: Gradient of the enclosed volume minus the gradient of the sum of nodal volumes, shape (n, 3) [m^2].
         spacing: Particle spacing [m].
         time_step: Time step of the equivalent backward Euler step [s].
     """

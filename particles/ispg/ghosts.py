@@ -85,8 +85,8 @@ def mirror(
     """Mirror the particles near each plate, plate by plate.
 
     Ghosts of earlier plates are mirrored, too, so that an edge between two plates at right angles has images of both.
-    Tangential velocities at the ghost are (b - z) / (b + z) times those of the particle, with the slip length b and the
-    height z above the plate: a linear shear flow at rest at a depth b is continued exactly.
+    The tangential velocity of a ghost is (b - z) / (b + z) times that velocity of its particle, with the slip length b
+    and the height z above the plate: a linear shear flow at rest at a depth b is continued exactly.
 
     Args:
         points: Particle positions, shape (n, 3) [m].

@@ -112,7 +112,7 @@ def transfer_motion(new: Sequence[MovingBody], old: Sequence[MovingBody]) -> Non
 
 
 def _plate_twists(body: Body, old: Sequence[MovingBody]) -> dict[int, Floats]:
-    """Return the twist of each plate of a body: that of the plate of an old body on the same side."""
+    """Return the twist of each plate of a body, taken from the plate of an old body on the same side."""
     moving = {part.body.plates[wall].side: twist for part in old for wall, twist in part.state.plate_twists.items()}
     return {wall: moving[plate.side] for wall, plate in enumerate(body.plates) if plate.side in moving}
 

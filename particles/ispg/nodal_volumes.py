@@ -1,10 +1,10 @@
 """Nodal volumes: weights of direct nodal integration and volumes of masses, fitted to the moments of the body.
 
 The cell of a particle follows from the particle density around it, halved on the free surface and on a wall. These
-volumes v know the shape of the liquid only roughly. They become v exp(q), with a quadratic polynomial q, so that sums
-over the particles of 1 and x equal the integrals over the enclosed body exactly, and those of x x nearly. Of all
+volumes v approximate the shape of the liquid only roughly. They become v exp(q), with a quadratic polynomial q, so that
+sums over the particles of 1 and x equal the integrals over the enclosed body exactly, and sums of x x nearly. Among all
 positive volumes they minimise the relative entropy to v over the volume V, plus |missing x x / (V h^2)|^2 /
-(2 softness). With exact second moments, surface particles of a film of one or two spacings would get next to no mass
+(2 softness). With exact second moments, surface particles of a film of one or two spacings would get almost no mass
 (cells at z = 0 and h have three times the moment of a film of thickness h) and be ejected from the liquid.
 """
 

@@ -1,15 +1,14 @@
 """Normal forces of the surface, for walls with friction.
 
 Uniform tension pulls a surface along its normals and its contact line across it. The energy gradient of a triangulated
-surface also has a tangential part, which moves vertices back from where mesh smoothing has taken them. Mesh smoothing
-feels no wall friction and the way back does, so that with asymmetric triangles a drop creeps along its wall at 1e-3
+surface also has a tangential part, which reverses the displacements of mesh smoothing. Wall friction acts on this
+reverse motion but not on mesh smoothing, so that with asymmetric triangles a drop creeps along its wall at 1e-3
 spacings per step. Without friction, conservation of momentum forbids this, and the forces stay an energy gradient.
 
 Fast stretching needs the tangential part: without it triangles collapse when a cube of 11 particles per edge spreads to
 60 degrees. Its share grows with the strain of the liquid within a period of the grid's waves and vanishes at rest.
 
-The net force and moment are unchanged: those of the removed part are replaced by a pressure-like normal force and a
-swirl.
+The net force and moment are unchanged: a pressure-like normal force and a swirl compensate the removed part.
 """
 
 from dataclasses import replace

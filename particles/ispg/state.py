@@ -149,7 +149,7 @@ class GalerkinState:
         """Return the state with its velocity corrected to the momenta of the last step.
 
         Particle shifting and new masses change the momenta; uncorrected, a drop would slide on a frictionless wall.
-        Lever arms are those of the predicted positions, where the forces are evaluated: the forces have no moment about
+        Lever arms refer to the predicted positions, where the forces are evaluated: the forces have no moment about
         these only.
 
         Args:

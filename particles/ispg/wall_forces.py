@@ -19,7 +19,7 @@ class StepSolution:
     """Solution of the equations of a step.
 
     Attributes:
-        force: Force of the surface, including that of the tension along the prediction, shape (n, 3) [N].
+        force: Surface force, including the surface tension along the prediction, shape (n, 3) [N].
         start: Velocity at the start of the equivalent backward Euler step, shape (n, 3) [m/s].
         after_friction: Velocity after the friction solve, shape (n, 3) [m/s].
         mean: Mean velocity of the step, shape (n, 3) [m/s].

@@ -99,7 +99,7 @@ class LiquidEffect(Effect[LiquidScene]):
         without_wall: Reason why the effect is off without a wall.
         is_axisymmetric: Whether a drop keeps its axis and its planes of symmetry. Otherwise it has no Young-Laplace
             reference and cannot be computed in part or in section.
-        section_implementation: Dotted name of the ``Acting`` class for a drop in section; by default ``implementation``.
+        section_implementation: Dotted name of the ``Acting`` class for a drop in section, if it is another one.
         is_measured: Whether ``benchmarks/effects.py`` measures the cost of the effect per step.
     """
 

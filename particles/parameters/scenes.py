@@ -1,6 +1,6 @@
 """Parameters (SI) of scenes with liquid solder alone: a drop, a joint, two drops, a free oscillating drop.
 
-A scene is resolved into the `Solder` and the geometry for the solvers.
+A scene is resolved into the ``Solder`` and the geometry for the solvers.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""Printed parts: drops of ink by delta-SPH that land one after the other and cure. Start with `printing.py`."""
+"""Printed parts: drops of ink by delta-SPH that land one after the other and cure. Start with ``printing.py``."""

@@ -61,14 +61,14 @@ class Deposit:
     Attributes:
         scene: Printing parameters.
         fields: Fields of all particles, in the order of landing.
-        state: State of each particle, `LIQUID`, `HELD` or `SOLID`, shape (n,).
+        state: State of each particle, ``LIQUID``, ``HELD`` or ``SOLID``, shape (n,).
         dose: Light dose of each particle, shape (n,) [J/m^2].
         enthalpy: Specific enthalpy of each particle, zero in the solid at the melting point, shape (n,) [J/kg].
         drop: Number of each particle's drop, shape (n,).
         bodies: Solid bodies, in the order in which they became solid.
         ground: Distance to the solid bodies, on a grid around the whole print.
         surface: Surface of the bodies that have liquid; empty if all ink is solid.
-        simulation: Simulation of liquid and held particles; None if there is no liquid.
+        simulation: Simulation of liquid and held particles; None if all ink is solid.
         order: Number of each particle of the simulation.
         heat: Heat of the particles of the simulation; None without freezing.
         time: Time [s].
@@ -116,7 +116,7 @@ class Deposit:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.fields, self.state, self.order = Fields(**saved["fields"]), saved["state"], saved["order"]
         self.dose, self.drop, self.time = saved["dose"], saved["drop"], saved["time"]
         self.enthalpy, self.spray = saved["enthalpy"], saved["spray"]
@@ -142,12 +142,12 @@ class Deposit:
 
     @property
     def points(self) -> Floats:
-        """Positions of all particles at the last `update`, shape (n, 3) [m]."""
+        """Positions of all particles at the last ``update``, shape (n, 3) [m]."""
         return np.stack(self.fields[:3], axis=1)
 
     @property
     def pressures(self) -> Floats:
-        """Pressure of all particles, that of the surface included, shape (n,) [Pa]; zero if held or solid."""
+        """Pressure of all particles including the surface pressure, shape (n,) [Pa]; zero if held or solid."""
         return np.where(self.state == LIQUID, self.fields.pressure + self.surface.pressure, 0.0)
 
     def add_drop(self, position: tuple[float, float]) -> None:
@@ -265,7 +265,7 @@ class Deposit:
         return cure.intensity * np.exp(-(top - points[particles, 2]) / cure.depth)
 
     def cure(self) -> bool:
-        """Hold cured or frozen particles and make bodies without liquid solid; return whether any particle changed."""
+        """Fix cured or frozen particles, and solidify bodies without liquid; return whether any particle changed."""
         self.update()
         cured = self.state == LIQUID
         if self.heat:

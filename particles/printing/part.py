@@ -58,7 +58,7 @@ class Part:
         triangles: Outward oriented triangles, shape (t, 3).
         x: Coordinates of the rows of the height map, shape (i,) [m].
         y: Coordinates of its columns, shape (j,) [m].
-        heights: Height map above the plate, shape (i, j) [m]; 0 where there is no ink.
+        heights: Height map above the plate, shape (i, j) [m]; 0 where the plate is bare.
         layers: Layers from the plate upwards.
         voids: Volume of each void, shape (k,) [m^3].
     """

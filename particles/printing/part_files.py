@@ -8,14 +8,14 @@ import numpy as np
 from reflowshock.particles.printing.part import Part
 
 LAYERS = "layer,drops,parts_of_layer,parts_so_far,mean_top_um,height_um,roughness_sa_um,roughness_sz_um,volume_pl,voids"
-# Factors from SI units to those of the columns.
+# Factors from SI units to the units of the columns.
 FACTORS = np.array([1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 1e6, 1e6, 1e15, 1.0])
 
 
 def write_part(folder: Path, part: Part) -> None:
-    """Write `part.stl` [mm], `height_map.npy` [m], `height_map.csv` [um] and `layers.csv` [um, pL].
+    """Write ``part.stl`` [mm], ``height_map.npy`` [m], ``height_map.csv`` [um] and ``layers.csv`` [um, pL].
 
-    The first row of `height_map.csv` has y, its first column x; `height_map.npy` has one row for each x.
+    The first row of ``height_map.csv`` has y, its first column x; ``height_map.npy`` has one row for each x.
 
     Args:
         folder: Folder of the files.

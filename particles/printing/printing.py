@@ -68,7 +68,7 @@ class PrintRun:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.deposit.restore(saved["deposit"])
         self.rows, self.pictures = [tuple(row) for row in saved["rows"].tolist()], saved["pictures"]
         for name, value in saved["numbers"].items():
@@ -83,8 +83,8 @@ def solve_printing(
 ) -> tuple[FlowResult, Part]:
     """Print a part.
 
-    The metric `spray_share` is the largest share of the liquid present at one time that was outside its surface, so it
-    also detects one drop that splashes among many.
+    The metric ``spray_share`` is the largest share of the liquid present at one time that was outside its surface, so
+    it also detects one drop that splashes among many.
 
     Args:
         scene: Printing parameters.
@@ -181,7 +181,7 @@ def _sample(run: PrintRun) -> None:
 
 
 def _picture(run: PrintRun, scene: Printing) -> None:
-    """Store the present particles, after about `PICTURES` of the drops."""
+    """Store the present particles, after about ``PICTURES`` of the drops."""
     deposit, count = run.deposit, len(run.pictures)
     if run.landed * PICTURES < (count + 1) * scene.drops or count >= min(run.landed, PICTURES):
         return

@@ -1,1 +1,1 @@
-"""Joints and drops from their start to rest; start with `reflow.py`."""
+"""Joints and drops from their start to rest; start with ``reflow.py``."""

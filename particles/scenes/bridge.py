@@ -1,8 +1,8 @@
-"""Joints of an array that touch: wider at rest than their distance, so two of them flow into one body on four pads.
+"""Solder bridges: two joints of an array that touch merge into one body on four pads.
 
-Each joint of an array flows alone. Two touch where their mean width reaches the distance of their axes: both are then
-``bridged``, and the pair that overlaps most is flowed on as one body for the report. A joint that never spans its gap
-ends as a drop on the board, one whose neck collapses as a drop on each pad (``rebuild``): both are ``open``.
+Each joint of an array is computed alone. Two joints touch if their mean width reaches the distance of their axes; both
+are then ``bridged``, and the pair with the largest overlap is computed on as one body for the report. A joint that
+never spans its gap ends as a drop on the board, one whose neck collapses as a drop on each pad: both are ``open``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,20 +32,22 @@ SPACINGS_IN_GAP = 4
 def solve_bridge(
     geometries: Sequence[JointGeometry], shapes: Sequence[JointShape], distance: float, solder: Solder
 ) -> JointShape:
-    """Let two joints that touch flow into one and come to rest.
+    """Merge two joints that touch and compute the common body at rest.
 
-    The particles are as coarse as a quarter of the gap. Where the gaps differ, both joints get their mean.
+    The particle spacing is at least a quarter of the gap. Both joints get the mean of their gaps.
 
     Args:
-        geometries: of both joints, coaxial.
-        shapes: both joints at rest by themselves.
-        distance: of their axes, along x [m].
-        solder: of one joint.
+        geometries: Geometries of both joints, coaxial.
+        shapes: Shapes of both joints at rest alone.
+        distance: Distance of their axes along x [m].
+        solder: Solder of one joint.
 
     Returns:
-        The common body at rest, its origin midway between the axes; verdict "bridged".
+        Common body at rest, with the verdict "bridged"; its origin is midway between the axes.
 
-    Raises: as `run_drops`.
+    Raises:
+        NotAtRest: The body is not at rest after ``solder.numerics.max_steps``.
+        CannotRebuild: The surfaces cannot be merged.
     """
     both = solder.model_copy(update={"volume": 2.0 * solder.volume})
     effects = switched(decide_effects(geometries[0], solder))
@@ -66,7 +68,7 @@ def solve_bridge(
 def placed_joints(
     geometries: Sequence[JointGeometry], shapes: Sequence[JointShape], distance: float, solder: Solder
 ) -> list[Body]:
-    """Two joints at rest, each in its place between plates that have the pads of both; arguments as above."""
+    """Return two joints at rest between plates with the pads of both; arguments as for ``solve_bridge``."""
     gap = float(np.mean([geometry.gap for geometry in geometries]))
     spacing = max(solder.numerics.spacing, gap / SPACINGS_IN_GAP)
     walls, centres = _walls(geometries, distance, gap, solder.pad_contact_angle), (-0.5 * distance, 0.5 * distance)
@@ -74,7 +76,7 @@ def placed_joints(
 
 
 def _walls(geometries: Sequence[JointGeometry], distance: float, gap: float, pad_angle: float) -> tuple[Plate, Plate]:
-    """Board and package, each with the pads of both joints."""
+    """Return board and package, each with the pads of both joints."""
     centres = ((-0.5 * distance, 0.0), (0.5 * distance, 0.0))
     radii = zip(*((geometry.radius_board, geometry.radius_package) for geometry in geometries), strict=True)
     board, package = [
@@ -100,9 +102,10 @@ class Contact:
     """Two joints that touch.
 
     Attributes:
-        first, second: their names, in the order of the array; equal where a joint touches its own mirror image.
-        distance: of their axes [m].
-        overlap: mean of their widths, less the distance [m].
+        first: Name of the first joint in the order of the array.
+        second: Name of the second joint; equal to the first if a joint touches its own mirror image.
+        distance: Distance of their axes [m].
+        overlap: Mean of their widths minus the distance [m].
     """
 
     first: str
@@ -112,33 +115,33 @@ class Contact:
 
 
 def contacts(places: Mapping[str, tuple[float, float]], widths: Mapping[str, float], mirrored: bool) -> list[Contact]:
-    """Find the joints that touch each other, the largest overlap first.
+    """Find the joints that touch each other; the largest overlap comes first.
 
     Args:
-        places: name of a joint to x and y of its axis [m].
-        widths: name of a joint to its largest width at rest, alone [m].
-        mirrored: whether x = 0 and y = 0 are planes of symmetry, beyond which the images of the joints are.
+        places: Name of a joint -> x and y of its axis [m].
+        widths: Name of a joint -> largest width of the joint at rest alone [m].
+        mirrored: Whether x = 0 and y = 0 are planes of symmetry, whose mirror images of the joints count, too.
     """
     names = list(places)
     points = np.array([places[name] for name in names])
     images = [points * sign for sign in ((1, 1), (-1, 1), (1, -1), (-1, -1))] if mirrored else [points]
     width = np.array([widths[name] for name in names])
-    found: dict[tuple[int, int], Contact] = {}
+    largest: dict[tuple[int, int], Contact] = {}
     for image in images:
         for i, near in enumerate(cKDTree(image).query_ball_point(points, width.max())):
             for j in near:
                 distance = float(np.linalg.norm(points[i] - image[j]))
                 overlap = float(0.5 * (width[i] + width[j])) - distance
-                known = found.get((i, j))
-                if i <= j and distance > 0.0 and overlap >= 0.0 and (known is None or known.overlap < overlap):
-                    found[i, j] = Contact(names[i], names[j], distance, overlap)
-    return sorted(found.values(), key=lambda contact: -contact.overlap)
+                other = largest.get((i, j))
+                if i <= j and distance > 0.0 and overlap >= 0.0 and (other is None or other.overlap < overlap):
+                    largest[i, j] = Contact(names[i], names[j], distance, overlap)
+    return sorted(largest.values(), key=lambda contact: -contact.overlap)
 
 
-def neighbours(found: Sequence[Contact]) -> dict[str, list[str]]:
-    """Name of each joint that touches another, to the names of those that it touches, in order."""
+def neighbours(pairs: Sequence[Contact]) -> dict[str, list[str]]:
+    """Return the name of each joint that touches another -> sorted names of the joints that it touches."""
     result: dict[str, set[str]] = {}
-    for contact in found:
+    for contact in pairs:
         result.setdefault(contact.first, set()).add(contact.second)
         result.setdefault(contact.second, set()).add(contact.first)
     return {name: sorted(others) for name, others in sorted(result.items())}

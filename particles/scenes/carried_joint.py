@@ -161,7 +161,7 @@ def _joined(first: Run, last: Run) -> Run:
 def stiffness_estimate(geometry: JointGeometry, solder: Solder) -> NDArray[np.float64]:
     """Estimate the derivative of the solder's wrench on the package pad with respect to the motion of a level package.
 
-    The axial stiffness is exact for the Young-Laplace joint. The lateral stiffness pi a gamma / h is that of a cylinder
+    The axial stiffness is exact for the Young-Laplace joint. The lateral stiffness pi a gamma / h belongs to a cylinder
     with the radius a of the pad and the height h of the gap, whose sections remain discs. The tilt stiffness follows
     from the axial stiffness distributed over the pad.
 

@@ -1,6 +1,6 @@
-"""A drop of its own brought to rest: free, on a uniform wall with or without hysteresis, or on a pad in the mask.
+"""Single drop at rest: free, on a uniform wall with or without hysteresis, or on a pad in the mask.
 
-It starts as a cube; or as a sphere that has just touched the wall and flies on.
+The drop starts as a cube, or for an impact as a sphere that touches the wall.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,12 +30,18 @@ from reflowshock.particles.surface.profile import width
 ANGLE_OF_CUBE = 0.5 * np.pi
 # Contact angle of the initial cap of an impact: at 160 degrees particles slip out between surface and wall.
 TOUCHING_ANGLE = float(np.radians(155.0))
-TOUCHING_STEP = 100.0  # capillary limits, while it takes this shape
+TOUCHING_STEP = 100.0  # time step that deforms the cube to this cap, in capillary limits
 
 
 @dataclass(frozen=True, slots=True)
 class DropAtRest:
-    """A drop at rest, the effects that acted, and its exact meridian where there is one."""
+    """Drop at rest.
+
+    Attributes:
+        shape: Particles, surface, history and metrics.
+        effects: Decision on each effect.
+        reference: Exact meridian; None if the drop has none.
+    """
 
     shape: JointShape
     effects: Mapping[str, Decision]
@@ -48,22 +54,23 @@ def drop_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> DropAtRest:
-    """Let a cube of liquid flow until it is at rest.
+    """Compute a drop at rest and compare it with its exact shape.
 
     Args:
-        drop: volume, wall and resolution.
-        solder: the same volume, fluid and process.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        drop: Volume, wall, resolution and initial motion.
+        solder: Fluid and process, with the volume of the drop.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
     Raises:
-        NotAtRest: no rest within `solder.numerics.max_steps`.
-        SolveFailed: a linear solve failed.
+        NotAtRest: The drop is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
     effects = decide_drop(solder, drop.is_free)
     flow, run = flow_to_rest(drop, solder, progress, checkpoint)
-    stands = drop.hysteresis is not None and effects["inertia"]["on"]  # a swing ends anywhere between both angles
-    is_known = drop.is_free or (effects["wall_adhesion"]["on"] and not stands)
+    # With hysteresis an oscillation ends at any angle between the receding and the advancing one.
+    is_arbitrary = drop.hysteresis is not None and effects["inertia"]["on"]
+    is_known = drop.is_free or (effects["wall_adhesion"]["on"] and not is_arbitrary)
     weight = reference_weight(solder, effects)
     reference = _reference(drop, solder, weight) if is_known and weight is not None else None
     metrics = body_metrics(solder, reference, flow, run)
@@ -95,7 +102,7 @@ def flow_to_rest(
 
 
 def _rule(drop: Drop, cloud: Cloud, solder: Solder) -> StopRule:
-    """When it is at rest: it swings as the cap that it becomes, unless an edge or friction holds its contact line."""
+    """Return the stop rule: a drop oscillates as the cap at rest, unless an edge or friction holds its contact line."""
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.is_free:
         return stop_rule(cloud, solder, acting, None)
@@ -115,7 +122,7 @@ def _touching(cloud: Cloud, solder: Solder) -> Cloud:
 
 
 def _spread(drop: Drop, run: Run) -> Metrics:
-    """Largest width of a drop that strikes a wall over its diameter, and when it has it."""
+    """Return the largest width of an impacting drop over its diameter, and its time."""
     if drop.speed is None:
         return {}
     widths = [width(snapshot.points) for snapshot in run.snapshots]
@@ -133,7 +140,7 @@ def _contact_lines(drop: Drop, solder: Solder, cloud: Cloud) -> tuple[ContactLin
 
 
 def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:
-    """Exact meridian; with hysteresis where all of the line advances, since a cube stands at 90 degrees."""
+    """Return the exact meridian; with hysteresis only if the line advances from the 90 degrees of the cube."""
     if drop.is_free:
         return sphere_meridian(solder.volume, solder.surface_tension)
     if drop.section == "plane":
@@ -146,7 +153,7 @@ def _reference(drop: Drop, solder: Solder, weight: float) -> Meridian | None:
 
 
 def _excess(drop: Drop, metrics: Metrics) -> Metrics:
-    """How far contact angles lie outside those at which a line with hysteresis stands [deg]."""
+    """Return the largest excess of contact angles beyond the receding and advancing angles [deg]."""
     if drop.hysteresis is None:
         return {}
     receding, advancing = np.degrees(drop.hysteresis)

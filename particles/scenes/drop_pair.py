@@ -1,4 +1,4 @@
-"""Two drops side by side: from their start to rest as one drop or two, against exact shapes."""
+"""Two drops side by side that come to rest apart or merged, compared with exact shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +27,13 @@ WORST = ("_error", "_drift", "_scatter", "_at_rest")
 
 @dataclass(frozen=True, slots=True)
 class PairAtRest:
-    """Both drops at rest as one shape, the effects that acted, and the exact meridian of the one they became."""
+    """Two drops at rest.
+
+    Attributes:
+        shape: Both drops, or the merged drop, as one shape.
+        effects: Decision on each effect.
+        reference: Exact meridian of the merged drop; None if the drops are apart.
+    """
 
     shape: JointShape
     effects: Mapping[str, Decision]
@@ -40,17 +46,17 @@ def pair_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> PairAtRest:
-    """Let two drops flow until they, or the one that they became, are at rest.
+    """Compute two drops, or the drop into which they merge, at rest.
 
     Args:
-        scene: volumes, place, wall and resolution.
-        solder: their fluid and process.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        scene: Volumes, distance, wall and resolution.
+        solder: Fluid and process.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
     Raises:
-        NotAtRest: a drop is not at rest within `solder.numerics.max_steps`.
-        SolveFailed: a linear solve failed.
+        NotAtRest: A drop is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
     effects = decide_drop(solder, scene.is_free)
     acting = switched(effects)
@@ -67,10 +73,10 @@ def pair_to_rest(
 
 
 def start_clouds(scene: Drops) -> list[Cloud]:
-    """Clouds of both drops, side by side along x with their common centre of volume at x = 0."""
+    """Return the clouds of both drops, side by side along x with their common centre of volume at x = 0."""
     share = scene.volume_left / scene.volume
-    places = (-(1.0 - share) * scene.distance, share * scene.distance)
-    return [_moved(_cloud(scene, volume), x) for volume, x in zip(scene.volumes, places, strict=True)]
+    centres = (-(1.0 - share) * scene.distance, share * scene.distance)
+    return [_moved(_cloud(scene, volume), x) for volume, x in zip(scene.volumes, centres, strict=True)]
 
 
 def _cloud(scene: Drops, volume: float) -> Cloud:
@@ -92,26 +98,26 @@ def _start(solder: Solder, acting: Mapping[str, bool], cloud: Cloud) -> LiquidFl
 
 
 def _volume(scene: Drops, drop: MovingDrop) -> float:
-    """Volume that a drop is made of [m^3]."""
+    """Return the volume of the initial drops that merged into a drop [m^3]."""
     return sum(scene.volumes[origin] for origin in drop.origins)
 
 
 def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], drop: MovingDrop) -> Meridian | None:
-    """Exact meridian of one of the drops that are left."""
+    """Return the exact meridian of one of the remaining drops."""
     volume = _volume(scene, drop)
     if scene.is_free:
         return sphere_meridian(volume, solder.surface_tension)
-    own = solder.model_copy(update={"volume": volume})
-    return reference_drop(own, inf, reference_weight(solder, effects))
+    drop_solder = solder.model_copy(update={"volume": volume})
+    return reference_drop(drop_solder, inf, reference_weight(solder, effects))
 
 
 def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Meridian | None) -> Metrics:
-    """Numbers of one of the drops that are left; of a sphere also the largest error of a radius."""
+    """Return the metrics of one of the remaining drops, for a sphere with the largest relative error of a radius."""
     body = drop.flow.body
     profile = fit_profile(body.points, body.triangles, body.span())
     run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds, calm=drop.calm, at_rest=drop.at_rest)
-    own = solder.model_copy(update={"volume": _volume(scene, drop)})
-    metrics = body_metrics(own, reference, drop.flow, run)
+    drop_solder = solder.model_copy(update={"volume": _volume(scene, drop)})
+    metrics = body_metrics(drop_solder, reference, drop.flow, run)
     if not scene.is_free or reference is None:
         return metrics
     surface = body.points[: body.cloud.surface_count]
@@ -120,7 +126,7 @@ def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Mer
 
 
 def _worst(results: Sequence[Metrics]) -> Metrics:
-    """Numbers of the first drop, but the largest error of all."""
+    """Return the metrics of the first drop, with the largest errors of all drops."""
     worst = dict(results[0])
     for name, (_, unit) in worst.items():
         if name.endswith(WORST):
@@ -163,7 +169,7 @@ def _now(drop: MovingDrop) -> Snapshot:
 
 
 def _side_by_side(states: Sequence[Snapshot]) -> Snapshot:
-    """States of several drops as one."""
+    """Combine the snapshots of several drops into one."""
     triangles = shifted_indices([state.triangles for state in states], [len(state.points) for state in states])
     points = np.concatenate([state.points for state in states])
     return Snapshot(max(state.time for state in states), points, np.concatenate(triangles))

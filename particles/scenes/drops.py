@@ -1,6 +1,6 @@
-"""Several drops: each flows by itself until it is at rest; two that touch become one, collapsed ones are rebuilt.
+"""Several drops that flow until they are at rest: drops that touch merge, and collapsed drops are remeshed.
 
-Drops that overlap before anything has flowed are an error.
+Drops that overlap at the start are an error.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,22 +21,22 @@ LARGEST_OVERLAP = 0.5  # spacings
 
 
 class OverlappingDrops(ValueError):
-    """Drops that are in the same place before anything has flowed."""
+    """Drops that overlap at the start."""
 
 
 @dataclass(slots=True, eq=False)
 class MovingDrop:
-    """A drop on its way to rest.
+    """Drop that flows until it is at rest.
 
     Attributes:
-        flow: the flow.
-        origins: numbers of the first drops that it is made of.
-        first: how it was when it was made.
-        parents: the drops that became this one, as they were when they touched.
-        records: its steps since it was made.
-        calm: its last steps that hardly moved it.
-        at_rest: whether it is at rest.
-        seconds: wall time of its steps [s].
+        flow: Flow of the drop.
+        origins: Numbers of the initial drops that merged into this one.
+        first: Particles and surface of the drop at its start.
+        parents: Drops that merged into this one, in their state at contact; empty for an initial drop.
+        records: Records of its steps since its start.
+        calm: Number of its last consecutive steps with hardly any motion.
+        at_rest: Whether the drop is at rest.
+        seconds: Wall time of its steps [s].
     """
 
     flow: LiquidFlow
@@ -50,12 +50,12 @@ class MovingDrop:
 
     @classmethod
     def made(cls, flow: LiquidFlow, origins: tuple[int, ...], parents: tuple["MovingDrop", ...] = ()) -> "MovingDrop":
-        """Make a drop of a flow that has not moved yet."""
+        """Return the drop of a flow that has not moved yet."""
         first = Snapshot(flow.time, flow.body.points.copy(), flow.body.triangles.copy())
         return cls(flow, origins, first, parents)
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state for a checkpoint."""
         return fields_of(self) | {
             "flow": self.flow.saved(),
             "parents": [parent.saved() for parent in self.parents],
@@ -64,7 +64,7 @@ class MovingDrop:
 
     @classmethod
     def restored(cls, saved: Mapping[str, Any], start: Callable[[Body], LiquidFlow]) -> "MovingDrop":
-        """Make it again of what `saved` returned; `start` as for `run_drops`."""
+        """Return the drop restored from the data of ``saved``; ``start`` is as for ``run_drops``."""
         flow = start(Body.at_rest(saved["flow"]["body"].cloud))
         flow.restore(saved["flow"])
         parents = tuple(cls.restored(parent, start) for parent in saved["parents"])
@@ -80,7 +80,7 @@ class MovingDrop:
         self.at_rest = is_lasting(self.records, self.calm, rule)
 
     def moves(self, rule: StopRule) -> bool:
-        """Whether it is neither at rest nor at the end of the process."""
+        """Return whether the drop is neither at rest nor at the end of the process."""
         return not self.at_rest and self.flow.time < rule.end_time
 
 
@@ -91,22 +91,22 @@ def run_drops(
     checkpoint: Checkpoint | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[MovingDrop]:
-    """Let drops flow until all are at rest; the one that is behind in time goes first.
+    """Compute the flow of drops until all are at rest; the drop with the earliest time advances first.
 
     Args:
-        flows: a flow a drop, advanced in place.
-        rule: when a drop is at rest.
-        start: makes the flow of a body that two drops became.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
-        progress: called with the fraction done of the drop that has most to do.
+        flows: Flow of each drop, advanced in place.
+        rule: Rule that ends the flow of a drop.
+        start: Function of a body that returns its flow, for merged and remeshed drops.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
+        progress: Function called with the fraction done, 0 to 1, of the drop with most left to do.
 
     Returns:
-        The drops that are left.
+        The remaining drops at rest.
 
     Raises:
-        OverlappingDrops: drops overlap at the start: they cannot both have their volume.
-        NotAtRest: a drop took too many steps.
-        CannotRebuild: drops touch, or one collapses, between walls.
+        OverlappingDrops: Drops overlap at the start, so that they cannot both have their volume.
+        NotAtRest: A drop is not at rest after the steps of the rule.
+        CannotRebuild: Drops that touch, or a drop that collapses, cannot be remeshed on their walls.
     """
     saved = checkpoint.read(RECORDS) if checkpoint else None
     drops = [MovingDrop.restored(drop, start) for drop in saved or []] or _merge_touching(_apart(flows), start)
@@ -139,7 +139,7 @@ def _apart(flows: Sequence[LiquidFlow]) -> list[MovingDrop]:
 
 
 def _restarted(start: Callable[[Body], LiquidFlow], *drops: MovingDrop) -> LiquidFlow:
-    """Flow of the body that drops become, from the time of the latest, with their momentum; steps are counted on."""
+    """Return the flow of the body into which drops merge, with their momentum and the latest of their times."""
     old = [drop.flow for drop in drops]
     body = rebuild(*(flow.body for flow in old))
     flow = start(body)

@@ -1,4 +1,4 @@
-"""A free drop with inertia: at rest (Laplace pressure) or oscillating in its second mode (Rayleigh)."""
+"""Free drop with inertia: at rest (Laplace pressure) or oscillating in its second mode (Rayleigh)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,27 +39,28 @@ METRICS = (
     "particle_steps_per_second",
 )
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
-# Ways to the rest of the polyhedron, whose vertices are not quite on a sphere; the step in radians of the second mode.
+# Steps that relax the initial polyhedron, whose vertices at rest are not exactly on a sphere; the size of a step is in
+# radians of the second mode.
 SETTLING_STEP, SETTLING_STEPS = 3.0, 10
 SNAPSHOTS_PER_PERIOD = 8
-RECORDS = (*FLOW_RECORDS, Snapshot)  # that a swing consists of in a checkpoint
+RECORDS = (*FLOW_RECORDS, Snapshot)  # dataclasses in a checkpoint of an oscillation
 SECOND_MOMENT = np.array([-1.0, -1.0, 2.0])
 
 
 @dataclass(frozen=True, slots=True)
 class FreeDrop:
-    """How a free drop moved.
+    """Motion of a free drop, and its final state.
 
     Attributes:
-        points: `(n, 3)` particles at the end [m], the first `s` are the vertices of the surface.
-        velocity: `(n, 3)` at the end [m/s].
-        pressure: `(n,)` above ambient at the end [Pa].
-        surface_points: `(s, 3)` [m].
-        triangles: `(t, 3)` of the surface, outward oriented.
-        history: arrays of equal length, the start included: time [s], amplitude of the second mode over the radius,
-            energy (surface plus kinetic) [J], kinetic_energy [J], volume [m^3], momentum (its length) [kg m/s].
-        snapshots: the start, and each eighth of a Rayleigh period.
-        metrics: name to value and unit.
+        points: Final positions of the particles, the s surface vertices first, shape (n, 3) [m].
+        velocity: Final velocity, shape (n, 3) [m/s].
+        pressure: Final pressure above ambient, shape (n,) [Pa].
+        surface_points: Final positions of the surface vertices, shape (s, 3) [m].
+        triangles: Outward triangles of the surface, shape (t, 3).
+        history: Columns of equal length from the start on: time [s], amplitude of the second mode over the radius,
+            energy (surface plus kinetic) [J], kinetic_energy [J], volume [m^3], momentum (its magnitude) [kg m/s].
+        snapshots: Shapes at the start and at each eighth of a Rayleigh period.
+        metrics: Name -> value and unit.
     """
 
     points: Floats
@@ -74,7 +75,14 @@ class FreeDrop:
 
 @dataclass(slots=True)
 class _Swing:
-    """State of a run: the flow, a row of the history for each step and the start, snapshots, wall time [s]."""
+    """State of a run.
+
+    Attributes:
+        flow: Flow of the drop.
+        rows: Rows of the history, one for the start and one per step.
+        snapshots: Shapes at regular times.
+        seconds: Wall time [s].
+    """
 
     flow: InertialFlow
     rows: list[tuple[float, ...]]
@@ -83,7 +91,7 @@ class _Swing:
 
     @classmethod
     def start(cls, solder: Solder, amplitude: float) -> "_Swing":
-        """Start with a ball at rest and the velocity a omega/2 (-x, -y, 2 z), on its surface a omega R P2."""
+        """Return a ball with the velocity a omega/2 (-x, -y, 2 z), whose normal part on the surface is a omega R P2."""
         radius, spacing = _radius(solder), solder.numerics.spacing
         shells = round(radius / spacing)
         if shells < 2:
@@ -100,24 +108,24 @@ class _Swing:
         return swing
 
     def saved(self) -> dict[str, Any]:
-        """All of it, for a checkpoint."""
+        """Return the state for a checkpoint."""
         return fields_of(self) | {"flow": self.flow.saved(), "rows": np.array(self.rows)}
 
     @classmethod
     def restored(cls, saved: Mapping[str, Any], solder: Solder) -> "_Swing":
-        """Make it again of what `saved` returned."""
+        """Return the run restored from the data of ``saved``."""
         solver = IspgStep() if solder.numerics.scheme == "ispg" else InertialStep(solder.density)
         flow = InertialFlow(saved["flow"]["body"], _physics(solder), solver)
         flow.restore(saved["flow"])
         return cls(**{**saved, "flow": flow, "rows": [tuple(row) for row in saved["rows"].tolist()]})
 
     def snap(self) -> None:
-        """Keep the present shape."""
+        """Store the current shape as a snapshot."""
         body = self.flow.body
         self.snapshots.append(Snapshot(self.rows[-1][0], body.points.copy(), body.triangles.copy()))
 
 
-def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is run
+def solve_free_drop(  # noqa: PLR0913 - the motion, its resolution and its control
     solder: Solder,
     amplitude: float = 0.0,
     periods: float = 2.0,
@@ -125,24 +133,23 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FreeDrop:
-    """Let a drop without walls and gravity swing in its second mode, or rest.
+    """Compute a drop without walls and gravity that oscillates in its second mode, or rests.
 
-    Steps are those on tetrahedra, or of the scheme ispg if `solder.numerics.scheme` says so; triangles are not evened
-    out. The ball starts with the velocity of the mode, linear in space: a start from a stretched shape would excite the
-    modes of the grid, too, whose phases part in the first period and look like damping.
-    The viscosity acts unless `solder.effects.viscosity` is "off"; the spacing is that of `solder.numerics`.
+    The steps use tetrahedra, or the scheme ispg if ``solder.numerics.scheme`` selects it, without mesh smoothing. The
+    ball starts with the velocity of the mode, linear in space: a stretched initial shape would also excite modes of the
+    grid, whose loss of phase in the first period looks like damping.
 
     Args:
-        solder: volume and fluid.
-        amplitude: to which the velocity at the start swings the second mode, over the radius; 0 for a ball at rest.
-        periods: duration in Rayleigh periods of the second mode.
-        steps_per_period: time steps in one of them.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        solder: Volume, fluid and spacing; viscosity acts unless ``solder.effects.viscosity`` is "off".
+        amplitude: Amplitude of the second mode that the initial velocity causes, over the radius; 0 for a ball at rest.
+        periods: Duration in Rayleigh periods of the second mode.
+        steps_per_period: Number of time steps per period.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
     Raises:
-        ValueError: the spacing leaves fewer than two shells.
-        SolveFailed: a linear solve failed.
+        ValueError: The spacing leaves fewer than two shells of particles.
+        SolveFailed: A linear solve failed.
     """
     saved = checkpoint.read(RECORDS) if checkpoint else None
     swing = _Swing.restored(saved, solder) if saved else _Swing.start(solder, amplitude)
@@ -179,7 +186,7 @@ def solve_free_drop(  # noqa: PLR0913 - what swings and for how long, how it is 
 
 
 def _radius(solder: Solder) -> float:
-    """Radius of the ball [m]."""
+    """Return the radius of the ball [m]."""
     return float(np.cbrt(3.0 * solder.volume / (4.0 * pi)))
 
 
@@ -190,7 +197,7 @@ def _physics(solder: Solder) -> Physics:
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:
-    """One row of the history."""
+    """Return one row of the history, with the entries ``COLUMNS``."""
     body, mass = flow.body, flow.mass
     offset = body.points - (mass @ body.points).sum(axis=0) / mass.sum()
     moment = SECOND_MOMENT @ (offset * (mass @ offset)).sum(axis=0) / mass.sum()
@@ -202,7 +209,7 @@ def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...
 
 
 def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
-    """Pressure, remaining motion of the surface and volume at the end."""
+    """Return the metrics of pressure, remaining surface motion and volume at the end."""
     body, weight = flow.body, np.asarray(flow.mass.sum(axis=0)).ravel()
     mean = float(np.average(body.pressure, weights=weight))
     scatter = float(np.sqrt(np.average((body.pressure - mean) ** 2, weights=weight)))
@@ -219,7 +226,7 @@ def _rest_metrics(flow: InertialFlow, solder: Solder, history: dict[str, Floats]
 
 
 def _swing_metrics(solder: Solder, history: dict[str, Floats]) -> dict[str, tuple[float, str]]:
-    """Period and decay rate of a fitted damped oscillation, and their errors against Reid's at this viscosity."""
+    """Return period and decay rate of a fitted damped oscillation, and their errors against Reid's solution."""
     radius = _radius(solder)
     omega = rayleigh_frequency(2, radius, solder.density, solder.surface_tension)
     exact_decay, exact_frequency = viscous_oscillation(2, omega, solder.viscosity / (solder.density * radius**2))
@@ -238,16 +245,16 @@ def solve_oscillation(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> JointShape:
-    """Let a drop swing: its shape at the end, history and snapshots in time.
+    """Compute an oscillating drop and return its final shape, with history and snapshots.
 
     Args:
-        scene: volume, amplitude, duration and resolution.
-        solder: the same volume, and fluid.
-        progress: called with the fraction done.
-        checkpoint: where the run continues from, to the last bit, and leaves its state.
+        scene: Volume, amplitude, duration and resolution.
+        solder: Fluid, with the volume of the scene.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
     Raises:
-        SolveFailed: a linear solve failed.
+        SolveFailed: A linear solve failed.
     """
     drop = solve_free_drop(solder, scene.amplitude, scene.periods, scene.steps_per_period, progress, checkpoint)
     steps = len(drop.history["time"]) - 1
@@ -275,15 +282,16 @@ def solve_oscillation(
 
 
 def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[float, float]:
-    """Fit decay rate [1/s] and angular frequency [rad/s] of the fundamental.
+    """Fit a damped oscillation and return its decay rate [1/s] and angular frequency [rad/s].
 
-    Model: exp(-b t) cos(w t + ..), and of second order its harmonic exp(-2 b t) cos(2 w t + ..), its mean exp(-2 b t)
-    and a constant. The factors of these are linear and eliminated (variable projection).
+    The model is exp(-b t) cos(w t + ..) plus terms of second order: the harmonic exp(-2 b t) cos(2 w t + ..), the mean
+    exp(-2 b t) and a constant. Variable projection eliminates their linear factors.
 
     Args:
-        time: `(k,)` [s], more than a period.
-        values: `(k,)`.
-        frequency: a guess within some 20 % [rad/s]; an octave too low is noticed: the harmonic is then the larger one.
+        time: Times, shape (k,) [s], over more than a period.
+        values: Values, shape (k,).
+        frequency: Guess of the angular frequency within about 20 % [rad/s]; a guess of half the frequency is detected,
+            since the harmonic is then larger.
     """
 
     def columns(unknowns: Floats) -> Floats:
@@ -299,8 +307,8 @@ def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[flo
         return basis @ factors(basis) - values
 
     scaled = time * frequency
-    found = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
-    first, second = np.hypot(*factors(columns(found))[:4].reshape(2, 2).T)
+    optimum = least_squares(misfit, (0.01, 1.0), x_scale=(0.01, 0.01), xtol=1e-12, ftol=1e-12).x
+    first, second = np.hypot(*factors(columns(optimum))[:4].reshape(2, 2).T)
     if second > first:
         return fit_oscillation(time, values, 2.0 * frequency)
-    return found[0] * frequency, found[1] * frequency
+    return optimum[0] * frequency, optimum[1] * frequency

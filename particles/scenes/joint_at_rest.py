@@ -1,4 +1,4 @@
-"""A joint of its own brought to rest: its package holds still, floats, or is moved along a path."""
+"""Single joint at rest: its package is fixed, floats, or follows a path."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,27 +19,28 @@ from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.shape import JointShape
 
 DIRECTIONS = {"lift": LIFT, "shift": SHIFT, "turn": TURN}
-BRACKET = 0.2  # around the collapse height that was found, in which the exact one is sought
-KNOTS = 40  # standoffs at which the exact pull is found along a way; linear between them
+BRACKET = 0.2  # relative half-width of the interval around the computed collapse height that contains the exact one
+KNOTS = 40  # number of standoffs of the exact pull, which is interpolated linearly
 ERRORS = ("width_error", "waist_error", "axial_force_error")
-OF_A_PLACE = ("max_width", "waist", "axial_force", *ERRORS)
+ROW_METRICS = ("max_width", "waist", "axial_force", *ERRORS)
 
 
 @dataclass(frozen=True, slots=True)
 class JointAtRest:
-    """A joint at rest.
+    """Joint at rest.
 
     Attributes:
-        shape: where the package ends.
-        effects: those that acted.
-        reference: the exact meridian there, where there is one.
-        places: of a path, the start included: SI values of each place and of the joint in it; else empty.
+        shape: Shape at the final position of the package.
+        effects: Decision on each effect.
+        reference: Exact meridian at the final position; None if the joint has none.
+        path_rows: Position of the package and metrics of the joint (SI values) at the start and at each target of a
+            path; empty without a path.
     """
 
     shape: JointShape
     effects: Mapping[str, Decision]
     reference: Meridian | None
-    places: list[dict]
+    path_rows: list[dict]
 
 
 def joint_to_rest(
@@ -48,15 +49,19 @@ def joint_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoints: Callable[[int], Checkpoint] | None = None,
 ) -> JointAtRest:
-    """Let the solder of a joint flow until it, and a package that floats, is at rest.
+    """Compute the solder of a joint, and a floating package, at rest.
 
     Args:
-        joint: volume, pads, package and resolution.
-        solder: the same volume, fluid and process.
-        progress: called with the fraction done.
-        checkpoints: gives the checkpoint of each place of a path by its number, of other joints that of place 0.
+        joint: Volume, pads, package and resolution.
+        solder: Fluid and process, with the volume of the joint.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoints: Function of the number of a target of the path that returns its checkpoint; joints without a path
+            use number 0.
 
-    Raises: as `solve_joint`.
+    Raises:
+        TooLittleSolder: The volume does not span the gap.
+        NotAtRest: The joint is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
     effects = decide_effects(joint.geometry, solder)
     weight = reference_weight(solder, effects)
@@ -64,14 +69,14 @@ def joint_to_rest(
         shapes = _along(joint, solder, progress, checkpoints)
         geometries = [joint.geometry, *joint.path_geometries][: len(shapes)]
         references = [reference_meridian(geometry, solder, weight) for geometry in geometries]
-        places = [_record(*place) for place in zip(geometries, shapes, references, strict=True)]
+        path_rows = [_path_row(*state) for state in zip(geometries, shapes, references, strict=True)]
         shape = replace(shapes[-1], metrics=shapes[-1].metrics | _worst(shapes))
         if joint.path.speed is None:
             states = [shape.snapshots[-1] for shape in shapes[:-1]] or shapes[0].snapshots
             shape = replace(shape, snapshots=states)
         else:
             shape = _with_exact_pull(shape, joint, solder, weight)
-        return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], places)
+        return JointAtRest(with_shape_error(shape, solder, references[-1]), effects, references[-1], path_rows)
     first = None if checkpoints is None else checkpoints(0)
     if joint.package is None:
         shape = solve_joint(joint.geometry, solder, progress, checkpoint=first)
@@ -108,23 +113,24 @@ def _along(
 
 
 def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float | None) -> JointShape:
-    """Add `pull_exact` [N] to the history: what a way up or down takes by Young and Laplace, else nan."""
+    """Add ``pull_exact`` [N] to the history: the Young-Laplace force of a vertical path, NaN for other paths."""
     if "standoff" not in shape.history:
         return shape
-    standoff, way = shape.history["standoff"], np.sign(joint.path_geometries[-1].gap - joint.standoff)
+    standoff, direction = shape.history["standoff"], np.sign(joint.path_geometries[-1].gap - joint.standoff)
     pull = np.full_like(standoff, np.nan)
-    if way:
+    if direction:
         knots = np.linspace(standoff.min(), standoff.max(), KNOTS)
         meridians = [reference_meridian(replace(joint.geometry, gap=gap), solder, weight) for gap in knots]
-        pulls = [np.nan if meridian is None else -way * meridian.axial_force for meridian in meridians]
+        pulls = [np.nan if meridian is None else -direction * meridian.axial_force for meridian in meridians]
         pull = np.interp(standoff, knots, pulls)
     return replace(shape, history=shape.history | {"pull_exact": pull})
 
 
 def _balance(joint: Joint, solder: Solder, weight: float | None, shape: JointShape) -> Metrics:
-    """Errors of a package that floats free to lift: of its force against the load, of its height against Young-Laplace.
+    """Return the errors of a package that floats freely in height.
 
-    The force's error is over pi gamma times the smaller pad's radius.
+    The axial force is compared with the load, over pi gamma times the smaller pad radius, and the height with the
+    Young-Laplace joint.
     """
     package = joint.package
     if package is None or "lift" not in package.free:
@@ -139,7 +145,17 @@ def _balance(joint: Joint, solder: Solder, weight: float | None, shape: JointSha
 
 
 def collapse_height(joint: Joint, solder: Solder, weight: float | None, near: float) -> float:
-    """Standoff [m] at which the Young-Laplace joint carries the load, near a guess; nan if none exists."""
+    """Return the standoff at which the Young-Laplace joint carries the load of the package [m].
+
+    Args:
+        joint: Volume, pads and package.
+        solder: Fluid properties.
+        weight: Specific weight rho g [N/m^3]; None if the shape is not axisymmetric.
+        near: Guess of the standoff [m].
+
+    Returns:
+        Standoff [m]; NaN if no solution is within 20 % of the guess.
+    """
     load = joint.package.load if joint.package else 0.0
 
     def excess(standoff: float) -> float:
@@ -152,17 +168,17 @@ def collapse_height(joint: Joint, solder: Solder, weight: float | None, near: fl
     return float(brentq(excess, low, high, rtol=1e-6))
 
 
-def _record(geometry: JointGeometry, shape: JointShape, reference: Meridian | None) -> dict:
-    """Place, verdict, main metrics and the exact force, SI values; None for missing values."""
-    values = {name: _value(shape, name) for name in OF_A_PLACE}
+def _path_row(geometry: JointGeometry, shape: JointShape, reference: Meridian | None) -> dict:
+    """Return the position of the package, verdict, main metrics and exact force in SI units; None for NaN values."""
+    values = {name: _value(shape, name) for name in ROW_METRICS}
     exact = {"axial_force_exact": float("nan") if reference is None else reference.axial_force}
-    known = {name: value if np.isfinite(value) else None for name, value in (values | exact).items()}
-    place = {"standoff": geometry.gap, "offset": geometry.offset[0], "tilt": geometry.tilt[1]}
-    return place | {"verdict": shape.verdict} | known
+    finite = {name: value if np.isfinite(value) else None for name, value in (values | exact).items()}
+    position = {"standoff": geometry.gap, "offset": geometry.offset[0], "tilt": geometry.tilt[1]}
+    return position | {"verdict": shape.verdict} | finite
 
 
 def _value(shape: JointShape, name: str) -> float:
-    """Value of a metric; nan where a shape has none, as a joint that has broken has no waist."""
+    """Return the value of a metric; NaN if the shape lacks it, as a broken joint has no waist."""
     return shape.metrics.get(name, (float("nan"), ""))[0]
 
 
@@ -170,6 +186,6 @@ def _worst(shapes: Sequence[JointShape]) -> Metrics:
     """Return the largest errors of all positions with a reference, and the number of positions reached."""
     worst: Metrics = {"places": (float(len(shapes)), "")}
     for name in ERRORS:
-        known = [value for shape in shapes if np.isfinite(value := _value(shape, name))]
-        worst[name] = (max(known, key=abs, default=float("nan")), "")
+        errors = [value for shape in shapes if np.isfinite(value := _value(shape, name))]
+        worst[name] = (max(errors, key=abs, default=float("nan")), "")
     return worst

@@ -1,12 +1,14 @@
-"""Numbers of a joint or drop at rest, and their comparison with the Young-Laplace reference."""
+"""Metrics of a joint or drop at rest, and their comparison with the Young-Laplace reference.
+
+Metrics are a dictionary: name -> SI value and unit.
+"""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from reflowshock.arrays import Floats, Indices
+from reflowshock.arrays import Floats
 from reflowshock.particles.core import winding_numbers
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
@@ -17,6 +19,7 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import BodyForce, Force, plate_wrench
+from reflowshock.particles.reference.shape_error import shape_error
 from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
@@ -24,13 +27,6 @@ from reflowshock.particles.steps.shape import JointShape
 from reflowshock.particles.steps.time_step import capillary_limit
 from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, ContactLine
 
-# Barycentric points and weights of a rule that is exact for cubic polynomials on a triangle: corners, middles of
-# edges, centroid (Zienkiewicz, The Finite Element Method, table of triangles).
-RULE = (
-    ((1.0, 0.0, 0.0), 0.05), ((0.0, 1.0, 0.0), 0.05), ((0.0, 0.0, 1.0), 0.05),
-    ((0.5, 0.5, 0.0), 2.0 / 15.0), ((0.0, 0.5, 0.5), 2.0 / 15.0), ((0.5, 0.0, 0.5), 2.0 / 15.0),
-    ((1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0), 0.45),
-)  # fmt: skip
 Metrics = dict[str, tuple[float, str]]
 LITTLE = 1e-3  # spacings
 WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
@@ -44,7 +40,7 @@ JOINT_NAMES = {
 
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint at the end of its run: name to SI value and unit."""
+    """Return the metrics of a joint at the end of its run, with errors against the reference of its geometry."""
     reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
@@ -53,19 +49,19 @@ def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run
 
 
 def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a drop at the end of its run: name to SI value and unit.
+    """Return the metrics of a drop on a pad at the end of its run, with errors against its reference.
 
     Args:
-        solder: volume, contact angles and fluid.
-        pad_radius: radius of the pad [m], infinite for a uniform wall.
-        flow: the flow at its end.
-        run: how it came there.
+        solder: Volume, contact angles and fluid.
+        pad_radius: Radius of the pad [m], infinite for a uniform wall.
+        flow: Flow at the end of the run.
+        run: Records of the run.
     """
     return body_metrics(solder, reference_drop(solder, pad_radius, _reference_weight(flow)), flow, run)
 
 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a drop, with its errors against a reference and its contact angle where it has them."""
+    """Return the metrics of a drop, with errors against a reference and contact angles if it has them."""
     profile = run.profiles[-1]
     height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
     shape: Metrics = {"height": (height, "m"), "max_width": (width, "m")}
@@ -81,9 +77,13 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
 def with_shape_error(
     shape: JointShape, solder: Solder, reference: Meridian | None, surface: Body | None = None
 ) -> JointShape:
-    """Add the error of the whole free surface, over the cube root of the volume, where there is an exact one.
+    """Add the error of the free surface over the cube root of the volume, if the shape has a reference.
 
-    That of a body that is not shown as it was computed is measured on its own surface.
+    Args:
+        shape: Shape at rest.
+        solder: Solder with the volume of the shape.
+        reference: Exact meridian; None leaves the shape unchanged.
+        surface: Body on whose surface the error is measured; None for the surface of the shape.
     """
     if reference is None or shape.verdict in ("open", "bridged"):
         return shape
@@ -93,7 +93,7 @@ def with_shape_error(
 
 
 def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Metrics:
-    """Radius of the wetted area; mean contact angle, the smallest and the largest along the line."""
+    """Return the radius of the wetted area, and the mean, smallest and largest contact angle."""
     cosines = _contact_cosines(solder, flow)[0]
     angle, angles = mean_angle(cosines), np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     contact: Metrics = {
@@ -108,9 +108,9 @@ def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Me
 
 
 def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Errors of a drop on one pad, in height and shape, against the exact one of its volume.
+    """Return the errors in height and shape of a drop on one pad against the exact drop of its volume.
 
-    None where its weight pulls it off an upper plate: such drops have no reference.
+    The result is empty for a pendant drop with weight, which has no reference.
     """
     body, plate, pad = flow.body, flow.body.plates[0], flow.physics.lines[0].pads[0]
     volume, weight = body.volume()[0], _reference_weight(flow)
@@ -126,16 +126,16 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of a joint whose solder is a drop on the board, under the names of a joint."""
+    """Return the metrics of an open joint with a drop on the board, under the names of a joint."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
-    own = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
-    return own | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
+    renamed = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
+    return renamed | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
 
 
 def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Collect the numbers of joints that became one body between plates a gap apart [m]: name to SI value and unit.
+    """Return the metrics of joints that merged into one body between plates at a distance ``gap`` [m].
 
-    The volume of the solder is that of all joints together.
+    ``solder`` has the total volume of the joints.
     """
     length = float(np.ptp(flow.body.points[:, 0]))
     shape: Metrics = {"standoff": (gap, "m"), "length": (length, "m"), "axial_force": (axial_force(flow), "N")}
@@ -143,7 +143,7 @@ def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Me
 
 
 def _weight(flow: LiquidFlow) -> float:
-    """Weight of the unit volume that acts [N/m^3]; zero without gravity."""
+    """Return the active specific weight rho g [N/m^3]; zero without gravity."""
     return sum(force.weight for force in flow.physics.forces if isinstance(force, Gravity))
 
 
@@ -153,7 +153,10 @@ def _reference_weight(flow: LiquidFlow) -> float | None:
 
 
 def particle_pressure(flow: LiquidFlow) -> Floats:
-    """Pressure of the particles above ambient `(n,)` [Pa], with the hydrostatic part that acts as a surface force."""
+    """Return the pressure of the particles above ambient, including the hydrostatic part, shape (n,) [Pa].
+
+    Gravity acts as a surface force, so the pressure of the solver lacks the hydrostatic part.
+    """
     body = flow.body.whole()
     pressure = body.pressure
     for force in flow.physics.forces:
@@ -163,18 +166,18 @@ def particle_pressure(flow: LiquidFlow) -> Floats:
 
 
 def contact_radius(body: Body, wall: int) -> float:
-    """Radius of the disc that has the wetted area of a wall [m]."""
+    """Return the radius of a disc with the wetted area of a wall [m]."""
     line = whole_points(body.cloud, body.points, wall)[0]
     return float(np.sqrt(ring_area(line, np.arange(len(line), dtype=np.int32)) / np.pi))
 
 
 def mean_angle(cosines: Floats) -> float:
-    """Contact angle of a mean cosine [deg]."""
+    """Return the contact angle of the mean of cosines [deg]."""
     return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
 
 
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
-    """Judge a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"; a uniform wall has no edge to leave."""
+    """Return the verdict on a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"."""
     if ruptured:
         return "open"
     if any(len(line.wetted_pads()) > 1 for line in lines):
@@ -186,12 +189,12 @@ def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
 
 
 def _contact_cosines(solder: Solder, flow: LiquidFlow) -> list[Floats]:
-    """Cosines of the contact angles along each contact line, by the balance of forces."""
+    """Return the cosines of the contact angles along each contact line, by the balance of forces."""
     return Wetting(solder.surface_tension, flow.physics.lines, _others(flow)).contact_cosines(flow.body)
 
 
 def _others(flow: LiquidFlow) -> tuple[Force, ...]:
-    """All forces but that of the walls."""
+    """Return all forces except wetting."""
     return tuple(force for force in flow.physics.forces if not isinstance(force, Wetting))
 
 
@@ -216,7 +219,7 @@ def _joint_shape(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 
 
 def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
-    """Errors against the reference, the force's over pi gamma times the smaller contact radius; nan without one."""
+    """Return the errors against the reference, NaN without one; the force is over pi gamma and the contact radius."""
     if reference is None:
         return {name: (float("nan"), "") for name in ("waist_error", "axial_force_error")}
     profile = run.profiles[-1]
@@ -228,7 +231,7 @@ def _joint_errors(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridia
 
 
 def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Error of the width against the coaxial joint of the same gap, and how far that may be off; nan beyond a limit."""
+    """Return the width error against the coaxial joint of the same gap, NaN for large offsets, and its uncertainty."""
     bound, error = width_change_bound(geometry), float("nan")
     if bound <= LARGEST_WIDTH_CHANGE:
         upright = replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0))
@@ -239,13 +242,13 @@ def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 
 
 def axial_force(flow: LiquidFlow) -> float:
-    """Force of the liquid on the package along +z [N]."""
+    """Return the force of the liquid on the package along +z [N]."""
     on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
     return float(sum(plate_wrench(flow.body, _others(flow), wall)[2] for wall in on_package))
 
 
 def _pressure(solder: Solder, flow: LiquidFlow, run: Run, reference: Meridian | None) -> Metrics:
-    """Mean pressure of the particles below the surface, its error and its scatter.
+    """Return the mean pressure of the particles below the surface, its error and its scatter.
 
     The scatter is the standard deviation from the hydrostatic pressure, over the capillary pressure of a sphere of the
     body's width.
@@ -278,9 +281,9 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def particles_lost(body: Body) -> int:
-    """Count interior particles outside the body: beyond the surface or a wall, or off their wall.
+    """Count interior particles outside the body: beyond the surface or a wall, or detached from their wall.
 
-    Those on a wall are looked at a little above it. Planes of symmetry close a body as walls do: its image is added.
+    Particles on a wall are tested slightly above it. At planes of symmetry the mirror image of the body closes it.
     """
     body = body.enclosing()
     cloud, inside, corners = body.cloud, body.points.copy(), [body.points[body.triangles]]
@@ -304,14 +307,14 @@ def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
     The sliding speed of a body is included, since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
-    known = [(flow, state, first) for flow, state, first in moved if state is not None]
-    if not known:
+    started = [(flow, state, first) for flow, state, first in moved if state is not None]
+    if not started:
         return {}
-    first = sum(energy for _, _, energy in known)
-    now = sum(flow.physics.energy(flow.body) + (state.kinetic or 0.0) for flow, state, _ in known)
-    lost = total_losses([state.losses for _, state, _ in known])
+    first = sum(energy for _, _, energy in started)
+    now = sum(flow.physics.energy(flow.body) + (state.kinetic or 0.0) for flow, state, _ in started)
+    lost = total_losses([state.losses for _, state, _ in started])
     metrics: Metrics = {f"{entry.name}_loss": (getattr(lost, entry.name) / first, "") for entry in fields(lost)}
-    slides = max(float(np.linalg.norm(state.volumes @ state.velocity)) / state.volumes.sum() for _, state, _ in known)
+    slides = max(float(np.linalg.norm(state.volumes @ state.velocity)) / state.volumes.sum() for _, state, _ in started)
     return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, ""), "slide_speed": (slides, "m/s")}
 
 
@@ -327,7 +330,16 @@ def width_change_bound(geometry: JointGeometry) -> float:
 
 
 def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float | None) -> Meridian | None:
-    """Young-Laplace meridian of a coaxial joint with Gibbs' condition at the edges; none without equilibrium."""
+    """Return the Young-Laplace meridian of a coaxial joint with Gibbs' condition at the pad edges.
+
+    Args:
+        geometry: Gap and pad radii.
+        solder: Volume, surface tension and contact angles.
+        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
+
+    Returns:
+        Meridian; None without a weight, if the joint is not coaxial, or if it has no equilibrium.
+    """
     if weight is None or not geometry.is_coaxial:
         return None
     try:
@@ -359,42 +371,3 @@ def reference_drop(solder: Solder, pad_radius: float, weight: float | None) -> M
         return None
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
     return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)
-
-
-def shape_error(points: Floats, triangles: Indices, meridian: Meridian) -> float:
-    """Root mean square distance of a triangulated surface from a surface of revolution about the z axis.
-
-    The mean is over the area of the flat triangles, so it counts what lies outside at their corners and inside between
-    them. A surface that minimises a discrete area has an error of second order in the size of its triangles.
-
-    Args:
-        points: `(n, 3)` [m].
-        triangles: `(t, 3)`, indices of `points`; a part of the surface that is cut by planes of symmetry will do.
-        meridian: the exact one.
-
-    Returns:
-        The distance [m].
-    """
-    corners = points[triangles]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    square = np.zeros(len(triangles))
-    for place, weight in RULE:
-        square += weight * distance(np.einsum("k,tkd->td", np.array(place), corners), meridian) ** 2
-    return float(np.sqrt(area @ square / area.sum()))
-
-
-def distance(points: Floats, meridian: Meridian) -> Floats:
-    """Distance of points `(n, 3)` from the surface of revolution that a meridian makes `(n,)` [m]."""
-    line = np.column_stack((meridian.r, meridian.z))
-    own = np.column_stack((np.hypot(points[:, 0], points[:, 1]), points[:, 2]))
-    nearest = cKDTree(line).query(own)[1]
-    before, after = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, len(line) - 1)
-    return np.minimum(*(_from_segment(own, line[nearest], line[other]) for other in (before, after)))
-
-
-def _from_segment(points: Floats, start: Floats, end: Floats) -> Floats:
-    """Distance of points in a plane, each from its own segment, which may be a single point."""
-    along = end - start
-    length = np.einsum("nd,nd->n", along, along)
-    share = np.einsum("nd,nd->n", points - start, along) / np.where(length > 0.0, length, 1.0)
-    return np.linalg.norm(points - start - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)

@@ -1,9 +1,9 @@
-"""Joints that are alike but for a turn about z and a mirror image: one in canonical orientation stands for all.
+"""Canonical orientation of a joint: joints that differ by a rotation about z and a mirror image are computed once.
 
-Canonical is a joint whose package rises towards +x and is offset to y >= 0; untilted, it is offset towards +x.
+In the canonical orientation the package rises towards +x and is offset to y >= 0; without tilt, the offset is along +x.
 
-The width of a joint that leans is compared with the coaxial joint of its gap; the difference is of second order, within
-0.1 (offset / a + 2 tilt)^2.
+The width of a leaning joint is compared with the coaxial joint of the same gap; the difference is of second order,
+within 0.1 (offset / a + 2 tilt)^2.
 """
 
 from collections.abc import Sequence
@@ -16,17 +16,17 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.steps.shape import JointShape, Snapshot
 
-NOTHING = 1e-12  # lengths below a picometre have no direction [m]
+SHORTEST = 1e-12  # shorter vectors have no direction [m]
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """How a joint lies, seen from its canonical orientation: mirrored first (y to -y), then turned.
+    """Transformation from the canonical orientation to a joint: first a reflection (y to -y), then a rotation.
 
     Attributes:
-        turn: about z [rad].
-        mirror: whether it is the mirror image.
+        turn: Angle of rotation about z [rad].
+        mirror: Whether the joint is a mirror image.
     """
 
     turn: float = 0.0
@@ -34,13 +34,13 @@ class Orientation:
 
     @property
     def matrix(self) -> Floats:
-        """Matrix `(3, 3)` that takes vectors of the canonical orientation to those of the joint."""
+        """Matrix that transforms vectors of the canonical joint to this joint, shape (3, 3)."""
         cosine, sine = np.cos(self.turn), np.sin(self.turn)
         turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         return turn @ MIRROR if self.mirror else turn
 
     def vectors(self, canonical: Floats) -> Floats:
-        """Vectors `(k, 3)` of the canonical joint as those of this joint."""
+        """Transform vectors, shape (k, 3), from the canonical joint to this joint."""
         return canonical @ self.matrix.T
 
     def wrenches(self, canonical: Floats) -> Floats:
@@ -50,9 +50,9 @@ class Orientation:
 
 
 def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
-    """Return a joint in canonical orientation, and how the joint lies seen from it."""
-    x, y = _nothing(geometry.offset, 1.0)
-    turn_x, turn_y = _nothing(geometry.tilt, geometry.radius_package)
+    """Return a joint in canonical orientation, and the transformation from it to the joint."""
+    x, y = _without_rounding(geometry.offset, 1.0)
+    turn_x, turn_y = _without_rounding(geometry.tilt, geometry.radius_package)
     steepness, distance = hypot(turn_x, turn_y), hypot(x, y)
     if steepness == distance == 0.0:
         return replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0)), Orientation()
@@ -60,14 +60,14 @@ def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
         return replace(geometry, offset=(distance, 0.0), tilt=(0.0, 0.0)), Orientation(atan2(y, x))
     uphill = -turn_y / steepness, turn_x / steepness
     along, across = x * uphill[0] + y * uphill[1], y * uphill[0] - x * uphill[1]
-    across = 0.0 if abs(across) < NOTHING else across
+    across = 0.0 if abs(across) < SHORTEST else across
     orientation = Orientation(atan2(uphill[1], uphill[0]), bool(across < 0.0))
     return replace(geometry, offset=(along, abs(across)), tilt=(0.0, -steepness)), orientation
 
 
-def _nothing(pair: tuple[float, float], lever: float) -> tuple[float, float]:
-    """Return the pair, or zeros if it moves the lever [m] by less than a picometre."""
-    return pair if hypot(*pair) * lever >= NOTHING else (0.0, 0.0)
+def _without_rounding(pair: tuple[float, float], lever: float) -> tuple[float, float]:
+    """Return an offset or tilt, or zeros if it moves a point at the distance ``lever`` [m] by less than a picometre."""
+    return pair if hypot(*pair) * lever >= SHORTEST else (0.0, 0.0)
 
 
 def sizes(geometry: JointGeometry) -> Floats:

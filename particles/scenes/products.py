@@ -1,4 +1,4 @@
-"""Files of shapes and flows: HDF5, and particles for ParaView. Nothing else here knows files."""
+"""Files of shapes and flows: HDF5 for scripts and VTU particles for ParaView."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ ARRAYS = ("points", "velocity", "pressure", "triangles")
 TIMES = (
     "seconds",
     "particle_steps_per_second",
-)  # of one run: in no product, so that the same shape gives the same file
+)  # timings are not written, so that equal shapes give equal files
 
 
 def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
@@ -26,7 +26,7 @@ def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
 
     Args:
         path: HDF5 file; replaced if it exists.
-        shapes: name to shape.
+        shapes: Name -> shape.
     """
     with h5py.File(path, "w") as file:
         for name, shape in shapes.items():
@@ -44,21 +44,21 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
         text = column.dtype.kind == "U"
         group[f"history/{name}"] = column.astype(h5py.string_dtype()) if text else column
     for number, snapshot in enumerate(shape.snapshots):
-        place = group.create_group(f"snapshots/{number:04d}")
-        place.attrs["time"] = snapshot.time
-        place["points"], place["triangles"] = snapshot.points, snapshot.triangles
+        subgroup = group.create_group(f"snapshots/{number:04d}")
+        subgroup.attrs["time"] = snapshot.time
+        subgroup["points"], subgroup["triangles"] = snapshot.points, snapshot.triangles
     for name, (value, unit) in untimed(shape.metrics).items():
-        place = group.create_group(f"metrics/{name}")
-        place.attrs["value"], place.attrs["unit"] = value, unit
+        subgroup = group.create_group(f"metrics/{name}")
+        subgroup.attrs["value"], subgroup.attrs["unit"] = value, unit
 
 
 def untimed(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
-    """Return metrics that are the same whenever and wherever a shape is computed."""
+    """Return the metrics without timings, which are equal on all machines."""
     return {name: metric for name, metric in metrics.items() if name not in TIMES}
 
 
 def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> None:
-    """Write one drop or joint: `shape.h5` with its exact meridian, where there is one, and `particles.vtu`."""
+    """Write one drop or joint: ``shape.h5``, with its exact meridian if it has one, and ``particles.vtu``."""
     write_shapes(folder / "shape.h5", {BODY: shape})
     if reference is not None:
         with h5py.File(folder / "shape.h5", "a") as file:
@@ -67,13 +67,13 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
 
 
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
-    """Read what `write_body` wrote: the shape, and radius and height `(2, k)` of the exact meridian [m]."""
+    """Read the files of ``write_body``: the shape, and radius and height of the exact meridian, shape (2, k) [m]."""
     with h5py.File(folder / "shape.h5", "r") as file:
         return _read_shape(file[BODY]), file[REFERENCE][()] if REFERENCE in file else None
 
 
 def read_shapes(path: Path | str) -> dict[str, JointShape]:
-    """Read what `write_shapes` wrote."""
+    """Read the file of ``write_shapes``: name -> shape."""
     with h5py.File(path, "r") as file:
         return {name: _read_shape(group) for name, group in file.items()}
 
@@ -84,12 +84,10 @@ def _read_shape(group: h5py.Group) -> JointShape:
     for name, column in group["history"].items():
         history[name] = column.asstr()[()].astype(str) if h5py.check_string_dtype(column.dtype) else column[()]
     snapshots = [
-        Snapshot(float(place.attrs["time"]), place["points"][()], place["triangles"][()])
-        for _, place in sorted(group["snapshots"].items())
+        Snapshot(float(subgroup.attrs["time"]), subgroup["points"][()], subgroup["triangles"][()])
+        for _, subgroup in sorted(group["snapshots"].items())
     ]
-    metrics = {
-        name: (float(place.attrs["value"]), str(place.attrs["unit"])) for name, place in group["metrics"].items()
-    }
+    metrics = {name: (float(item.attrs["value"]), str(item.attrs["unit"])) for name, item in group["metrics"].items()}
     return JointShape(
         **arrays,
         rings=tuple(ring[()] for _, ring in sorted(group.get("rings", {}).items())),
@@ -102,7 +100,10 @@ def _read_shape(group: h5py.Group) -> JointShape:
 
 
 def write_particles(path: Path | str, shape: JointShape) -> None:
-    """Write the particles at rest and the free surface as VTU: velocity, pressure, `surface` 1 on the free surface."""
+    """Write the particles at rest and the triangles of the free surface as VTU.
+
+    Point data are velocity, pressure, and ``surface``, which is 1 on the free surface and 0 inside.
+    """
     count = len(shape.points)
     cells = [("vertex", np.arange(count).reshape(-1, 1)), ("triangle", shape.triangles)]
     surface = (np.arange(count) < len(shape.surface_points)).astype(float)
@@ -111,19 +112,19 @@ def write_particles(path: Path | str, shape: JointShape) -> None:
 
 
 def write_flow(folder: Path, result: FlowResult) -> None:
-    """Write `flow.h5` and `particles.vtu`."""
+    """Write the pictures, history and metrics of a flow to ``flow.h5``, and its end to ``particles.vtu``."""
     with h5py.File(folder / FLOW, "w") as file:
         file["walls"] = result.walls
         for name, column in result.history.items():
             file[f"history/{name}"] = column
         for number, picture in enumerate(result.pictures):
-            place = file.create_group(f"pictures/{number:04d}")
-            place.attrs["time"] = picture.time
+            subgroup = file.create_group(f"pictures/{number:04d}")
+            subgroup.attrs["time"] = picture.time
             for name in ("points", "velocity", "pressure"):
-                place[name] = getattr(picture, name)
+                subgroup[name] = getattr(picture, name)
         for name, (value, unit) in untimed(result.metrics).items():
-            place = file.create_group(f"metrics/{name}")
-            place.attrs["value"], place.attrs["unit"] = value, unit
+            subgroup = file.create_group(f"metrics/{name}")
+            subgroup.attrs["value"], subgroup.attrs["unit"] = value, unit
     end = result.pictures[-1]
     cells = [("vertex", np.arange(len(end.points)).reshape(-1, 1))]
     data = {"velocity": end.velocity, "pressure": end.pressure}
@@ -131,14 +132,14 @@ def write_flow(folder: Path, result: FlowResult) -> None:
 
 
 def read_flow(folder: Path) -> FlowResult:
-    """Read what `write_flow` wrote."""
+    """Read the file ``flow.h5`` of ``write_flow``."""
     with h5py.File(folder / FLOW, "r") as file:
         pictures = [
-            Picture(float(place.attrs["time"]), place["points"][()], place["velocity"][()], place["pressure"][()])
-            for _, place in sorted(file["pictures"].items())
+            Picture(float(item.attrs["time"]), item["points"][()], item["velocity"][()], item["pressure"][()])
+            for _, item in sorted(file["pictures"].items())
         ]
         history = {name: column[()] for name, column in file["history"].items()}
         metrics = {
-            name: (float(place.attrs["value"]), str(place.attrs["unit"])) for name, place in file["metrics"].items()
+            name: (float(item.attrs["value"]), str(item.attrs["unit"])) for name, item in file["metrics"].items()
         }
         return FlowResult(pictures, file["walls"][()], history, metrics)

@@ -36,14 +36,14 @@ CLOSING_SPACINGS = 0.5
 VELOCITY_NEIGHBOURS = 4
 SHORTEST_EDGE = 0.25
 LOWEST_QUALITY = 0.25
-# A neck nearer to a plate than this leaves no drop there that particles could fill.
+# A neck closer to a plate leaves a drop too thin for particles.
 FEWEST_SPACINGS = 2.0
-KEPT_METRICS = ("volume", "volume_drift", "standoff", "steps", "seconds", "time_step_over_capillary_limit")
+JOINT_METRICS = ("volume", "volume_drift", "standoff", "steps", "seconds", "time_step_over_capillary_limit")
 Flowed = tuple[LiquidFlow, Run]
 
 
 def touch(first: Body, second: Body) -> bool:
-    """Whether vertices of the two free surfaces are within a spacing of each other."""
+    """Return whether vertices of two free surfaces are within a spacing of each other."""
     reach = CONTACT_SPACINGS * min(first.cloud.spacing, second.cloud.spacing)
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
     distance, _ = cKDTree(surfaces[0]).query(surfaces[1], distance_upper_bound=reach)
@@ -51,12 +51,12 @@ def touch(first: Body, second: Body) -> bool:
 
 
 def overlap(first: Body, second: Body) -> float:
-    """How deep particles of the second body are inside the first [m]; negative where none are."""
+    """Return the largest depth of particles of the second body inside the first [m]; negative if all are outside."""
     return float(depths(second.points, *closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:
-    """Whether triangles shrink to slivers (vertices crowd where liquid sinks), or contact lines of a body meet."""
+    """Return whether triangles of a body have collapsed to slivers, or its contact lines meet."""
     corner = body.points[body.triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2)
     twice_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
@@ -66,7 +66,7 @@ def collapsing(body: Body) -> bool:
 
 
 def _contact_lines_meet(body: Body) -> bool:
-    """Whether two contact lines of one body are within the closing distance."""
+    """Return whether two contact lines of one body are within the closing distance."""
     points = [body.points[ring] for ring in body.cloud.rings]
     reach = CLOSING_SPACINGS * body.cloud.spacing
     pairs = combinations(points, 2)
@@ -74,13 +74,15 @@ def _contact_lines_meet(body: Body) -> bool:
 
 
 def rebuild(*bodies: Body) -> Body:
-    """Make bodies one, with new particles, their volume and momentum; the pressures are those of a body at rest.
+    """Merge bodies into one with new particles, or remesh a single body; volume and momentum are conserved.
+
+    The particle pressures start from zero, as for a body at rest.
 
     Args:
-        bodies: one body, or some that touch, all free, on the same wall, or between the same two walls.
+        bodies: One body, or bodies that touch: all free, on the same wall, or between the same two walls.
 
     Raises:
-        CannotRebuild: a wall is not horizontal, or the bodies are not on the same walls.
+        CannotRebuild: A wall is not horizontal, or the bodies are not on the same walls.
     """
     walls = _common_walls(bodies)
     spacing = min(body.cloud.spacing for body in bodies)
@@ -100,9 +102,9 @@ def rebuild(*bodies: Body) -> Body:
 
 
 def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
-    """Shift a body so that its centre of volume is where it was `(3,)` [m], as far as its walls let it slide.
+    """Shift a body so that its centre of volume is at ``centre``, shape (3,) [m], as far as it slides on its walls.
 
-    A neck that is closed on one side shifts it; no force does.
+    Without this, filling the neck on one side would shift the centre without a force.
     """
     if any(plate.pads for plate in walls):
         return
@@ -124,12 +126,12 @@ def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
 
 
 def _moving(flows: Sequence[LiquidFlow]) -> list[MovingBody]:
-    """Those that the scheme ispg moves."""
+    """Return the bodies, physics and solvers of the flows computed by the scheme ispg."""
     return [MovingBody(flow.body, flow.physics, flow.solver) for flow in flows if isinstance(flow.solver, IspgStep)]
 
 
 def _keep_centre(old: Sequence[MovingBody], new: Sequence[MovingBody]) -> None:
-    """Give new bodies the centre of volume that the old ones had together; each moves by as much."""
+    """Shift all new bodies by one vector so that they have the common centre of volume of the old bodies."""
     before, after = ([body_moments(part.body) for part in parts] for parts in (old, new))
     missing = np.sum([first for _, first, _ in before], axis=0) - np.sum([first for _, first, _ in after], axis=0)
     total = sum(volume for volume, _, _ in after)
@@ -138,12 +140,15 @@ def _keep_centre(old: Sequence[MovingBody], new: Sequence[MovingBody]) -> None:
 
 
 def closed_surface(body: Body) -> tuple[Floats, Indices]:
-    """Surface of a body, with its mirror image behind each wall: points `(n, 3)` [m] and triangles.
+    """Return the closed surface of a body and its mirror image behind each wall.
 
-    On one wall that closes it; between two it has lids far behind them.
+    The image closes a body on one wall; between two walls, lids far behind the walls close it.
+
+    Returns:
+        Points, shape (n, 3) [m], and triangles, shape (t, 3).
 
     Raises:
-        CannotRebuild: contact lines meet in a point.
+        CannotRebuild: Contact lines meet in a point.
     """
     count, triangles = body.cloud.surface_count, body.triangles
     points, faces = [body.points[:count]], [triangles]
@@ -170,14 +175,17 @@ def _walls(body: Body) -> tuple[Plate, ...]:
 def _common_walls(bodies: Sequence[Body]) -> tuple[Plate, ...]:
     """Return the common walls of bodies that merge."""
     first, *others = [_walls(body) for body in bodies]
-    places = [[(plate.side, plate.origin[2]) for plate in walls] for walls in (first, *others)]
-    if any(place != places[0] for place in places[1:]):
-        raise CannotRebuild("only bodies that are free, or on the same walls, can become one")
+    positions = [[(plate.side, plate.origin[2]) for plate in walls] for walls in (first, *others)]
+    if any(position != positions[0] for position in positions[1:]):
+        raise CannotRebuild("only free bodies, or bodies on the same walls, can merge")
     return first
 
 
 def _common_velocity(body: Body, parts: Sequence[Body]) -> Floats:
-    """Velocities `(n, 3)` [m/s] of the nearest old particles, weighed by inverse distance, with the old momentum."""
+    """Return velocities interpolated from the nearest old particles by inverse distance, shape (n, 3) [m/s].
+
+    The total momentum of the old bodies is restored.
+    """
     points = np.concatenate([part.points for part in parts])
     velocity = np.concatenate([part.velocity for part in parts])
     distance, nearest = cKDTree(points).query(body.points, VELOCITY_NEIGHBOURS)
@@ -190,16 +198,16 @@ def _common_velocity(body: Body, parts: Sequence[Body]) -> Floats:
 
 
 def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[Flowed]:
-    """Cut a body between two horizontal plates at its neck and let both drops come to rest.
+    """Cut a body between two horizontal plates at its neck and compute both drops at rest.
 
     Args:
-        flow: of the body, with one contact line on each plate.
-        rule: when a drop is at rest.
-        start: makes the flow of a drop.
+        flow: Flow of the body, with one contact line on each plate.
+        rule: Rule that ends the flow of a drop.
+        start: Function of a body that returns the flow of a drop.
 
     Returns:
-        The flow and run of the drop on the lower plate and of that under the upper one; none where the neck is at a
-        plate, or a plate is tilted.
+        Flow and run of the drop on the lower plate and of the drop below the upper plate; an empty list if the neck is
+        at a plate, or a plate is tilted.
     """
     body, lines = flow.body, flow.physics.lines
     walls = tuple(replace(plate, pads=line.pads) for plate, line in zip(body.plates, lines, strict=True))
@@ -214,7 +222,7 @@ def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], Liqu
 
 
 def _neck(profile: Profile) -> tuple[float, float]:
-    """Height of the thinnest section [m], and the share of the volume below it."""
+    """Return the height of the thinnest section [m], and the share of the volume below it."""
     thinnest = int(profile.radius.argmin())
     slices = 0.5 * (profile.radius[1:] ** 2 + profile.radius[:-1] ** 2)
     return float(profile.z[thinnest]), float(slices[:thinnest].sum() / slices.sum())
@@ -237,14 +245,14 @@ def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> 
     """Return the shape of an open joint: both drops at rest, with the history until the neck collapsed.
 
     Args:
-        joint: when its neck collapsed.
-        solder: contact angles and fluid.
-        drops: what `split_to_rest` returned.
+        joint: Shape of the joint when its neck collapsed.
+        solder: Contact angles and fluid.
+        drops: Flow and run of each drop, as returned by ``split_to_rest``.
     """
     bodies = [flow.body for flow, _ in drops]
     counts = [body.cloud.surface_count for body in bodies]
     points = concatenated([body.points for body in bodies], counts)
-    kept = {name: number for name, number in joint.metrics.items() if name in KEPT_METRICS}
+    metrics = {name: number for name, number in joint.metrics.items() if name in JOINT_METRICS}
     return replace(
         joint,
         points=points,
@@ -253,12 +261,12 @@ def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> 
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=tuple(shifted_indices([body.cloud.rings[0] for body in bodies], counts)),
-        metrics=kept | _drop_metrics(solder, drops),
+        metrics=metrics | _drop_metrics(solder, drops),
     )
 
 
 def _drop_metrics(solder: Solder, drops: Sequence[Flowed]) -> Metrics:
-    """Volume and height of each drop with their errors, and what an array is judged by."""
+    """Return volume and height of each drop with their errors, and the metrics that decide the verdict of an array."""
     metrics: Metrics = ledger([flow for flow, _ in drops]) | {
         "max_width": (max(run.profiles[-1].max_width for _, run in drops), "m"),
         "axial_force": (0.0, "N"),

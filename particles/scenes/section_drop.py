@@ -1,8 +1,8 @@
-"""A drop on a uniform wall in section, by the scheme ispg: a meridian, or a plane where it is the same along y.
+"""Drop on a uniform wall in section, by the scheme ispg: a meridian, or a plane section of a drop uniform along y.
 
-A body of revolution starts as a cylinder as high as the cube that other drops start as. In a plane it starts as the
-cube's section, and the piece of it that has the volume is as deep as the cube. What acts on it is what acts on a body,
-with the forces of a polyline in the place of those of triangles.
+A body of revolution starts as a cylinder as high as the initial cube of other drops. A plane drop starts as the section
+of the cube; the piece with the drop's volume is as deep as the cube. The same effects act as on a body, with forces of
+a polyline instead of triangles.
 """
 
 import numpy as np

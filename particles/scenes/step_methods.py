@@ -1,7 +1,7 @@
 """Registry of the particle methods that solve a time step of a reflow: one record for each.
 
-A method is chosen by the scheme of the case and by the effects that act. The limits of the schemes are in
-`parameters/schemes.py`.
+The scheme of the case and the active effects select the method. The limits of the schemes are in
+``parameters/schemes.py``.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +25,7 @@ class StepMethod:
     """Particle method that solves a time step.
 
     Attributes:
-        name: Name of the method, for readers.
+        name: Name of the method in reports.
         scheme: Scheme of a case that selects it.
         build: Function of the solder that returns the step solver.
         applies: Function of the effects (name -> on or off) that returns whether the method computes them.
@@ -40,11 +40,11 @@ class StepMethod:
 
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
-    """Return whether an effect acts that a liquid at rest does not feel: inertia or viscosity."""
+    """Return whether inertia or viscosity acts, which have no effect at rest."""
     return any(effects.get(name, False) for name in AT_REST)
 
 
-# The first method whose scheme is selected and that computes the effects is taken.
+# The first method of the selected scheme that computes the active effects is used.
 STEP_METHODS = (
     StepMethod(
         "incompressible smoothed particle Galerkin",
@@ -59,7 +59,7 @@ STEP_METHODS = (
 
 
 def step_method(solder: Solder, effects: Mapping[str, bool]) -> StepMethod:
-    """Return the method that computes a solder with the effects that are on."""
+    """Return the particle method for the scheme of a solder and its active effects."""
     return next(m for m in STEP_METHODS if m.scheme == solder.numerics.scheme and m.applies(effects))
 
 

@@ -199,7 +199,7 @@ class Polyline:
 
         Args:
             line: Vertices, shape (s, 3) [m].
-            heights: Heights, none equal to that of a vertex, shape (k,) [m].
+            heights: Heights, all different from the heights of the vertices, shape (k,) [m].
 
         Returns:
             Areas, shape (k,) [m^2].

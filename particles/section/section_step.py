@@ -2,7 +2,7 @@
 
 Mesh smoothing spaces the vertices of the polyline evenly at the rate of mesh smoothing in space; particles below the
 surface are shifted as in space. The hoop terms of the implicit surface tension are essential: without them the axis is
-unstable from some 50 steps per period on. Masses are those of the nodal volumes V alone.
+unstable from some 50 steps per period on. Masses follow from the nodal volumes V alone.
 """
 
 from collections.abc import Callable, Mapping

@@ -48,8 +48,8 @@ class Capillarity:
 
         Args:
             mesh: The surface.
-            drift: Velocities of the vertices over the sliding velocity, shape (m, 2), as `relative_drift` returns them.
-                Without them contact lines have one angle.
+            drift: Velocities of the vertices over the sliding velocity, shape (m, 2), as ``relative_drift`` returns
+                them. Without them contact lines have one angle.
 
         Returns:
             Forces -d(E - p V)/dx, shape (m, 3) [N], and the pressure p [Pa].
@@ -91,7 +91,7 @@ def _balancing_pressure(mesh: SurfaceMesh, forces: Floats) -> float:
 def outward_along(line: Floats) -> Floats:
     """Return the outward normals of a contact line within the wall, shape (k, 2) [m].
 
-    Their length is that of the line about each vertex.
+    Their length is half the distance between the two neighbours of each vertex.
 
     Args:
         line: Vertices of the contact line, shape (k, 3) [m].
@@ -111,8 +111,8 @@ def contact_cosines(lowest: float, highest: float, outward: Floats, push: Floats
     Args:
         lowest: Cosine of the advancing angle.
         highest: Cosine of the receding angle.
-        outward: Normals within the wall, as `outward_along` returns them, shape (k, 2) [m].
-        push: Forces on the vertices, without that of the wall, over the surface tension, shape (k, 2) [m].
+        outward: Normals within the wall, as ``outward_along`` returns them, shape (k, 2) [m].
+        push: Forces on the vertices except the wall force, over the surface tension, shape (k, 2) [m].
         drift: Velocities of the vertices over the sliding velocity, shape (k, 2).
     """
     length = np.hypot(outward[:, 0], outward[:, 1])

@@ -1,7 +1,7 @@
-"""CUDA kernels: loops over the same functions of one particle that `thread_particles.py` runs on threads.
+"""CUDA kernels: loops over the same functions of one particle that ``threads.py`` runs on threads.
 
-Particles are stored by cells, those of the liquid first, so that a warp reads neighbouring memory. The array ``state``,
-shape (13, n), has the rows `STATE`; ``walls``, shape (5, m), has the fields that only wall particles have. Load this
+Particles are stored by cells, liquid particles first, so that a warp reads neighbouring memory. The array ``state``,
+shape (13, n), has the rows ``STATE``; ``walls``, shape (5, m), has the fields that only wall particles have. Load this
 module only where a case asks for a GPU.
 """
 
@@ -37,7 +37,7 @@ class Speeds(NamedTuple):
 
 @njit
 def fields_of(state, walls):
-    """Return the rows of ``state`` and ``walls`` as `Fields`."""
+    """Return the rows of ``state`` and ``walls`` as ``Fields``."""
     return Fields(
         state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10],
         state[11], walls[0], walls[1], walls[2], walls[3], walls[4], state[12],

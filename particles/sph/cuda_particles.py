@@ -40,12 +40,12 @@ class NoDeviceError(RuntimeError):
 
 
 class CudaParticles:
-    """Liquid and walls on a GPU, with the interface of `ThreadParticles` and equal results up to rounding.
+    """Liquid and walls on a GPU, with the interface of ``ThreadParticles`` and equal results up to rounding.
 
     Particles of a periodic flow are moved into its domain.
 
     Raises:
-        NoDeviceError: There is no CUDA device.
+        NoDeviceError: The machine has no CUDA device.
     """
 
     def __init__(self, fields: Fields, fluids: int, law: Law) -> None:
@@ -118,7 +118,7 @@ class CudaParticles:
 
     @property
     def velocity(self) -> Floats:
-        """Velocities by which `predict` moved the liquid, shape (3, n) [m/s]; valid until `settle`."""
+        """Velocities by which ``predict`` moved the liquid, shape (3, n) [m/s]; valid until ``settle``."""
         if not self._law.xsph:
             return self._on_host(self._middle[:3])
         middle = self._on_host(self._middle)
@@ -204,7 +204,7 @@ class CudaParticles:
         return np.asarray(result.copy_to_host())
 
     def _have_moved(self) -> bool:
-        """Return whether lists may lack pairs; see `core.neighbours.have_moved`."""
+        """Return whether lists may lack pairs; see ``core.neighbours.have_moved``."""
         span = self._largest(loops.find_span, self._count, 7, self._built_at)
         high, low, limit = span[:6:2], -span[1:6:2], (0.5 * SKIN * self._law.length) ** 2
         if not span[6] and 0.25 * ((high - low) ** 2).sum() <= limit:  # no displacement is outside this box

@@ -52,7 +52,7 @@ class FlowRun:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.simulation.restore(saved["simulation"])
         self.rows = [tuple(row) for row in saved["rows"].tolist()]
         self.pictures, self.seconds = saved["pictures"], saved["seconds"]
@@ -81,7 +81,7 @@ def run_flow(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FlowRun:
-    """Run a simulation to a final time with about `SAMPLES` rows of history and `PICTURES` pictures.
+    """Run a simulation to a final time with about ``SAMPLES`` rows of history and ``PICTURES`` pictures.
 
     Args:
         simulation: Simulation in its initial state.
@@ -112,7 +112,7 @@ def _flow_until(
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint | None,
 ) -> None:
-    """Advance the simulation to the final time; arguments as for `run_flow`."""
+    """Advance the simulation to the final time; arguments as for ``run_flow``."""
     simulation = run.simulation
     while simulation.time < until:
         start = perf_counter()
@@ -132,7 +132,7 @@ def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     """Return the class of particles for the device of a flow; CUDA is imported only if it is requested.
 
     Raises:
-        NoDeviceError: There is no CUDA device.
+        NoDeviceError: The machine has no CUDA device.
     """
     if scene.numerics.device == "cpu":
         return ThreadParticles
@@ -181,7 +181,7 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
 
 
 def shear_law(scene: FlowScene) -> dict[str, Any]:
-    """Return the entries of `Law` for a shear-dependent viscosity."""
+    """Return the entries of ``Law`` for a shear-dependent viscosity."""
     rheology = scene.rheology
     if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
         return {"rheology": NEWTON, "exponent": 1.0, "shear_rate": 1.0, "least_viscosity": 0.0, "most_viscosity": 0.0}

@@ -1,6 +1,6 @@
 """Fields of a fluid and its walls, one array for each quantity, and parameters of the pair interactions.
 
-Particles 0 to `fluids` - 1 are liquid; the others are wall particles, in layers that fill the support of the liquid
+Particles 0 to ``fluids`` - 1 are liquid; the others are wall particles, in layers that fill the support of the liquid
 near the wall. A flow in a plane is in the plane of x and z.
 """
 
@@ -16,18 +16,18 @@ class Law(NamedTuple):
     """Parameters of the interaction of two particles; a term whose coefficient is zero does not act.
 
     Attributes:
-        kernel: Smoothing kernel, `CUBIC_SPLINE` or `WENDLAND_C2`.
+        kernel: Smoothing kernel, ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
         dimension: Dimension d of the flow, 1 to 3.
         length: Smoothing length h [m].
         norm: Normalisation sigma of the kernel [1/m^d].
         rest_density: Density at rest rho_0 [kg/m^3].
         sound: Speed of sound c0 [m/s].
         diffusion: Coefficient of density diffusion, delta h c0 [m^2/s].
-        gradient: Density gradient in the diffusion, `RENORMALISED` (3 x 3) or `REPRODUCING` (4 x 4, exact for linear
-            densities at surfaces, too).
+        gradient: Density gradient in the diffusion, ``RENORMALISED`` (3 x 3) or ``REPRODUCING`` (4 x 4, exact for
+            linear densities at surfaces, too).
         artificial: Artificial viscosity, alpha h c0 rho_0 [Pa s].
-        viscosity: Viscosity mu [Pa s]; with a shear-dependent law the one named in `Rheology`.
-        rheology: Viscosity law, `NEWTON`, `POWER_LAW` or `CARREAU`.
+        viscosity: Viscosity mu [Pa s]; with a shear-dependent law the one named in ``Rheology``.
+        rheology: Viscosity law, ``NEWTON``, ``POWER_LAW`` or ``CARREAU``.
         exponent: Exponent of the viscosity law.
         shear_rate: Reference shear rate of the viscosity law [1/s].
         least_viscosity: Lower bound of the viscosity [Pa s]; Carreau's viscosity at infinite rate.
@@ -92,7 +92,7 @@ class Fields(NamedTuple):
         wall_u: Velocities of wall particles along x, shape (m,) [m/s]; likewise wall_v, wall_w.
         wall_room: Share of the kernel about each wall particle that liquid fills when it covers the wall, shape (m,); 0
             for walls that always count fully.
-        wall_share: Weight of each wall particle, shape (m,): the liquid within its kernel over `wall_room`, at most
+        wall_share: Weight of each wall particle, shape (m,): the liquid within its kernel over ``wall_room``, at most
             one.
             So a wall of cured ink ends with the liquid at the contact line, as a mirror does.
         viscosity: Viscosities, shape (n,) [Pa s]; computed if they depend on the shear rate.

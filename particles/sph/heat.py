@@ -1,8 +1,8 @@
 """Heat conduction between particles and to the plate z = 0, with freezing by the enthalpy method.
 
 Conduction follows Cleary & Monaghan (1999): heat is exchanged between pairs, so its sum is conserved to rounding.
-The plate acts through images of the particles near it, whose temperature makes the mean with their own that of the
-plate. No heat is lost at a free surface. `reflowshock.materials.enthalpy` has the law between enthalpy and temperature.
+The plate acts through images of the particles near it: the mean temperature of a particle and its image is the plate
+temperature. A free surface is adiabatic. ``reflowshock.materials.enthalpy`` relates enthalpy and temperature.
 """
 
 from dataclasses import dataclass, field
@@ -33,9 +33,9 @@ def temperature_laplacian(i, neighbours, fields, temperatures, law):
     Args:
         i: Particle.
         neighbours: Neighbours of the particle, which include itself because of its image.
-        fields: `Fields` of all particles.
+        fields: ``Fields`` of all particles.
         temperatures: Temperatures of all particles and of their images, shape (2, n) [K].
-        law: `Law` of the particles.
+        law: ``Law`` of the particles.
     """
     x, y, z, temperature = fields.x[i], fields.y[i], fields.z[i], temperatures[0, i]
     periods, (line, inverse, scale, softening, _) = periods_of(law), constants_of(law)
@@ -106,5 +106,5 @@ class Heat:
 
 
 def enthalpy_at(freezing: Freezing, temperature: float) -> float:
-    """Return the specific enthalpy [J/kg] at a temperature [K]; at the melting point that of the liquid."""
+    """Return the specific enthalpy [J/kg] at a temperature [K]; at the melting point, of the liquid."""
     return float(enthalpy.enthalpy(temperature, freezing.melting_point, freezing.heat_capacity, freezing.latent_heat))

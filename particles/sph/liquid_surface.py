@@ -1,17 +1,17 @@
 """Tracked free surface of a liquid: triangles that the particles carry, and the forces of its energy on the particles.
 
-The vertices of the surface (`surface/surface_mesh.py`) move with the particles near them and hand their forces over to
-them by the same weights (`surface_coupling.py`). The surface loses the work that the particles gain, so a drop comes to
-rest. The forces are those of surface tension and wetting (`capillary_forces.py`).
+The vertices of the surface (``surface/surface_mesh.py``) move with the particles near them and hand their forces over
+to them by the same weights (``surface_coupling.py``). The surface loses the work that the particles gain, so a drop
+comes to rest. The forces are those of surface tension and wetting (``capillary_forces.py``).
 
 The pressure that balances the tension of the whole surface does nothing else in a body of liquid, so it is removed from
 both: vertices have the forces of E - p V, and particles only the rest of their pressure, which vanishes at rest. Hence
 neither the incomplete sums of particles at a free surface, which carry too little of a pressure, nor the stiffness of a
 lattice of particles under pressure matters; no parameter is fitted. Where that pressure is negative particles would
-cluster; they are shifted towards lower concentration (`simulation.py`), and the surface stands for the neighbours that
-they lack.
+cluster; they are shifted towards lower concentration (``simulation.py``), and the surface stands for the neighbours
+that they lack.
 
-Triangles are remeshed every few steps (`surface/remeshing.py`). Liquids whose surfaces are closer than a particle
+Triangles are remeshed every few steps (``surface/remeshing.py``). Liquids whose surfaces are closer than a particle
 spacing merge; volume is restored, and particles and their momentum are not changed.
 """
 
@@ -35,8 +35,8 @@ from reflowshock.particles.surface.morphological_closing import TopologyChange
 from reflowshock.particles.surface.remeshing import SurfaceRemeshing
 from reflowshock.particles.surface.surface_mesh import SurfaceLost, SurfaceMesh
 
-# Largest share of vertices without a particle within reach, which follow the nearest one. An impact at a Weber number
-# of 1000 whose rim breaks up has 0.003 at most.
+# Largest share of vertices without a particle within the kernel support; these follow the nearest particle. In an
+# impact at a Weber number of 1000 whose rim breaks up, the share is at most 0.003.
 MOST_ALONE = 0.1
 
 
@@ -49,7 +49,7 @@ class LiquidSurface:
         capillarity: Surface tension and contact angles.
         coupling: Particles near each vertex.
         remeshing: What was changed in the triangles.
-        pressure: Pressure of the liquid above that of its particles [Pa].
+        pressure: Uniform pressure of the liquid in addition to the particle pressures [Pa].
         spray: Volume of the particles outside the surface [m^3].
     """
 
@@ -71,7 +71,7 @@ class LiquidSurface:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.mesh.restore(saved["mesh"])
         self.remeshing.restore(saved["remeshing"])
         self.pressure, self.spray = saved["pressure"], saved["spray"]
@@ -114,7 +114,7 @@ class LiquidSurface:
 
     @property
     def needs_volume(self) -> bool:
-        """Whether the next `move` remeshes, and so needs the volume of the liquid."""
+        """Whether the next ``move`` remeshes, and so needs the volume of the liquid."""
         return self.remeshing.is_due_next
 
     @property
@@ -148,7 +148,7 @@ class LiquidSurface:
         """Compute the forces on the vertices, shape (m, 3) [N], and store the pressure that balances them.
 
         Args:
-            drift: As for `Capillarity.forces`.
+            drift: As for ``Capillarity.forces``.
         """
         forces, self.pressure = self.capillarity.forces(self.mesh, drift)
         return forces

@@ -13,8 +13,8 @@ def predict(i, fields, rates, middle, time_step):
 
     Args:
         i: Particle.
-        fields: `Fields` of all particles.
-        rates: Rates as `rates_of` returns them, shape (10, n).
+        fields: ``Fields`` of all particles.
+        rates: Rates as ``rates_of`` returns them, shape (10, n).
         middle: Values in the middle of the step, shape (7, n), of which the first four rows are written.
         time_step: Time step [s].
     """
@@ -42,7 +42,7 @@ def settle(i, fields, middle, law):
 def reflect(i, fields, law):
     """Replace a particle behind the mirror z = 0 by its image; return -1 if it was replaced, else 1.
 
-    There is no branch, since with one threads would count references to all fields for every particle.
+    The code has no branch, since with a branch threads would count references to all fields for every particle.
     """
     side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
     fields.z[i] *= side
@@ -85,7 +85,7 @@ def speed2_of(i, fields):
 
 @compiled
 def cover(k, i, fields, found, law):
-    """Write the ``values`` that `wall_values` returns to the k-th wall particle, particle i of all."""
+    """Write the ``values`` that ``wall_values`` returns to the k-th wall particle, particle i of all."""
     pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share
     fields.density[i] = law.rest_density + pressure / (law.sound * law.sound)

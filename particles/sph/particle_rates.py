@@ -58,7 +58,7 @@ def apart(place, j, side, fields, periods):
 
 @compiled
 def positive(value):
-    """Return a value, or zero if it is negative or not a number; Numba 0.68 cannot compile `max` for a GPU."""
+    """Return a value, or zero if it is negative or not a number; Numba 0.68 cannot compile ``max`` for a GPU."""
     return value if value > 0.0 else 0.0
 
 
@@ -105,8 +105,8 @@ def rates_of(i, fluids, neighbours, fields, law):
         i: Particle.
         fluids: Number of liquid particles.
         neighbours: Row of the particle, liquid neighbours first.
-        fields: `Fields` of all particles.
-        law: `Law` of the particles.
+        fields: ``Fields`` of all particles.
+        law: ``Law`` of the particles.
 
     Returns:
         Rate of density [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4], gradient of the
@@ -237,7 +237,7 @@ def drift_of(i, fluids, neighbours, fields, law):
 
 @compiled
 def solved(moments, sums, dimension):
-    """Return the gradient `moments^-1 sums`, in a plane with x and z only; zero if neighbours do not resolve it."""
+    """Return the gradient ``moments^-1 sums``, in a plane with x and z only; zero if neighbours do not resolve it."""
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
     if dimension == 1:
@@ -319,7 +319,7 @@ def wall_values(i, fluids, neighbours, fields, law):
 
     The pressure is extrapolated from the liquid with its hydrostatic part. With a free surface that is not tracked it
     is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the wall's velocity at
-    its face. The weight is `Fields.wall_share`.
+    its face. The weight is ``Fields.wall_share``.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1

@@ -1,6 +1,6 @@
 """Shear-dependent viscosity, for threads and CUDA: power law and Carreau, with the shear rate at a particle.
 
-The shear rate is sqrt(2 D : D) of the renormalised velocity gradient. `parameters/rheology.py` has the parameters.
+The shear rate is sqrt(2 D : D) of the renormalised velocity gradient. ``parameters/rheology.py`` has the parameters.
 """
 
 from math import sqrt

@@ -1,9 +1,9 @@
 """Time integration of delta-SPH: velocity Verlet with one loop over the pairs in each step.
 
-A step is a short sequence of loops over particles, which run on threads or on a GPU (`threads.py`,
-`cuda_particles.py`); a tracked surface stays on the processor. Density follows the continuity equation with diffusion
+A step is a short sequence of loops over particles, which run on threads or on a GPU (``threads.py``,
+``cuda_particles.py``); a tracked surface stays on the processor. Density follows the continuity equation with diffusion
 along its renormalised gradient (delta-SPH), and pressure is linear in density. Particles are shifted towards lower
-concentration (Sun et al. 2017) where there is no free surface or a tracked one; without shifting vortices decay twice
+concentration (Sun et al. 2017) unless the free surface is untracked; without shifting vortices decay twice
 too fast.
 """
 
@@ -21,7 +21,7 @@ from reflowshock.particles.sph.threads import ThreadParticles
 
 
 class Particles(Protocol):
-    """Interface of the particles on a device and of the loops over them; see `threads.ThreadParticles`."""
+    """Interface of the particles on a device and of the loops over them; see ``threads.ThreadParticles``."""
 
     @property
     def fields(self) -> Fields:
@@ -29,7 +29,7 @@ class Particles(Protocol):
 
     @property
     def rates(self) -> Floats:
-        """Rates of the liquid at the last positions, as `rates_of` returns them, shape (10, n)."""
+        """Rates of the liquid at the last positions, as ``rates_of`` returns them, shape (10, n)."""
 
     @property
     def built_at(self) -> Floats:
@@ -53,7 +53,7 @@ class Particles(Protocol):
 
     @property
     def velocity(self) -> Floats:
-        """Velocities by which `predict` moved the liquid, shape (3, n) [m/s]."""
+        """Velocities by which ``predict`` moved the liquid, shape (3, n) [m/s]."""
 
     def restore(self, fields: Fields, rates: Floats, built_at: Floats, builds: int, /) -> None:
         """Continue from saved fields, rates and positions of the neighbour lists."""
@@ -91,7 +91,7 @@ class Simulation:
         surface: Tracked surface; None without surface tension.
         device: Creates particles from fields, number of liquid particles and law.
         held: Number of fixed particles after the liquid's that still carry the surface.
-        particles: Particles, with positions, velocities and densities at `time`.
+        particles: Particles, with positions, velocities and densities at ``time``.
         time: Time [s].
         steps: Number of time steps.
     """
@@ -119,7 +119,7 @@ class Simulation:
 
     @property
     def rates(self) -> Floats:
-        """Rates of the liquid at the last positions, as `rates_of` returns them, shape (10, n)."""
+        """Rates of the liquid at the last positions, as ``rates_of`` returns them, shape (10, n)."""
         return self.particles.rates
 
     @property
@@ -148,7 +148,7 @@ class Simulation:
 
     @property
     def pressures(self) -> Floats:
-        """Pressure of the liquid particles, that of the surface included, shape (fluids,) [Pa]."""
+        """Pressure of the liquid particles including the surface pressure, shape (fluids,) [Pa]."""
         return self.fields.pressure[: self.fluids] + (self.surface.pressure if self.surface else 0.0)
 
     def saved(self) -> dict[str, Any]:
@@ -160,7 +160,7 @@ class Simulation:
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.particles.restore(Fields(**saved["fields"]), saved["rates"], saved["built_at"], saved["builds"])
         self.time, self.steps = saved["time"], saved["steps"]
         if self.surface:
@@ -176,8 +176,8 @@ class Simulation:
     def step(self, time_step: float) -> None:
         """Advance by a time step [s].
 
-        Rates at the new time depend on the velocities and densities at that time; those predicted from the last rates
-        are used, which keeps second order.
+        Rates at the new time depend on velocities and densities at that time; predictions from the last rates replace
+        them, which preserves second order.
         """
         particles, law = self.particles, self.law
         volume = self._volume_within() if self.surface and self.surface.needs_volume else 0.0
@@ -202,7 +202,7 @@ class Simulation:
         return float(volumes.sum()) - surface.spray
 
     def _find_rates(self) -> None:
-        """Compute the rates for the present fields, those of the surface included."""
+        """Compute the rates for the present fields, including surface tension."""
         self.particles.find_rates()
         if self.surface:
             carriers, surface = self.fluids + self.held, self.surface

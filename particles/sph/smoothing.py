@@ -58,7 +58,7 @@ def beyond_plane(kernel: int, distance: Floats) -> Floats:
     Of a sphere of radius r about the point the area 2 pi r (r - distance) is beyond the plane.
 
     Args:
-        kernel: `CUBIC_SPLINE` or `WENDLAND_C2`.
+        kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
         distance: Distances of the points from the plane over h, shape (n,).
     """
     return np.interp(distance, *_table_beyond_plane(kernel))
@@ -67,6 +67,6 @@ def beyond_plane(kernel: int, distance: Floats) -> Floats:
 @lru_cache
 def _table_beyond_plane(kernel: int) -> tuple[Floats, Floats]:
     radius = np.linspace(0.0, SUPPORT, 801)
-    level = norm(kernel, 3, 1.0) * np.array([shape(kernel, False, one) for one in radius])
+    level = norm(kernel, 3, 1.0) * np.array([shape(kernel, False, r) for r in radius])
     area = 2.0 * pi * radius * np.maximum(radius - radius[:, None], 0.0)
     return radius, trapezoid(level * area, radius, axis=1)

@@ -1,8 +1,8 @@
 """Coupling between the vertices of a liquid's surface and the particles near them.
 
 A vertex moves with the mean velocity of the particles within the support of the kernel W, weighted by W; its force is
-distributed to the same particles by the same weights. So the work of the forces is that of the particles, and momentum
-is conserved. Above a wall in z = 0 mirror images of the particles count, too.
+distributed to the same particles by the same weights. So the particles receive exactly the work of the forces,
+and momentum is conserved. Above a wall in z = 0 mirror images of the particles count, too.
 """
 
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ class SurfaceCoupling:
         """Compute the kernel between points, one for each vertex, and the particles near the vertices.
 
         Returns:
-            Weights and their sums at the points, as `find_weights` writes and returns them.
+            Weights and their sums at the points, as ``find_weights`` writes and returns them.
         """
         weights = np.empty((2, 2, len(self.lists[1])))
         return weights, find_weights(points, self.lists, fields, self.law, weights)
@@ -103,7 +103,7 @@ class SurfaceCoupling:
 
 
 def near_vertices(vertices: Floats, particles: Floats, reach: float) -> tuple[Indices, Indices]:
-    """Find the particles near each vertex, or the nearest one if there is none within reach.
+    """Find the particles near each vertex, or the nearest one if none is within the kernel support.
 
     Args:
         vertices: Vertices, shape (m, 3) [m].
@@ -129,8 +129,8 @@ def find_weights(points, lists, fields, law, weights):
     Args:
         points: Vertices, shape (m, 3) [m].
         lists: Offsets and indices of the particles near each vertex.
-        fields: `Fields` of the particles.
-        law: `Law` of the particles.
+        fields: ``Fields`` of the particles.
+        law: ``Law`` of the particles.
         weights: Output, shape (2, 2, pairs). Row 1 has W [1/m^3] for components along a wall and, with reversed images,
             across it; row 0 the same over the sum of W along the wall at the vertex. Without a particle within the
             support the nearest one has the whole weight.
@@ -203,7 +203,7 @@ def find_distances_to_cover(vertices, lists, fields, cover, distances):
     Args:
         vertices: Points (m, 3) [m] and outward unit normals (m, 3).
         lists: Offsets and indices of the particles near each vertex.
-        fields: `Fields` of the particles.
+        fields: ``Fields`` of the particles.
         cover: Least and largest distance of the surface beyond a particle [m]; half the curvature of the surface about
             a particle [1/m]; distance outside a vertex from which on particles are left out [m].
         distances: Output, shape (m,) [m].

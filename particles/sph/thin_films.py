@@ -22,7 +22,7 @@ LOWEST = 0.75
 # Largest drag over the rate at which sound crosses the smoothing length; a stronger one is unstable in a time step.
 STRONGEST = 2.0
 # A vertex is level if its unit normal has more than the first component across the wall; a film is where more than the
-# second share of the surface is level. Rims, and liquid that rolls over a contact line, are no films.
+# second share of the surface is level. Rims and liquid that rolls over a contact line are excluded.
 LEVEL, MOST = 0.7, 0.5
 
 
@@ -48,7 +48,7 @@ def film_sums(
 
 @njit(cache=True)
 def _sum_surface(points, normals, lists, kernel, sums):
-    """Add the sums of `film_sums`."""
+    """Add the sums of ``film_sums``."""
     offsets, indices = lists
     for v in range(points.shape[0]):
         is_level = normals[v, 2] > LEVEL
@@ -65,7 +65,7 @@ def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> 
     """Subtract the missing friction of the wall z = 0 from the accelerations of particles in films.
 
     Args:
-        sums: Surface near each particle, as `film_sums` returns it, shape (3, particles).
+        sums: Surface near each particle, as ``film_sums`` returns it, shape (3, particles).
         fields: Fields of all particles.
         law: Parameters of the pair interactions.
         rates: Rates of the liquid, shape (10, n); rows 1 and 2 change.

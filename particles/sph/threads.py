@@ -1,8 +1,8 @@
 """Particles of a simulation on threads: arrays, neighbour lists, and the loops over particles.
 
-Each loop calls a function of one particle, which `cuda_loops.py` runs on a GPU. An array that a loop writes is a
+Each loop calls a function of one particle, which ``cuda_loops.py`` runs on a GPU. An array that a loop writes is a
 separate argument: if it were only in a tuple, Numba could drop the loop. The index of a parallel loop is unsigned, but
-Numba first compiles with a signed one; `np.uint64` avoids that every called function is compiled twice.
+Numba first compiles with a signed one; ``np.uint64`` avoids that every called function is compiled twice.
 """
 
 from collections.abc import Callable, Sequence
@@ -116,7 +116,7 @@ class ThreadParticles:
 
     Attributes:
         fields: Fields of all particles.
-        rates: Rates of the liquid, as `rates_of` returns them, shape (10, n).
+        rates: Rates of the liquid, as ``rates_of`` returns them, shape (10, n).
         rows: Neighbour table.
     """
 
@@ -165,7 +165,7 @@ class ThreadParticles:
 
     @property
     def velocity(self) -> Floats:
-        """Velocities by which `predict` moved the liquid, shape (3, n) [m/s]; valid until `settle`."""
+        """Velocities by which ``predict`` moved the liquid, shape (3, n) [m/s]; valid until ``settle``."""
         return self._middle[:3] + self._middle[4:] if self._law.xsph else self._middle[:3]
 
     def settle(self) -> None:

@@ -39,7 +39,7 @@ def solve_droplet(
 ) -> FlowResult:
     """Compute the motion of a droplet.
 
-    Raises: as `follow`.
+    Raises: as ``follow``.
     """
     return follow(scene, droplet(scene), progress, checkpoint)
 

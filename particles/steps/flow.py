@@ -210,8 +210,8 @@ class LiquidFlow:
 
         The motion may change at its present rate until nothing of it is left. A body that has overflowed both pads
         slides as a whole, resisted only by a mass term that grows with smaller steps, and would creep. The motion must
-        equal that of the last step, smoothing included: where smoothing undoes what the forces move, these move the
-        same distance in each step, too, but to no effect.
+        equal the last motion, smoothing included: where smoothing undoes the motion by the forces, the
+        forces cause the same motion in each step, too, but to no effect.
         """
         if self.solver.traits.keeps_time:
             return 1.0

@@ -1,6 +1,6 @@
 """Relaxation step: the free surface relaxes at constant volume, the particles below it follow as potential flow.
 
-Without inertia and viscosity a step is no physical motion; only the energy of the surface counts:
+Without inertia and viscosity a step is not a physical motion; only the energy of the surface counts:
 
     A v = f + p a,     a . v = dV/dt
 
@@ -10,10 +10,10 @@ of the surface motion drives a potential flow inside, which keeps the particles 
 rest.
 
 No step raises the energy of the triangles, and the volume is exact (``descent.py``). At rest the forces balance except
-for what mesh smoothing undoes: where a contact line leaves the edge of a pad at a sharp corner, the energy of ever more
-distorted triangles would be lower. The load of gravity is the gradient of its energy to second order. Mesh smoothing
-would shift a free body, so its centre is restored. A motion that does not change from step to step is taken for many
-steps at once. The number of iterations does not grow with the number of particles.
+for displacements that mesh smoothing undoes: where a contact line leaves the edge of a pad at a sharp corner, ever more
+distorted triangles would lower the energy. The load of gravity is the gradient of its energy to second order. Mesh
+smoothing would shift a free body, so its centre is restored. A motion that does not change from step to step continues
+for many steps at once. The number of iterations does not grow with the number of particles.
 """
 
 from collections.abc import Mapping
@@ -59,7 +59,7 @@ class Relaxation:
 
     @property
     def traits(self) -> SolverTraits:
-        """Properties of the scheme: it descends, and a step is no physical motion."""
+        """Properties of the scheme: it descends, and a step is not a physical motion."""
         return SolverTraits(SUPPORT, SMOOTHING_PASSES, descends=True, keeps_time=False)
 
     def prepare(self, body: Body, physics: Physics, neighbours: NeighbourList) -> "PreparedRelaxation":

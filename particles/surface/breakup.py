@@ -81,7 +81,7 @@ def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Float
 
 
 def largest_part(points: Floats, triangles: Indices) -> Floats:
-    """Return the vertices (k, 3) [m] of the part with the largest volume; arguments as for `volumes_of_parts`."""
+    """Return the vertices (k, 3) [m] of the part with the largest volume; arguments as for ``volumes_of_parts``."""
     part, volumes = volumes_of_parts(points, triangles)
     return points[np.unique(triangles[part == volumes.argmax()])]
 

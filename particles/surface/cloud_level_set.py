@@ -135,7 +135,7 @@ def with_lids(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> t
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Loops to close, as `boundary_loops` returns them.
+        rings: Loops to close, as ``boundary_loops`` returns them.
 
     Returns:
         Vertices, of which the last ones are the mean points, and triangles.
@@ -186,7 +186,7 @@ def _with_volume(
 
 
 def _interior(level: LevelSet, walls: Sequence[Plate]) -> Floats:
-    """Return the points of a cubic lattice deeper than `DEPTH` spacings, shape (m, 3) [m]; layers lie on the walls."""
+    """Return the lattice points deeper than ``DEPTH`` spacings, with layers on the walls, shape (m, 3) [m]."""
     axes, spacing = level.grid.axes(), level.grid.spacing
     heights = [plate.origin[2] for plate in walls]
     if len(walls) == 1:

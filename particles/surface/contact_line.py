@@ -39,7 +39,7 @@ class ContactLine:
         edges: Distance of pinned vertices from the centre of each pad, shape (m,) [m].
         pad: Pad whose edge is nearest to each vertex, shape (k,).
         state: State of each vertex, PINNED, ON_PAD or ON_MASK, shape (k,).
-        constant: Sum of the jumps of the formula of `cosine_area` at changes of state [m^2].
+        constant: Sum of the jumps of the formula of ``cosine_area`` at changes of state [m^2].
         stopped: Whether each vertex was pinned at the end of the last step and stays pinned in the next one, shape
             (k,).
     """
@@ -77,7 +77,7 @@ class ContactLine:
         return {"pads": self.pads} | {name: getattr(self, name) for name in SAVED}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self._take_pads(saved["pads"])
         for name in SAVED:
             setattr(self, name, saved[name])
@@ -100,7 +100,7 @@ class ContactLine:
 
     @property
     def has_energy(self) -> bool:
-        """Whether the force on the line is the gradient of an energy, `cosine_area`."""
+        """Whether the force on the line is the gradient of an energy, ``cosine_area``."""
         return True
 
     @property
@@ -126,7 +126,7 @@ class ContactLine:
         return (self._level(body) + self.constant) / body.cloud.parts
 
     def cosine_area_gradient(self, body: Body) -> Floats:
-        """Return the gradient of `cosine_area` with respect to the vertices of the line, shape (k, 3) [m]."""
+        """Return the gradient of ``cosine_area`` with respect to the vertices of the line, shape (k, 3) [m]."""
         ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = plate.local(points)[:, :2], self.pad[index]
@@ -140,8 +140,8 @@ class ContactLine:
         """Return the integral for the line around the whole body up to a constant [m^2].
 
         A segment next to a pinned vertex has the cosine of its free end. A segment between pinned vertices has none; if
-        they are not evenly spaced, its area differs from that of its part of the edge, so the formula jumps when one of
-        them is released.
+        they are not evenly spaced, its area differs from the area at its part of the edge, so the formula jumps when
+        one of them is released.
         """
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
@@ -154,7 +154,7 @@ class ContactLine:
         return float(self._mask_cosine * area + self._beyond_mask(index) @ beyond)
 
     def _beyond_mask(self, index: NDArray[np.int64]) -> Floats:
-        """Return the mean cosine of the free ends of each segment minus that of the mask, shape (k,).
+        """Return the mean cosine of the free ends of each segment minus the cosine on the mask, shape (k,).
 
         It is zero for a segment from one pad to another.
         """
@@ -179,12 +179,12 @@ class ContactLine:
         """Return the cosine of the contact angle at each vertex from the balance of forces, shape (k,).
 
         The free surface pulls with -gamma cos(theta) a unit length. The load includes the pressure on the vertex's
-        share of the surface, so that the angle is that at the wall, not that of the first triangle. It is averaged over
+        share of the surface, so that the angle is measured at the wall, not in the first triangle. It is averaged over
         neighbours with the weights 1/4, 1/2, 1/4, since vertices with few and with many triangles alternate.
 
         Args:
             body: Liquid body.
-            load: All forces except those of the wall, with the pressure, shape (n, 3) [N].
+            load: All forces except wall forces, including the pressure, shape (n, 3) [N].
             coefficient: Surface tension [N/m].
         """
         outward, length = self.outward(body)
@@ -197,7 +197,7 @@ class ContactLine:
 
         Args:
             body: Liquid body.
-            load: As for `contact_cosine`.
+            load: As for ``contact_cosine``.
             coefficient: Surface tension [N/m].
         """
         ring, plate = body.cloud.rings[self.wall], body.plates[self.wall]
@@ -223,7 +223,7 @@ class ContactLine:
 
         Args:
             body: Liquid body.
-            load: As for `contact_cosine`.
+            load: As for ``contact_cosine``.
             coefficient: Surface tension [N/m].
         """
         no_vertex = np.zeros(len(self.state), bool)
@@ -298,7 +298,7 @@ def sectors(local: Floats) -> Floats:
 
 
 def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
-    """Return the gradient of the weighted sum of `_sectors`, with weights (k,), shape (k, 2) [m]."""
+    """Return the gradient of the weighted sum of ``_sectors``, with weights (k,), shape (k, 2) [m]."""
     following, previous = weight[:, None], behind(weight)[:, None]
     across = following * ahead(local) - previous * behind(local)
     return 0.5 * np.column_stack((across[:, 1], -across[:, 0]))
@@ -311,6 +311,6 @@ def _turns(local: Floats) -> Floats:
 
 
 def _turns_gradient(local: Floats, weight: Floats) -> Floats:
-    """Return the gradient of the weighted sum of `_turns`, with weights (k,), shape (k, 2) [1/m]."""
+    """Return the gradient of the weighted sum of ``_turns``, with weights (k,), shape (k, 2) [1/m]."""
     around = np.column_stack((-local[:, 1], local[:, 0])) / (local**2).sum(axis=1)[:, None]
     return (behind(weight) - weight)[:, None] * around

@@ -69,7 +69,7 @@ class HystereticLine(ContactLine):
 
         Args:
             body: Liquid body.
-            load: As for `ContactLine.contact_cosine`.
+            load: As for ``ContactLine.contact_cosine``.
             coefficient: Surface tension [N/m].
         """
         outward, _ = self.outward(body)
@@ -87,7 +87,7 @@ class FrictionLine(HystereticLine):
     Coulomb's law holds at each vertex: while the vertex is pinned, the wall pulls with gamma cos(theta) a unit length,
     where theta between both angles is the one that balances the other forces. A moving vertex has the force of one of
     the angles, against its motion. Which vertices are pinned is found with the velocities of the step
-    (`update_states`), so friction never adds energy.
+    (``update_states``), so friction never adds energy.
     """
 
     @property

@@ -64,7 +64,7 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
 
 
 def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
-    """Compute the signed distance as `signed_distance` does, limited to the half width ``band`` [m] in magnitude."""
+    """Compute the signed distance as ``signed_distance`` does, limited to the half width ``band`` [m] in magnitude."""
     distance = np.full(grid.shape, band)
     near_distance.lower_to_distance(points, triangles, grid.origin, grid.spacing, distance)
     return LevelSet(grid, np.where(winding_numbers_on(grid, points, triangles) > 0, -distance, distance))

@@ -61,7 +61,7 @@ def _plane(points, corners):
 def _squared_distance(node, points, corners, plane, limit2):
     """Return the squared distance of a node to a triangle [m^2]; infinity if the plane alone is beyond the limit.
 
-    ``plane``: As `_plane` returns it.
+    ``plane``: As ``_plane`` returns it.
     """
     (nx, ny, nz), size2 = plane
     a = corners[0]

@@ -112,7 +112,7 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles of the free surface, shape (t, 3).
-        span: Lowest and highest height of the fit [m]; by default those of the vertices.
+        span: Lowest and highest height of the fit [m]; by default of the vertices.
         parts: Number of parts like this one that planes of symmetry through the z axis make of the whole body.
     """
     z = points[np.unique(triangles), 2]

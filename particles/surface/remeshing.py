@@ -68,7 +68,7 @@ class SurfaceRemeshing:
     Attributes:
         steps: Number of time steps.
         rebuilds: Number of attempts to rebuild the surface.
-        waits: For each reason in `GAPS` the step from which on it is tried again, and the last wait in passes.
+        waits: For each reason in ``GAPS`` the step from which on it is tried again, and the last wait in passes.
         topology_changes: Merged and separated liquids.
         detachments: Number of events in which parts too small for particles lost their surface.
     """
@@ -87,7 +87,7 @@ class SurfaceRemeshing:
         }  # fmt: skip
 
     def restore(self, saved: dict[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.steps, self.rebuilds, self.waits = saved["steps"], saved["rebuilds"], dict(saved["waits"])
         self.topology_changes, self.detachments = saved["topology_changes"], saved["detachments"]
 
@@ -121,7 +121,7 @@ class SurfaceRemeshing:
                 return
 
     def rebuild(self, mesh: SurfaceMesh, reason: str, energy: Callable[[SurfaceMesh], float]) -> None:
-        """Triangulate the surface from its signed distance, for one of the reasons in `GAPS`."""
+        """Triangulate the surface from its signed distance, for one of the reasons in ``GAPS``."""
         parts, energy_before, gaps = count_parts(mesh.triangles), energy(mesh), GAPS[reason]
         _, wait = self.waits.get(reason, (0, 1))
         new = rebuilt_from_distance(mesh.points, mesh.triangles, mesh.has_wall, mesh.spacing, gaps)
@@ -189,7 +189,7 @@ def without_dry_spots(
         spacing: Particle spacing [m].
 
     Returns:
-        New vertices and triangles; None if there are no such spots.
+        New vertices and triangles; None without such spots.
     """
     spots = [ring for ring in rings if -(spacing**2) < area_within(points[ring]) < 0.0]
     if not spots:
@@ -229,7 +229,7 @@ def rebuilt_from_distance(
             is thinner; 0 keeps the shape.
 
     Returns:
-        New vertices and triangles for the first width that works; None if there is none.
+        New vertices and triangles for the first width that works; None if no width works.
     """
     closed = with_mirror_image(points, triangles) if has_wall else (points, triangles)
     distance = signed_distance(*closed, Grid.around(closed[0], EDGE * spacing))

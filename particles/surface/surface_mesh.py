@@ -1,7 +1,7 @@
 """Triangulated free surface of a liquid, closed by the wall z = 0 or lying on solid ground.
 
-Where triangles end, on the wall, they have contact lines. On solid ground (`ground.py`), the surface stays closed: its
-vertices have a wetness between 0 (free) and 1 (on the ground).
+Where triangles end, on the wall, they have contact lines. On solid ground (``ground.py``), the surface stays closed:
+its vertices have a wetness between 0 (free) and 1 (on the ground).
 """
 
 from dataclasses import dataclass, field
@@ -61,7 +61,7 @@ class SurfaceMesh:
         return {"points": self.points, "triangles": self.triangles, "rings": list(self.rings)}
 
     def restore(self, saved: dict[str, Any]) -> None:
-        """Continue from the data that `saved` returned."""
+        """Continue from the data that ``saved`` returned."""
         self.points, self.triangles, self.rings = saved["points"], saved["triangles"], tuple(saved["rings"])
         self.settle_on_ground()
 
@@ -160,7 +160,7 @@ class SurfaceMesh:
         np.maximum(self.points[:, 2], 0.0 if self.has_wall else -np.inf, out=self.points[:, 2])
 
     def _volume_correction(self, volume: float) -> Floats:
-        """Return the displacements of `enclose`, shape (m, 3) [m]; contact lines move along the wall."""
+        """Return the displacements of ``enclose``, shape (m, 3) [m]; contact lines move along the wall."""
         enclosed, gradient = volume_and_gradient(self.points, self.triangles, (), ())
         for ring in self.rings:
             gradient[ring, 2] = 0.0
@@ -171,8 +171,8 @@ class SurfaceMesh:
 def on_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bool_]:
     """Return whether each triangle has reached the wall z = 0, shape (t,).
 
-    Triangles that face the wall wet it at a height of `TOUCH` spacings; a film, whose triangles face away from the
-    wall, opens only at `DRY` spacings.
+    Triangles that face the wall wet it at a height of ``TOUCH`` spacings; a film, whose triangles face away from the
+    wall, opens only at ``DRY`` spacings.
 
     Args:
         points: Vertices, shape (m, 3) [m].

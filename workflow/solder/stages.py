@@ -64,8 +64,8 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
     with progress_bar("reflow of a joint") as progress:
         result = joint_to_rest(joint, solder, progress, checkpoint)
     write_body(folder, result.shape, result.reference)
-    if result.places:
-        write_json(folder / "path.json", result.places)
+    if result.path_rows:
+        write_json(folder / "path.json", result.path_rows)
     findings = judge_joint(result.shape.metrics, result.shape.verdict, result.effects)
     return replace(findings, continued="the joint" if any(used.continued for used in checkpoints) else "")
 

@@ -1,10 +1,10 @@
-"""The distance of a triangulated surface from an exact surface of revolution."""
+"""Distance of a triangulated surface from an exact surface of revolution."""
 
 import numpy as np
 import pytest
 
+from reflowshock.particles.reference.shape_error import distance, shape_error
 from reflowshock.particles.reference.young_laplace import sphere_meridian
-from reflowshock.particles.scenes.metrics import distance, shape_error
 
 VOLUME = 4.0 / 3.0 * np.pi * 1e-9  # sphere of 1 mm
 OCTAHEDRON = np.vstack((np.eye(3), -np.eye(3)))
@@ -20,14 +20,14 @@ def refined(points, triangles):
     return np.concatenate(pieces).reshape(-1, 3), np.arange(12 * len(triangles)).reshape(-1, 3)
 
 
-def test_distance_is_that_from_the_nearest_place_of_the_surface():
+def test_distance_to_the_nearest_point_of_the_surface():
     sphere = sphere_meridian(VOLUME, 0.5)
     points = 1e-3 * np.array([[1.1, 0.0, 0.0], [0.0, 0.6, 0.6], [0.0, 0.0, -0.5]])
     exact = 1e-3 * np.array([0.1, 1.0 - 0.6 * np.sqrt(2.0), 0.5])
     assert distance(points, sphere) == pytest.approx(exact, abs=1e-8)  # the meridian has 400 straight pieces
 
 
-def test_a_surface_that_is_shifted_outwards_is_as_far_off():
+def test_error_of_a_surface_shifted_outwards_is_its_shift():
     points, triangles = OCTAHEDRON, FACES
     for _ in range(5):
         points, triangles = refined(points, triangles)
