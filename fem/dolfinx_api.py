@@ -186,8 +186,8 @@ class FieldFile:
 
 
 def _name_each_piece_once(parallel_file: Path) -> None:
-    """Drop repeated pieces: dolfinx 0.5 lists a piece once a function, and readers show as many copies of the mesh."""
+    """Remove repeated pieces: DOLFINx 0.5 lists each piece once per function, and readers show copies of the mesh."""
     lines = parallel_file.read_text(encoding="utf-8").splitlines()
     first = {line: k for k, line in reversed(list(enumerate(lines)))}
-    kept = [line for k, line in enumerate(lines) if "<Piece " not in line or first[line] == k]
-    parallel_file.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    unique = [line for k, line in enumerate(lines) if "<Piece " not in line or first[line] == k]
+    parallel_file.write_text("\n".join(unique) + "\n", encoding="utf-8")

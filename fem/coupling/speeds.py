@@ -68,13 +68,13 @@ def families(mesh: MeshData, kind: Kind) -> NDArray[np.int8]:
 
 
 def samples(mesh: MeshData, family: NDArray[np.int8], ranks: int) -> dict[int, tuple[MeshData, MeshData]]:
-    """Return a small and a large sample of each family that a mesh has: neighbours in the order of its cells."""
-    found = {}
+    """Return a small and a large sample of each family in a mesh, with cells that follow each other in the mesh."""
+    sampled = {}
     for number in np.unique(family).tolist():
         chosen = np.flatnonzero(family == number)
         share = min(LARGE, -(-len(chosen) // ranks))
-        found[number] = some_cells(mesh, chosen, min(SMALL, share)), some_cells(mesh, chosen, share)
-    return found
+        sampled[number] = some_cells(mesh, chosen, min(SMALL, share)), some_cells(mesh, chosen, share)
+    return sampled
 
 
 def some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshData:

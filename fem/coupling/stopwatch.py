@@ -49,9 +49,9 @@ class Stopwatch:
     def summary(self, world: MPI.Comm, windows: int) -> dict[str, Any]:
         """Return window times and their shares on each rank and in total; collective.
 
-        ``coupling_overhead`` is what the rank that others wait for spends on the coupling, packing and messages: its
-        share is that of the rank with the least. Waiting for the other model is in ``busy_share``, as is waiting
-        within a model.
+        ``coupling_overhead`` is the share of time for coupling, packing and messages on the rank that others wait for,
+        which is the rank with the smallest share. Time spent waiting for the other model or within a model counts in
+        ``busy_share``.
         """
         ranks = world.allgather(self._record())
         total = np.array([sum(item["turns"].values()) for item in ranks])

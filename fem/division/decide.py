@@ -118,7 +118,7 @@ def in_path_levels(division: Division, rules: Rules, pace: Pace, around: Around)
 def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     """Return the division of an estimated mesh, whose masks and levels have shape (n,), one for each row.
 
-    Layers of board are taken to fit around the joints. The window of local steps is that of the board's elements;
+    Layers of board are assumed to fit around the joints. The window of local steps follows from the board's elements;
     ``divide`` also tries shorter ones.
 
     Args:
@@ -148,7 +148,7 @@ def slow_rows(rules: Rules) -> NDArray[np.bool_]:
 
 
 def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
-    """Return windows and substeps of an estimated mesh; the substeps are those of a DNS."""
+    """Return windows and substeps of an estimated mesh, with the substeps of a DNS."""
     return plan_windows(rules, slow_rows(rules), estimate.steps)
 
 

@@ -20,7 +20,7 @@ class Rules:
 
     Attributes:
         coupling: Coupling settings of the user.
-        coarse: Cells of the macro model in two-way coupling, those of the board, shape (ne,).
+        coarse: Cells of the board, which form the macro model in two-way coupling, shape (ne,).
         fraction: Step over critical step.
         stiffness: Coefficient beta of stiffness-proportional damping [s].
         duration: Simulated time [s].

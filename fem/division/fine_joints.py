@@ -40,7 +40,7 @@ def read_coarse(path: Path | None) -> MeshData:
     """Read the mesh of coarse joints.
 
     Raises:
-        MeshError: There is no such file.
+        MeshError: The path is None, or the file cannot be read.
     """
     if path is None:
         raise MeshError(f"{KEY} leaves out some joints, and there is no file of coarse joints (coarse_joints)")

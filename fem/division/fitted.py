@@ -89,8 +89,8 @@ def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Seq
     nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
     margin = ROUNDING * float(np.ptp(mesh.points, axis=0).max())
     for name, item in masses.items():
-        for place, part in item.meshed_places(symmetry, margin):
-            around, share = point_shares(mesh, f"masses.{name}.at", place)
+        for position, part in item.meshed_places(symmetry, margin):
+            around, share = point_shares(mesh, f"masses.{name}.at", position)
             nodes.append(around)
             shares.append(item.mass * part * share)
     numbers, where = np.unique(np.concatenate(nodes), return_inverse=True)

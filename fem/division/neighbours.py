@@ -28,7 +28,7 @@ def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> Mesh
     """Add neighbouring packages to the board of a mesh, with the facet sets that ``tie_joints`` needs.
 
     Raises:
-        MeshError: There is no board below one of them.
+        MeshError: A package lies outside the board.
     """
     for name, item in neighbours.items():
         package = neighbour_mesh(name, item)

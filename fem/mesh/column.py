@@ -3,8 +3,8 @@
 The file of the joints contains the columns (``board_column@..``, ``substrate_column@..``) and the faces that may touch
 a box (``column_board@..``, ``column_package@..``). The boxes inside the columns are removed. Neighbouring columns share
 nodes; their other faces are tied to the remaining boxes. Constant stress passes exactly if the lines and planes of the
-boxes are a subset of those of the column, whose face is the finer one. Joints whose mesh differs from that of their
-column are tied to it (``slave@foot@..``, ``slave@head@..``).
+boxes are a subset of the lines and planes of the column, whose face is the finer one. Joints with a mesh different
+from their column are tied to it (``slave@foot@..``, ``slave@head@..``).
 """
 
 from collections.abc import Mapping

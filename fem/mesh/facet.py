@@ -92,8 +92,8 @@ def spring_rates(
     """Return upper bounds for the increase of the largest omega^2 of elements by a bedding, shape (nf,) [1/s^2].
 
     The bedding of a facet is assigned to its element, with its row sums as stiffness. The frequency of the fastest
-    element, omega^2 = 4 / dt^2, bounds that of the mesh and grows by at most the largest ratio of bedding stiffness and
-    mass at its nodes.
+    element, omega^2 = 4 / dt^2, bounds the frequency of the mesh and grows by at most the largest ratio of bedding
+    stiffness and mass at its nodes.
 
     Args:
         cells: Nodes of the element of each facet, shape (nf, k).

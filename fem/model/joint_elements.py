@@ -98,11 +98,11 @@ class JointElements:
         for term in body.terms:
             if not isinstance(term, NonlinearElements | Corotational):
                 continue
-            place = positions(term.numbers, chosen)
-            rows = np.flatnonzero(place >= 0)
+            index = positions(term.numbers, chosen)
+            rows = np.flatnonzero(index >= 0)
             is_linear[rows] = False
             if len(rows) and isinstance(term, NonlinearElements):
-                self._nonlinear.append((rows, FollowingElements(term, place[rows])))
+                self._nonlinear.append((rows, FollowingElements(term, index[rows])))
             elif len(rows) and isinstance(term, Corotational):
                 self._nonlinear.append((rows, TurningElements(body, term, chosen[rows])))
         self._linear = [

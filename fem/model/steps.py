@@ -130,7 +130,7 @@ def critical_by_role(
     world: MPI.Comm, models: Sequence[Pieces], roles: Iterable[str] = tuple(Materials.model_fields)
 ) -> dict[str, float]:
     """Return the smallest element critical step [s] of each material role over all ranks; collective."""
-    smallest = {role: agreed_minimum(world, [own.steps[own.roles == role] for own in models]) for role in roles}
+    smallest = {role: agreed_minimum(world, [model.steps[model.roles == role] for model in models]) for role in roles}
     return {role: step for role, step in smallest.items() if np.isfinite(step)}
 
 

@@ -27,9 +27,9 @@ class StressRecovery:
         self._finite, self._turning = np.zeros((2, len(chosen)), dtype=bool)
         for term in body.terms:
             if isinstance(term, NonlinearElements):
-                place = positions(term.numbers, chosen)
-                rows = np.flatnonzero(place >= 0)
-                self._stored.append((term, rows, place[rows]))
+                index = positions(term.numbers, chosen)
+                rows = np.flatnonzero(index >= 0)
+                self._stored.append((term, rows, index[rows]))
                 self._finite[rows] = term.finite
             elif isinstance(term, Corotational):
                 self._turning |= positions(term.numbers, chosen) >= 0

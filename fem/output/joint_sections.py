@@ -3,7 +3,7 @@
 The solder receives F_n = f_n + m_n (a_n - g + alpha v_n) at the nodes of a pad face, where f is the internal force of
 its elements (stiffness-proportional damping included) and m their mass. Since inner nodes obey the equation of motion,
 the forces and moments of both faces add up exactly to the inertia of the solder, sum of m (a - g + alpha v). With
-finite rotations, positions, areas and normals are those of the deformed state.
+finite rotations, positions, areas and normals refer to the deformed state.
 """
 
 from dataclasses import dataclass

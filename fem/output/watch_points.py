@@ -14,7 +14,7 @@ class PointWatch:
     """Watch points, gauges and supports on one rank; implements ``history.Watch``."""
 
     def __init__(self, table: PointTable, body: Body, turning: bool) -> None:
-        """Select this rank's share of the table; ``turning`` tells whether rotations are finite."""
+        """Select this rank's share of the table; ``turning`` says whether rotations are finite."""
         self._table, self._tie, self._turning = table, body.tie, turning
         self.labels: dict[str, NDArray] = {
             "watch": np.array(table.names, dtype=str),
