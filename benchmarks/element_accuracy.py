@@ -31,7 +31,7 @@ from reflowshock.fem.elements.element import critical_steps
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -95,8 +95,12 @@ class Problem:
         mesh = MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {})
         item = prepare(mesh, "dns")["dns"]
         formulation = self.kind if KINDS[self.kind].nodes == 8 else "incompatible_modes"
-        pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation)
-        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), ForceOptions(kinematics))
+        rank_elements = make_rank_elements(
+            distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation
+        )
+        body = make_body(
+            MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), ForceOptions(kinematics)
+        )
         body.free[self.held(body.local.points)] = False
         return body
 

@@ -28,7 +28,7 @@ from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import Load, half_sine_drop
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.materials.roles import Materials
@@ -43,9 +43,11 @@ NAP = 1e-3  # [s]
 def motion_on(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
     """Return the cube at rest, distributed over the ranks."""
     item = prepare(cube(), "dns")["dns"]
-    pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL))
-    body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
-    return motion_of(body, FRACTION * comm.allreduce(float(pieces.steps.min()), MPI.MIN), loads)
+    rank_elements = make_rank_elements(
+        distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL)
+    )
+    body = make_body(comm, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
+    return motion_of(body, FRACTION * comm.allreduce(float(rank_elements.steps.min()), MPI.MIN), loads)
 
 
 def step(motion: ExplicitMotion) -> Callable[[], None]:

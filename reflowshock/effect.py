@@ -9,7 +9,7 @@ from reflowshock.parameters import changed
 
 Switch = Literal["auto", "on", "off"]
 Scene = TypeVar("Scene", contravariant=True)
-GIVEN = "none: the case says it"
+SPECIFIED = "none: the case says it"
 
 
 class Decision(TypedDict):
@@ -57,7 +57,7 @@ class Effect(ABC, Generic[Scene]):
     name: str
     stage: str = "shock"
     adds: str = ""
-    number: str = GIVEN
+    number: str = SPECIFIED
     influence: str = ""
     implementation: str = ""
     switch: str = ""

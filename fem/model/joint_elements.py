@@ -26,7 +26,7 @@ class ElasticHexahedra:
         if body.begin is not None:
             body.begin(self._term)
         self._start = {name: values.copy() for name, values in self._term.history.items()}
-        self._place = self._term.located(np.arange(len(chosen)))
+        self._locations = self._term.located(np.arange(len(chosen)))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force, shape (n, 3) [N], at a displacement, shape (n, 3) [m]."""
@@ -36,7 +36,7 @@ class ElasticHexahedra:
 
     def points(self) -> PointValues:
         """Return the values at the integration points at the latest displacement."""
-        return self._term.points(*self._place)
+        return self._term.points(*self._locations)
 
 
 class TurningElements:
@@ -64,16 +64,16 @@ class FollowingElements:
 
     def __init__(self, term: NonlinearElements, places: NDArray[np.integer]) -> None:
         """Select elements of a term by their positions in it, shape (k,)."""
-        self._term, self._place, self._frozen = term, term.located(places), term.frozen(places)
+        self._term, self._locations, self._frozen = term, term.located(places), term.frozen(places)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force, shape (n, 3) [N], at ``displacement``, the latest displacement of the term."""
-        self._frozen.take_path(self._term, *self._place)
+        self._frozen.take_path(self._term, *self._locations)
         self._frozen.add(displacement, force)
 
     def points(self) -> PointValues:
         """Return the current values at the integration points."""
-        return self._term.points(*self._place)
+        return self._term.points(*self._locations)
 
 
 class JointElements:

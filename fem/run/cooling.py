@@ -15,7 +15,7 @@ from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.output.cooling_report import Convergence, CooledPackage, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
@@ -42,13 +42,13 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
     package = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
     tables: JointTables = world.bcast(package.model.tables if package else None)
     ACTIVITY.slow = "cools the model"
-    pieces = distributed(world, package.model.mesh if package else None, tables, request)
-    ones = np.ones(len(pieces.steps))
-    body = make_body(world, pieces, tables, ones, ForceOptions())
-    statics = Statics(world, body, pieces.materials, request.change)
+    rank_elements = distributed(world, package.model.mesh if package else None, tables, request)
+    ones = np.ones(len(rank_elements.steps))
+    body = make_body(world, rank_elements, tables, ones, ForceOptions())
+    statics = Statics(world, body, rank_elements.materials, request.change)
     equilibrium, memory = statics.solve(), statics.memory
     statics.free()
-    loaded = with_initial_stress(body, pieces.materials, equilibrium.displacement, request.change, path=True)
+    loaded = with_initial_stress(body, rank_elements.materials, equilibrium.displacement, request.change, path=True)
     residual, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
     convergence = Convergence(equilibrium.residuals, residual, equilibrium.products, memory, seconds)
     displacement = whole_displacement(world, body, equilibrium, package)
@@ -90,12 +90,12 @@ def pinned(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
     return replace(item, tables=replace(tables, held_nodes=nodes, held=held[nodes]))
 
 
-def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput) -> Pieces:
+def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput) -> RankElements:
     """Distribute the mesh and assign materials to the elements of each rank; collective."""
     dolfinx_api.compile_ahead(world, mesh.points[mesh.cells[0]] if mesh else None)
     local = distribute(world, mesh)
     formulation = request.shock.numerics.formulation
-    return agreed(world, lambda: make_pieces(local, tables, request.materials, formulation))
+    return agreed(world, lambda: make_rank_elements(local, tables, request.materials, formulation))
 
 
 def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:

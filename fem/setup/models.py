@@ -13,7 +13,7 @@ from reflowshock.fem.division.division import Rules, SchemeName
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.division.whole import Treatment
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.parallel.agreement import agreed
@@ -79,7 +79,7 @@ def distributed(
     divided: DividedModels[TablesT_co],
     ranks: Mapping[Role, NDArray[np.int32]],
     request: RunInput | StructureInput,
-) -> dict[Role, Pieces]:
+) -> dict[Role, RankElements]:
     """Distribute the models and assign materials to the elements of this rank; collective.
 
     Args:
@@ -96,18 +96,21 @@ def distributed(
     dolfinx_api.compile_ahead(comms.world, first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
     meshes = {role: distribute(comms.models[role], *part) for role, part in parts.items()}
 
-    def pieces_of(role: Role) -> Pieces:
-        return make_pieces(meshes[role], divided.tables[role], request.part_materials, request.formulation)
+    def rank_elements_of(role: Role) -> RankElements:
+        return make_rank_elements(meshes[role], divided.tables[role], request.part_materials, request.formulation)
 
-    return agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
+    return agreed(comms.world, lambda: {role: rank_elements_of(role) for role in meshes})
 
 
 def assembled(
-    comms: Communicators, divided: DividedModels[TablesT_co], pieces: Mapping[Role, Pieces], kinematics: Kinematics
+    comms: Communicators,
+    divided: DividedModels[TablesT_co],
+    rank_elements: Mapping[Role, RankElements],
+    kinematics: Kinematics,
 ) -> dict[Role, Body]:
     """Assemble the bodies of this rank's models with their time steps; collective."""
     bodies = {}
-    for role, elements in pieces.items():
+    for role, elements in rank_elements.items():
         factor = divided.mass_factors[role][elements.local.cell_numbers]
         response = ForceOptions(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
         body = make_body(comms.models[role], elements, divided.tables[role], factor, response)

@@ -19,7 +19,7 @@ from reflowshock.fem.division.whole import Whole, on_springs, survey
 from reflowshock.fem.loads.shock_loads import check_shaken
 from reflowshock.fem.mesh.column import COPY
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.model.attachments import beddings_of, with_attachments, with_support_stiffness
 from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
 from reflowshock.fem.parallel.communicators import Communicators, Role
@@ -122,19 +122,22 @@ def build_package(
         Models of this rank, and the time steps, which power iteration may increase in a DNS.
     """
     steps = divided.steps
-    pieces = distributed(comms, divided, ranks, request)
+    rank_elements = distributed(comms, divided, ranks, request)
     beddings = {
-        role: beddings_of(part.local, divided.tables[role].fitted, request.supports) for role, part in pieces.items()
+        role: beddings_of(part.local, divided.tables[role].fitted, request.supports)
+        for role, part in rank_elements.items()
     }
     for role, springs in beddings.items():
         for bedding in springs:
-            pieces[role] = with_support_stiffness(pieces[role], bedding)
-    if "dns" in pieces and request.numerics.critical_step == "power_iteration":
-        factor = divided.mass_factors["dns"][pieces["dns"].local.cell_numbers]
-        whole_step = assembled_step(comms.models["dns"], pieces["dns"], divided.tables["dns"], factor, beddings["dns"])
-        element_step = agreed_minimum(comms.world, [pieces["dns"].steps * np.sqrt(factor)])
+            rank_elements[role] = with_support_stiffness(rank_elements[role], bedding)
+    if "dns" in rank_elements and request.numerics.critical_step == "power_iteration":
+        factor = divided.mass_factors["dns"][rank_elements["dns"].local.cell_numbers]
+        whole_step = assembled_step(
+            comms.models["dns"], rank_elements["dns"], divided.tables["dns"], factor, beddings["dns"]
+        )
+        element_step = agreed_minimum(comms.world, [rank_elements["dns"].steps * np.sqrt(factor)])
         steps = undivided(steps, max(whole_step, element_step), divided.rules)
-    bodies = assembled(comms, replace(divided, steps=steps), pieces, request.kinematics)
+    bodies = assembled(comms, replace(divided, steps=steps), rank_elements, request.kinematics)
     models = {
         role: Model(table := divided.tables[role], with_attachments(body, *table.fitted.masses, beddings[role]))
         for role, body in bodies.items()
@@ -154,7 +157,7 @@ def elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
     whole = joined(with_neighbours(read_package(single), request.packages))
     model = model_inputs(whole, "dns", held_by(single), shock.joint_layer, fitted_board(whole, single))["dns"]
     tables, local = model.tables, distribute(MPI.COMM_SELF, model.mesh)
-    pieces = make_pieces(local, tables, request.materials, request.formulation)
-    body = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), None)
+    rank_elements = make_rank_elements(local, tables, request.materials, request.formulation)
+    body = make_body(MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)), None)
     body = with_attachments(body, *tables.fitted.masses, beddings_of(local, tables.fitted, request.supports))
     return Model(tables, body), float(body.mass.sum())

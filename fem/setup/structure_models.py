@@ -23,7 +23,7 @@ from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.attachments import beddings_of, with_attachments, with_support_stiffness
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import (
@@ -58,15 +58,17 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     """
     mesh, tables = read_structure(comm, request)
     local = distribute(comm, mesh)
-    pieces = agreed(comm, lambda: make_pieces(local, tables, request.part_materials, request.formulation))
-    beddings = beddings_of(pieces.local, tables.fitted, request.supports)
+    rank_elements = agreed(comm, lambda: make_rank_elements(local, tables, request.part_materials, request.formulation))
+    beddings = beddings_of(rank_elements.local, tables.fitted, request.supports)
     for bedding in beddings:
-        pieces = with_support_stiffness(pieces, bedding)
-    steps = choose_steps(comm, pieces, request, pulses)
+        rank_elements = with_support_stiffness(rank_elements, bedding)
+    steps = choose_steps(comm, rank_elements, request, pulses)
     steps = replace(steps, model_mass=steps.model_mass + float(tables.fitted.masses[1].sum()))
 
     def assemble(steps: Steps) -> StructureModel:
-        body = make_body(comm, pieces, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step))
+        body = make_body(
+            comm, rank_elements, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step)
+        )
         return Model(tables, with_attachments(body, *tables.fitted.masses, beddings))
 
     model = assemble(steps)
@@ -94,11 +96,11 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
     return (structure[0] if structure else None), comm.bcast(structure[1] if structure else None)
 
 
-def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses: list[float]) -> Steps:
+def choose_steps(comm: MPI.Comm, rank_elements: RankElements, request: StructureInput, pulses: list[float]) -> Steps:
     """Choose the time steps of the run's solver; collective."""
     if request.implicit:
-        return implicit_steps(comm, pieces, request.dynamics, pulses)
-    return explicit_steps(comm, pieces, request.dynamics)
+        return implicit_steps(comm, rank_elements, request.dynamics, pulses)
+    return explicit_steps(comm, rank_elements, request.dynamics)
 
 
 def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedModels[StructureTables]:
@@ -117,8 +119,8 @@ def build_coupled(
     ranks: Mapping[Role, NDArray[np.int32]],
 ) -> dict[Role, StructureModel]:
     """Distribute and assemble the coupled models of this rank; ``ranks`` as ``distributed``; collective."""
-    pieces = distributed(comms, divided, ranks, request)
-    bodies = assembled(comms, divided, pieces, request.kinematics)
+    rank_elements = distributed(comms, divided, ranks, request)
+    bodies = assembled(comms, divided, rank_elements, request.kinematics)
     return {role: Model(divided.tables[role], body) for role, body in bodies.items()}
 
 

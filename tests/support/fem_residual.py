@@ -10,7 +10,7 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.division.tables import joined, model_inputs
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -60,19 +60,19 @@ def cooled(
 ) -> Cooled:
     """Cool a mesh on its symmetry planes and return bodies without and with the initial stress."""
     item = pinned(model_inputs(joined(mesh), "dns", SYMMETRY)["dns"])
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+    rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
 
     def body() -> Body:
-        return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
+        return make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), response)
 
-    equilibrium = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
+    equilibrium = Statics(MPI.COMM_SELF, body(), rank_elements.materials, change).solve()
     plain = body()
     return Cooled(
         plain,
         equilibrium,
-        with_initial_stress(body(), pieces.materials, equilibrium.displacement, change, path=True),
-        float(pieces.steps.min()),
-        thermal_force(plain, slice(None), pieces.materials, change),
+        with_initial_stress(body(), rank_elements.materials, equilibrium.displacement, change, path=True),
+        float(rank_elements.steps.min()),
+        thermal_force(plain, slice(None), rank_elements.materials, change),
     )
 
 

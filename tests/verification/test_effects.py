@@ -351,9 +351,9 @@ def _(_effect, _folder):
 
 @off("mass_scaling")
 def _(_effect, _folder):
-    pieces = SimpleNamespace(roles=np.array(["copper", "solder"]), steps=np.array([1e-9, 4e-9]))
-    assert np.array_equal(mass_factor(pieces, (), 4e-9), [1.0, 1.0])
-    assert np.array_equal(mass_factor(pieces, ("copper",), 4e-9), [16.0, 1.0])
+    rank_elements = SimpleNamespace(roles=np.array(["copper", "solder"]), steps=np.array([1e-9, 4e-9]))
+    assert np.array_equal(mass_factor(rank_elements, (), 4e-9), [1.0, 1.0])
+    assert np.array_equal(mass_factor(rank_elements, ("copper",), 4e-9), [16.0, 1.0])
 
 
 @on("mass_scaling")
