@@ -42,7 +42,7 @@ class StructureTables(Tables):
     pushed: dict[str, Shares]
     fitted: FittedTable
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return facet sets and fittings in the numbers of a model."""
         return {
             "nodes_of": {name: present(node[nodes]) for name, nodes in self.nodes_of.items()},
@@ -121,7 +121,7 @@ def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
     if layers != parts:
         empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))
         raise MeshError(
-            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts that are no layer:"
+            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts without a layer:"
             f" {foreign or 'none'}"
         )
 

@@ -81,7 +81,7 @@ class Tables:
             **fields,
         )
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return the fields of a subclass restricted to one model.
 
         Args:
@@ -130,7 +130,7 @@ class JointTables(Tables):
             fitted=fittings or fitted(mesh, Fittings(), (), whole.tie.slave, yields=False),
         )
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return watch points, shaken nodes, joint interfaces and fittings in the numbers of a model."""
         return {
             "watch": self.watch.within(node, cell, part.number),
@@ -232,11 +232,11 @@ def part_input(
         nodes=part.nodes,
         level=np.zeros(len(part.mesh.cells), np.int32),
         every=np.ones(len(part.mesh.cells), np.int32),
-        **tables.counted(part, node, cell),
+        **tables.restricted(part, node, cell),
     )
     return ModelInput(part.mesh, restricted, np.flatnonzero(part.cell_number >= 0))
 
 
 def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the non-negative numbers, which belong to this model."""
+    """Return the numbers of nodes or cells that belong to this model, which are the non-negative ones."""
     return numbers[numbers >= 0]

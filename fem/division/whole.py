@@ -138,7 +138,10 @@ def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment
     """
     target = min(float(step[~scaled].min(initial=np.inf)), treatment.scaled_step)
     if not np.isfinite(target):
-        raise StepError(f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} leaves no role to take the step from")
+        raise StepError(
+            f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} includes every role; omit at least one, whose"
+            " elements determine the step"
+        )
     return np.where(scaled, np.maximum(1.0, (target / step) ** 2), 1.0)
 
 

@@ -112,7 +112,7 @@ def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData,
 def merge_nodes(
     data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
 ) -> tuple[MeshData, NDArray[np.int32]]:
-    """Replace each node of ``duplicates`` by its counterpart in ``originals``; returns as in ``without_unused_nodes``."""
+    """Replace each of ``duplicates`` by the same row of ``originals``; returns as in ``without_unused_nodes``."""
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}

@@ -156,7 +156,7 @@ def make_body(
         rank_elements: Elements of the rank.
         tables: Tables of the model.
         mass_factor: Factor on the density of each element, shape (ne,).
-        response: Kinematics and step; None for linear elastic terms whatever the materials.
+        response: Kinematics and step; None for linear elastic terms, also for plastic materials.
     """
     local = rank_elements.local
     plain = rank_elements.elements

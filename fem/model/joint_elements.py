@@ -39,7 +39,7 @@ class ElasticHexahedra:
         return self._term.points(*self._locations)
 
 
-class TurningElements:
+class SampledCorotational:
     """Corotational hexahedra: force by their own law, point values by the finite-strain element."""
 
     def __init__(self, body: Body, term: Corotational, chosen: NDArray[np.integer]) -> None:
@@ -59,7 +59,7 @@ class TurningElements:
         return self._points.points()
 
 
-class FollowingElements:
+class SampledNonlinear:
     """Path-dependent elements: point values of the body's term, forces of a copy with the selected elements."""
 
     def __init__(self, term: NonlinearElements, places: NDArray[np.integer]) -> None:
@@ -94,7 +94,7 @@ class JointElements:
         self._body, self._size = body, len(chosen)
         self._levels = levels_of(body.terms)
         is_linear = np.ones(len(chosen), dtype=bool)
-        self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningElements]] = []
+        self._nonlinear: list[tuple[NDArray[np.intp], SampledNonlinear | SampledCorotational]] = []
         for term in body.terms:
             if not isinstance(term, NonlinearElements | Corotational):
                 continue
@@ -102,9 +102,9 @@ class JointElements:
             rows = np.flatnonzero(index >= 0)
             is_linear[rows] = False
             if len(rows) and isinstance(term, NonlinearElements):
-                self._nonlinear.append((rows, FollowingElements(term, index[rows])))
+                self._nonlinear.append((rows, SampledNonlinear(term, index[rows])))
             elif len(rows) and isinstance(term, Corotational):
-                self._nonlinear.append((rows, TurningElements(body, term, chosen[rows])))
+                self._nonlinear.append((rows, SampledCorotational(body, term, chosen[rows])))
         self._linear = [
             (k, rows, ElasticHexahedra(body, chosen[rows]))
             for k in np.unique(level[chosen])

@@ -168,9 +168,7 @@ def set_initial_points(
         by_lane(term.history["slip"])[...] = -in_modes(points.stretched)[order]
 
 
-def expansion_energy(
-    body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float
-) -> float:
+def expansion_energy(body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float) -> float:
     """Return the elastic energy of suppressed thermal expansion of selected elements, shape (ne,) [J]."""
     strain = np.zeros((len(materials), 6))
     strain[:, :3] = free_expansion(materials, change)

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.chebyshev import stabilisation
-from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
+from reflowshock.fem.division.choose_levels import StepLimits, governing_steps, least_steps
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.mesh.mesh import MeshData, append
@@ -53,11 +53,11 @@ def levelled(
     alone = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
     steps = np.empty(len(alone.steps))
     steps[alone.local.cell_numbers] = alone.steps
-    least = least_steps(ratios, Pace(steps, np.ones(len(steps)), 1.0, FRACTION, damping))
+    least = least_steps(ratios, StepLimits(steps, np.ones(len(steps)), 1.0, FRACTION, damping))
     window = FRACTION * min(steps.max() / least[0], steps.min() / least[-1])
-    pace = Pace(steps, np.ones(len(steps)), window, FRACTION, damping * window)
+    step_limits = StepLimits(steps, np.ones(len(steps)), window, FRACTION, damping * window)
     needed = governing_steps(item.mesh.cells, item.tables.tie, FRACTION * steps)
-    level = np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32)
+    level = np.sum(needed[:, None] < least_steps(ratios, step_limits)[:-1], axis=1, dtype=np.int32)
     tables = replace(item.tables, level=level, ratios=ratios)
     rank_elements = make_rank_elements(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
     factor = np.ones(len(rank_elements.steps))
