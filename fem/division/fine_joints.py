@@ -43,7 +43,7 @@ def read_coarse(path: Path | None) -> MeshData:
         MeshError: The path is None, or the file cannot be read.
     """
     if path is None:
-        raise MeshError(f"{KEY} omits some joints; they need a file of coarse joints (coarse_joints)")
+        raise MeshError(f"{KEY} leaves out some joints, and there is no file of coarse joints (coarse_joints)")
     return read_mesh(path)
 
 
@@ -78,7 +78,7 @@ def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
     """
     missing = sorted(set(fine) - set(joint_names(coarse)))
     if missing:
-        raise MeshError(f"{missing[0]} has no coarse mesh, which shock.coupling.direction = one_way requires")
+        raise MeshError(f"{missing[0]} has no coarse mesh, as shock.coupling.direction = one_way needs")
     chosen, _ = select(coarse, lambda part: joint_of(part) in fine)
     names = tuple(name.replace("@", COPY) for name in chosen.part_names)
     return replace(
