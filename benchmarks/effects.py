@@ -27,7 +27,7 @@ CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3
 PULSE = BodyAcceleration(DOWN, HalfSine(1.5e4, 5e-4))
 WEIGHT = BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))
 DROP = Solder(volume=1e-9, pad_contact_angle=np.radians(120.0))
-RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "inertia": False, "viscosity": False}
+RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True}
 RATELESS = SAC305.model_copy(update={"plasticity": SAC305.plasticity.model_copy(update={"C": 0.0})})
 BOARD = dns_body(
     mesh_of(

@@ -8,7 +8,7 @@ from pydantic import Field
 from reflowshock.effect import Decision, Effect, Switch, decided, decision
 from reflowshock.particles.flows.flow import FlowScene, FlowSwitches
 from reflowshock.particles.flows.sph_numerics import MethodNumerics
-from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
+from reflowshock.particles.parameters.effect_gravity import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.quantity import Quantity
 
 RIGHT_ANGLE = 0.5 * pi

@@ -32,9 +32,7 @@ def test_cut_through_copper_and_board_is_stable_in_local_steps():
     assert {"board", "copper"} <= set(scene[1].role[at_interface & division.macro])
     assert "copper" in scene[1].role[at_interface & division.meso]
     assert radius(mesh, "local_steps") <= 1 + 1e-8
-    with pytest.raises(
-        CouplingError, match=r"must belong to the board, found \d+ of copper.*scheme = local_steps"
-    ):
+    with pytest.raises(CouplingError, match=r"must belong to the board, found \d+ of copper.*scheme = local_steps"):
         check_division(*scene[:2], held(*scene, division.meso), scene[2])
 
 

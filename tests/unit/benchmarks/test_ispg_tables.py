@@ -27,7 +27,4 @@ def test_rows_are_computed_once(tmp_path, monkeypatch):
         monkeypatch.setattr("sys.argv", ["ispg_tables.py", *arguments])
         ispg_tables.main()
     assert asked == ["warm"] * 2
-    assert (
-        "16 particles along an edge"
-        in results.read_figures(ispg_tables.NAME)["drops"][refused.name]["error"]
-    )
+    assert "16 particles along an edge" in results.read_figures(ispg_tables.NAME)["drops"][refused.name]["error"]
