@@ -85,7 +85,7 @@ class ShearDependence(FlowEffect):
         why = f"{rheology.law.replace('_', ' ')}, exponent {rheology.exponent:g}"
         return decision(viscous, why if viscous else f"{why}, but viscosity does not act")
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with constant viscosity; None if the effect is off, since no rheology is specified."""
         return changed(case, f"{case.kind}.rheology", None) if acts else None
 

@@ -101,10 +101,10 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
     """Convert a table of a case file to SI floats, field by field.
 
     Args:
-        model: model of the table; unknown keys stay, so that its validation rejects them.
-        table: the table as TOML gives it.
-        prefix: dotted key of the table with its dot, or empty.
-        problems: list to which unit errors are added; their values become nan.
+        model: Model of the table; unknown keys stay, so that its validation rejects them.
+        table: The table as TOML gives it.
+        prefix: Dotted key of the table with its dot, or empty.
+        problems: List to which unit errors are added; their values become nan.
 
     Returns:
         The table in SI values. Tables of the same kind as their default are completed by it.

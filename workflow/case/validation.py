@@ -19,10 +19,10 @@ def translate(model: type[BaseModel], error: ValidationError, table: dict, repor
     """Translate validation errors.
 
     Args:
-        model: the validated model.
-        error: error of pydantic.
-        table: table as written by the user.
-        reported: keys with a problem already reported, which are skipped.
+        model: The validated model.
+        error: Error of pydantic.
+        table: Table as written by the user.
+        reported: Keys with a problem already reported, which are skipped.
 
     Returns:
         One problem per key.

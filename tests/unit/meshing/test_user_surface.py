@@ -136,7 +136,7 @@ def test_files_without_a_surface_are_rejected(tmp_path):
         load_surface(tmp_path / "text.ply", "mm", SITE)
     box = meshio.Mesh(np.eye(4, 3), [("quad", np.array([[0, 1, 2, 3]]))])
     meshio.write(tmp_path / "quads.vtu", box)
-    with pytest.raises(SurfaceError, match="holds quad, allowed triangles"):
+    with pytest.raises(SurfaceError, match="contains quad, allowed triangles"):
         load_surface(tmp_path / "quads.vtu", "mm", SITE)
 
 
