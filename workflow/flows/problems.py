@@ -10,7 +10,9 @@ LARGEST_REYNOLDS = 1000.0  # of vortices and channels: above it the flow becomes
 
 
 def rheology_problems(kind: str, scene: FlowScene) -> list[Problem]:
-    """Find a method that does not compute the flow, keys of the other viscosity law, and a viscosity at infinity that is not below the one at rest.
+    """Find a method that does not compute the flow, and contradictions in the viscosity law.
+
+    These are keys of the other law, and a viscosity at infinity that is not below the one at rest.
 
     Args:
         kind: Table of the scene in the case file.
