@@ -27,7 +27,7 @@ class BoxLayer:
         name: Name of the layer.
         thickness: Thickness [m].
         cells: Number of elements through the thickness.
-        in_plane: Number of elements along x and y, if they differ from those of the box.
+        in_plane: Number of elements along x and y, if they differ from the box.
     """
 
     name: str

@@ -38,7 +38,7 @@ class QuadraticTetrahedra:
 def quadratic_tetrahedra(
     split: SplitTetrahedra, points: np.ndarray, tetrahedra: np.ndarray, faces: dict[str, np.ndarray]
 ) -> QuadraticTetrahedra:
-    """Build ten-node tetrahedra whose surface edges are curved like those of the split hexahedra.
+    """Build ten-node tetrahedra whose surface edges are curved like the split hexahedra.
 
     Args:
         split: Hexahedra into which the tetrahedra were split.
@@ -61,7 +61,7 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
     """Return the number of tetrahedra, their smallest scaled Jacobian and the relative error of their volume.
 
     Args:
-        tetrahedra: Ten-node tetrahedra; the scaled Jacobian is that of the straight ones.
+        tetrahedra: Ten-node tetrahedra; the scaled Jacobian refers to straight edges.
         volume: Exact volume [m^3].
     """
     return {

@@ -54,7 +54,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMesh:
-    """Hexahedra of a column; new nodes are numbered after those of the joint, whose foot or head it shares.
+    """Hexahedra of a column; new nodes are numbered after the joint, whose foot or head it shares.
 
     All faces are counter-clockwise seen from outside.
 

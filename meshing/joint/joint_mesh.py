@@ -292,7 +292,7 @@ def _add_copper(parts: _Parts, name: str, face: _Face, step: np.ndarray, count: 
 
 
 def _add_tied_column(parts: _Parts, column: Column, pad: _Pad, outer: _Face, wetted: WettedFace) -> np.ndarray:
-    """Add a column whose mesh differs from the copper's, which is to be tied to it.
+    """Add a column whose mesh differs from the copper's, so that both must be tied.
 
     Args:
         parts: Joint under construction.

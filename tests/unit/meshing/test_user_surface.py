@@ -127,7 +127,7 @@ def test_another_unit_is_refused_and_the_right_one_named(tmp_path):
         load_surface(path, "mm", SITE)
 
 
-def test_files_that_are_no_surface_are_refused(tmp_path):
+def test_files_without_a_surface_are_rejected(tmp_path):
     for name, message in (("joint.obj", "suffix .obj, allowed .stl, .ply, .vtu"), ("none.stl", "no such file")):
         with pytest.raises(SurfaceError, match=message):
             load_surface(tmp_path / name, "mm", SITE)

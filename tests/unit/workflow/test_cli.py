@@ -161,7 +161,7 @@ def test_another_case_is_not_cleaned(call, tmp_path):
     assert (code, "contains the run of other" in errors) == (2, True)
 
 
-def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):
+def test_nothing_is_written_next_to_files_of_a_user(call, tmp_path):
     (tmp_path / "mine.toml").write_bytes(CASE.read_bytes())
     for command in ("run", "clean"):
         call(command, "mine.toml", "--out", ".")

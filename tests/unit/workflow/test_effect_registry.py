@@ -52,7 +52,7 @@ def printed(case) -> list[str]:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_plan_tells_scenes_apart(name):
+def test_a_plan_distinguishes_scenes(name):
     path, *settings = SCENES[name]
     lines = []
     for setting in settings:

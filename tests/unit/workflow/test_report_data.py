@@ -211,7 +211,7 @@ def test_a_page_allows_its_own_script_and_nothing_else(tmp_path):
     assert not re.search(r'(src|href)="(?!data:|#)', page)
 
 
-def test_a_page_without_results_says_what_was_not_run(tmp_path):
+def test_a_page_without_results_lists_missing_stages(tmp_path):
     page = page_of(tmp_path, not_run=["surface", "shock"], healthy=False, missed=["energy balance error"])
     assert "This run is incomplete; stages not run: surface, shock." in page
     assert "A health check failed: energy balance error." in page

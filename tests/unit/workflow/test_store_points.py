@@ -72,7 +72,7 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     assert states["reflow"].missing
 
 
-def test_why_a_point_is_not_complete_is_told(tmp_path):
+def test_the_reason_of_an_incomplete_point_is_reported(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
     make(store, point, ["geometry"])
     assert why(store, point, "geometry") == ""
@@ -92,7 +92,7 @@ def test_why_a_point_is_not_complete_is_told(tmp_path):
     assert store.message(point, "reflow") is None
 
 
-def test_all_that_is_wrong_with_points_is_told_with_their_settings():
+def test_all_errors_of_points_are_reported_with_their_settings():
     settings = [{}, {"package.pitch": "0.1 mm"}, {"package.pitsch": "1 mm", "solder.volume": "1 mm"}]
     points, impossible = read_possible_points(SMALL_CASE, settings)
     lines = PointsError("study.toml", impossible, settings).lines()

@@ -136,7 +136,7 @@ def test_a_check_that_failed_is_named(store):
     assert failed_checks(store, point_of(), "geometry") == []
 
 
-def test_a_damaged_case_of_a_run_is_told(done):
+def test_a_damaged_case_of_a_run_is_reported(done):
     path = done.folder / CASE
     path.write_text(path.read_text().replace('"small"', '"smell"'))
     with pytest.raises(CaseError, match="was changed since it was written"):

@@ -109,7 +109,7 @@ def test_a_run_folder_may_be_a_link(store, tmp_path):
     assert link.is_symlink() and (store.folder / "report.html").is_file()
 
 
-def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatch):
+def test_obsolete_links_are_removed_before_their_list_entries(store, monkeypatch):
     """However early the program is killed, no old product is mistaken for a user's file."""
 
     def kill(*_: object) -> None:
@@ -125,7 +125,7 @@ def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatc
     assert not list(store.folder.rglob("*.kept-*"))
 
 
-def test_what_is_of_no_product_does_not_replace_a_users(store):
+def test_foreign_files_do_not_replace_files_of_a_user(store):
     def adopted(text: str, *names: str) -> None:
         made = store.home / "work/made"
         made.mkdir(parents=True)
@@ -268,14 +268,14 @@ def test_no_run_folder_is_made_in_a_store(store):
     assert not folder.exists()
 
 
-def test_a_mark_that_was_being_written_is_no_users(tmp_path):
+def test_an_unfinished_mark_is_not_a_file_of_a_user(tmp_path):
     (tmp_path / ".reflowshock.partial").write_text("{")
     with locked(tmp_path, "run", "small"):
         pass
     assert remove_own(tmp_path) == []
 
 
-def test_what_the_run_folder_lacks_is_told(store):
+def test_missing_files_of_the_run_folder_are_reported(store):
     assert not_as_put(store, store.folder) == []
     (store.folder / "report.html").unlink()
     (store.folder / "summary.json").unlink()
@@ -297,7 +297,7 @@ def test_a_run_folder_has_one_user(tmp_path):
         pass
 
 
-def test_a_lock_that_was_removed_meanwhile_is_none(tmp_path, monkeypatch):
+def test_a_removed_lock_does_not_lock(tmp_path, monkeypatch):
     """As when a folder is cleaned between the opening of its lock and the holding of it."""
     folder, take = tmp_path / "run", fcntl.flock
 
@@ -311,7 +311,7 @@ def test_a_lock_that_was_removed_meanwhile_is_none(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("make_it", [lambda path: path.touch(), lambda path: path.symlink_to(path)])
-def test_what_is_no_folder_is_refused(tmp_path, make_it):
+def test_paths_that_are_not_folders_are_rejected(tmp_path, make_it):
     make_it(tmp_path / "file")
     with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), locked(tmp_path / "file", "run", "a"):
         pass

@@ -110,7 +110,7 @@ def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
         read_case(case, [setting, other])
 
 
-def test_report_says_what_part_is_meshed():
+def test_the_report_names_the_meshed_part():
     wholes = {"[]": "", '["y"]': "half", '["x", "y"]': "quarter", '["y", "y"]': "half"}
     for symmetry, part in wholes.items():
         assert meshed_part(read_case(BOARD, [f"structure.symmetry={symmetry}"])) == part

@@ -78,7 +78,7 @@ def test_values_of_coarse_joints_are_marked():
     assert [joint.get("mesh") for joint in judged(coarse=["A2"])["joints"].values()] == [None, "coarse"]
 
 
-def test_life_is_that_of_the_joint_that_fails_first_with_its_scatter():
+def test_life_belongs_to_the_joint_that_fails_first_with_its_scatter():
     verdict = judged(life=LIFE)
     assert verdict["life"] == LIFE_OF_A2
     assert "NO LIMIT; life of A2 10 drops (5 to 20); discretisation" in answer(verdict, None)
