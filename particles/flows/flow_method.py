@@ -11,7 +11,9 @@ class FlowScale(Protocol):
     """Scales of a flow that determine the time step."""
 
     has_free_surface: ClassVar[bool]
-    density: float
+
+    @property
+    def density(self) -> float: ...  # noqa: D102
 
     @property
     def spacing(self) -> float: ...  # noqa: D102

@@ -5,13 +5,13 @@ To add a method, list its functions in ``SOLVERS`` and make its numerical parame
 
 from collections.abc import Callable, Mapping
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
+from reflowshock.particles.flows.flow_method import FlowNumerics
 from reflowshock.particles.flows.sph_numerics import SphNumerics
 
 if TYPE_CHECKING:
     from reflowshock.particles.core.checkpoint import Checkpoint
-    from reflowshock.particles.flows.flow import FlowScene
     from reflowshock.particles.flows.result import FlowResult
 
 # Numerical parameters of a plane flow by any method. A second method makes it a union with a discriminator ``method``.
@@ -29,12 +29,20 @@ SOLVERS: Mapping[str, Mapping[str, str]] = {
 }
 
 
-def computes(scene: "FlowScene") -> bool:
+class HasMethod(Protocol):
+    """Scene with the numerical parameters of a method."""
+
+    @property
+    def numerics(self) -> FlowNumerics:
+        """Numerical parameters of the method."""
+
+
+def computes(scene: HasMethod) -> bool:
     """Return whether the method of a scene computes this kind of flow."""
     return type(scene).__name__ in SOLVERS[scene.numerics.method]
 
 
-def solve_flow(scene: "FlowScene", progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
+def solve_flow(scene: HasMethod, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
     """Compute a flow by the method of its scene.
 
     Args:
