@@ -125,9 +125,9 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
 
 
 def _solve(scene: Droplet, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.sph_flows.droplet import solve_droplet
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_droplet(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def _limits(scene: Droplet) -> dict[str, float]:
