@@ -1,4 +1,4 @@
-"""Surfaces from user files: accepted if they enclose a joint, otherwise rejected with fault, position and allowed range."""
+"""Surfaces from user files: accepted if they enclose a joint, else rejected with fault, position and allowed range."""
 
 import meshio
 import numpy as np
