@@ -9,7 +9,7 @@ from reflowshock.parameters import changed
 
 Switch = Literal["auto", "on", "off"]
 Scene = TypeVar("Scene", contravariant=True)
-SPECIFIED = "none: the case says it"
+SET_IN_CASE = "none: set in the case file"
 
 
 class Decision(TypedDict):
@@ -57,7 +57,7 @@ class Effect(ABC, Generic[Scene]):
     name: str
     stage: str = "shock"
     adds: str = ""
-    number: str = SPECIFIED
+    number: str = SET_IN_CASE
     influence: str = ""
     implementation: str = ""
     switch: str = ""
@@ -70,7 +70,7 @@ class Effect(ABC, Generic[Scene]):
     def decide(self, scene: Scene) -> Decision:
         """Decide whether the effect acts in a scene."""
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with the effect toggled, or None if its cost cannot be predicted."""
         if self.toggle is None:
             return None

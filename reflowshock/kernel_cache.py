@@ -38,7 +38,7 @@ class ModuleCacheLocator:
     """Cache locator for the kernels of this program, with the interface of Numba's own locators."""
 
     def __init__(self, function: Callable, file: str) -> None:
-        """Take a kernel and its source."""
+        """Store a kernel and the path of its source file."""
         self._function, self._py_file = function, file  # Numba reads this name in its error messages
 
     @classmethod
@@ -78,16 +78,16 @@ class _ImportHook:
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
-            def execute_and_put_first(module: ModuleType) -> None:
+            def execute_and_insert(module: ModuleType) -> None:
                 execute(module)
                 _insert_locator(module)
 
-            spec.loader.exec_module = execute_and_put_first  # type: ignore[method-assign]
+            spec.loader.exec_module = execute_and_insert  # type: ignore[method-assign]
         return spec
 
 
 def _insert_locator(caching: ModuleType) -> None:
-    cache_type = getattr(caching, "CacheImpl", None) or caching._CacheImpl  # its name has changed
+    cache_type = getattr(caching, "CacheImpl", None) or caching._CacheImpl  # renamed in recent versions
     classes = cache_type._locator_classes
     if _has_locator_classes(_compiler()) and ModuleCacheLocator not in classes:
         classes.insert(0, ModuleCacheLocator)

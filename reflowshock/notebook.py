@@ -16,7 +16,7 @@ class ReportView:
     """Report for a notebook, including its 3D view, in a sandboxed frame.
 
     Attributes:
-        path: path of ``report.html``.
+        path: Path of ``report.html``.
     """
 
     path: Path
@@ -60,13 +60,13 @@ def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> s
     """Return the HTML of a run: answer, health checks, picture of the meshes and metrics.
 
     Args:
-        summary: contents of ``summary.json``.
-        title: title of the case.
+        summary: Contents of ``summary.json``.
+        title: Title of the case.
         picture: PNG data, or None.
     """
-    missed = [_words(name) for name, check in summary["health"].items() if not check["ok"]]
-    held = f"all {len(summary['health'])} health checks passed"
-    health = f"health checks failed: {', '.join(missed)}" if missed else held
+    failed = [_words(name) for name, check in summary["health"].items() if not check["ok"]]
+    passed = f"all {len(summary['health'])} health checks passed"
+    health = f"health checks failed: {', '.join(failed)}" if failed else passed
     parts = [heading(summary["case"], title), _paragraph(summary.get("answer", "")), _paragraph(health)]
     if picture is not None:
         encoded = base64.b64encode(picture).decode()

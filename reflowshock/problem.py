@@ -14,13 +14,13 @@ class Problem:
     """Input error in a case file or on the command line.
 
     Attributes:
-        key: dotted key, e.g. "package.pitch"; empty for errors of the whole file.
-        message: description of the error.
-        value: value as written by the user; None for a missing value.
-        allowed: allowed range or dimension, or empty.
-        hint: nearest valid name, or empty.
-        line: line of the key in its file, counted from 1; None if unknown.
-        column: column of the key, counted from 1; None if unknown.
+        key: Dotted key, e.g. "package.pitch"; empty for errors of the whole file.
+        message: Description of the error.
+        value: Value as written by the user; None for a missing value.
+        allowed: Allowed range or dimension, or empty.
+        hint: Nearest valid name, or empty.
+        line: Line of the key in its file, counted from 1; None if unknown.
+        column: Column of the key, counted from 1; None if unknown.
     """
 
     key: str
@@ -48,7 +48,7 @@ class Problem:
 
 
 def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterator[Problem]:
-    """Yield a problem where a name is not among the valid ones."""
+    """Yield a problem at a dotted key if a name, e.g. of a "joint" (``what``), is not among the valid ones."""
     names = list(valid)
     if name not in names:
         yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))

@@ -51,15 +51,15 @@ def to_si(text: object, unit: str) -> float:
     """Convert a quantity to its SI value.
 
     Args:
-        text: a number and a unit, e.g. "0.48 mm".
-        unit: any unit of the expected dimension, e.g. "m".
+        text: A number and a unit, e.g. "0.48 mm".
+        unit: Any unit of the expected dimension, e.g. "m".
 
     Returns:
         The float nearest to the value in SI base units (rad for angles, K for temperatures and for differences, e.g.
         "5 delta_degC").
 
     Raises:
-        UnitError: not a string, no number, no unit, unknown unit or another dimension.
+        UnitError: Not a string, no number, no unit, unknown unit or another dimension.
     """
     if not isinstance(text, str):
         raise UnitError(f'needs a unit, as a string such as "{_plain(text)} {unit}"')

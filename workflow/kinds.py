@@ -65,17 +65,17 @@ class Kind:
     """Kind of case.
 
     Attributes:
-        case: model of its case files.
-        problems: check for combinations of parameters that are impossible.
-        stages: functions of the stages except the report, by name, in order.
-        forecast: prediction of effects and cost from the parameters.
-        size: prediction of time and memory of the stages.
-        plan: further tables of the plan, from a case and its forecast.
-        acts: subject of its effects in headings.
-        report: function that adds sections to the context of a report: run folder, case, context, summary.
-        study: convergence study of a case.
-        effects: effects that may act.
-        conclude: function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
+        case: Model of its case files.
+        problems: Check for combinations of parameters that are impossible.
+        stages: Functions of the stages except the report, by name, in order.
+        forecast: Prediction of effects and cost from the parameters.
+        size: Prediction of time and memory of the stages.
+        plan: Further tables of the plan, from a case and its forecast.
+        acts: Subject of its effects in headings.
+        report: Function that adds sections to the context of a report: run folder, case, context, summary.
+        study: Convergence study of a case.
+        effects: Effects that may act.
+        conclude: Function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -277,7 +277,7 @@ def kind_named_in(table: Mapping) -> Kind:
     """Return the kind of a case file.
 
     Raises:
-        CaseError: the file has the table of no kind, or of several.
+        CaseError: The file has the table of no kind, or of several.
     """
     names = [name for name in NAMES if name in table]
     if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):

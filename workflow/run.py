@@ -13,12 +13,12 @@ from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.stage_runner import execute
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.process.terminal import console, print_error, styled
-from reflowshock.workflow.store.folders import locked, read_mark, remove_own
+from reflowshock.workflow.store.folders import locked, read_mark, remove_program_files
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, failed_checks, why_stale
 from reflowshock.workflow.store.store import TRACEBACK, Store
-from reflowshock.workflow.store.view import adopt, not_as_put, remove_unused, withdraw_all
+from reflowshock.workflow.store.view import adopt, altered_files, remove_all_links, remove_unused
 
 WHAT = "run"  # kind of content in the mark of a run folder
 REPORT = "report"
@@ -37,18 +37,18 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
     """Make the missing, stale and damaged products of a run and print the result.
 
     Args:
-        store: store of the run folder.
-        point: case of the run.
-        until: last stage to run.
-        machine: resources of the computation.
-        force: whether the folder may contain another case.
+        store: Store of the run folder.
+        point: Case of the run.
+        until: Last stage to run.
+        machine: Resources of the computation.
+        force: Whether the folder may contain another case.
 
     Returns:
         The result; the verdict is empty without a report or without limits in the case.
 
     Raises:
-        CaseError: the folder belongs to something else or is not writable.
-        RunFolderBusy: another process is running in the folder.
+        CaseError: The folder belongs to something else or is not writable.
+        RunFolderBusy: Another process is running in the folder.
     """
     with locked(store.folder, WHAT, point.case.case.name, force) as lock:
         states = examine(store, point)
@@ -88,7 +88,7 @@ def check_movie(path: Path) -> None:
     """Check that a GIF can be written to a path.
 
     Raises:
-        CaseError: the name does not end in .gif, another file exists there, or the folder is missing.
+        CaseError: The name does not end in .gif, another file exists there, or the folder is missing.
     """
     why = ""
     if path.suffix.lower() != ".gif":
@@ -105,7 +105,7 @@ def write_run_movie(folder: Path, path: Path) -> None:
     """Write the first animated scene of a report as a GIF.
 
     Raises:
-        CaseError: no scene is animated, since its stage has not run.
+        CaseError: No scene is animated, since its stage has not run.
     """
     from reflowshock.workflow.pipeline.report import moving_scene
     from reflowshock.workflow.report.movie import write_movie
@@ -123,16 +123,16 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
     If products are missing, the report is partial and not stored as a product: the next run replaces it.
 
     Args:
-        folder: run folder.
-        name: name of its case.
-        write: function that writes the report of a run folder and a case into a folder.
-        stage: stage function of the report.
+        folder: Run folder.
+        name: Name of its case.
+        write: Function that writes the report of a run folder and a case into a folder.
+        stage: Stage function of the report.
 
     Returns:
         Whether the report was written; False if a product is damaged.
 
     Raises:
-        CaseError: nothing was run in the folder.
+        CaseError: Nothing was run in the folder.
     """
     case = read_case_of_run(folder)
     store, point = Store(folder, one_run=True), Point({}, case)
@@ -182,7 +182,7 @@ def verify(store: Store, point: Point) -> bool:
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
-    lost = not_as_put(store, store.folder)
+    lost = altered_files(store, store.folder)
     for fault in lost:
         print_error(f"{fault}; `reflowshock run` restores it")
     return not lost and not any(state.stale for state in states.values())
@@ -192,14 +192,14 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
     """Remove the files of the program from a run folder; files of the user stay.
 
     Args:
-        folder: the run folder.
-        name: name of the case.
-        unused: whether to remove only products without links in the run folder, and interrupted work.
-        force: whether to clean the folder even if it contains another case, a study or a convergence study.
+        folder: The run folder.
+        name: Name of the case.
+        unused: Whether to remove only products without links in the run folder, and interrupted work.
+        force: Whether to clean the folder even if it contains another case, a study or a convergence study.
 
     Raises:
-        CaseError: the folder contains another case.
-        RunFolderBusy: a run is active in the folder.
+        CaseError: The folder contains another case.
+        RunFolderBusy: A run is active in the folder.
     """
     mark = read_mark(folder)
     if mark is None:
@@ -213,8 +213,8 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
             console.print(f"removed {' and '.join(removed)} from {folder}")
             return
         for used_store in (*(again for again in store.repeated if again.home.is_dir()), store):
-            withdraw_all(used_store)
-            left = remove_own(used_store.folder)
+            remove_all_links(used_store)
+            left = remove_program_files(used_store.folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
         console.print(f"kept files that the program did not write: {', '.join(left)}")

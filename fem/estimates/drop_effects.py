@@ -176,7 +176,7 @@ class SolderPlasticity(DropEffect):
         why = f"shock.numerics.plasticity = {run.shock.numerics.plasticity}"
         return decision(bool(laws), "; ".join([why, *(yields(name, law) for name, law in laws.items())]))
 
-    def other_way(self, case: Any, acts: bool) -> Any:
+    def toggled(self, case: Any, acts: bool) -> Any:
         """Return the case of a package with elastic solder if it is plastic, else with plastic solder."""
         with_law = case if acts or case.materials.solder.plasticity else changed(case, "materials.solder", SAC405)
         return changed(with_law, "shock.numerics.plasticity", "off" if acts else "on")

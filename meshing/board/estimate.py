@@ -153,7 +153,7 @@ def _joint_estimates(package: Package, joints: int, gap: float) -> dict[str, Par
 def _column_estimates(
     package: Package, board: Board, parts: dict[str, PartEstimate], joints: int
 ) -> dict[str, PartEstimate]:
-    """Count the elements of the columns of fine joints, and those of the remaining boxes."""
+    """Count the elements of the columns of fine joints, and the remaining boxes."""
     imprint, numerics = package.imprint, package.joint_numerics
     if imprint is None or package.column_size is None:
         return {}

@@ -23,8 +23,8 @@ def outlines(facets: np.ndarray) -> list[np.ndarray]:
     first, second = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     count = int(facets.max()) + 1
     forward, backward = first * np.int64(count) + second, second * np.int64(count) + first
-    alone = ~np.isin(forward, backward)
-    following = dict(zip(first[alone].tolist(), second[alone].tolist(), strict=True))
+    unpaired = ~np.isin(forward, backward)
+    following = dict(zip(first[unpaired].tolist(), second[unpaired].tolist(), strict=True))
     lines = []
     while following:
         line = [next(iter(following))]

@@ -12,7 +12,7 @@ from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write
 from reflowshock.meshing.core.split_tetrahedra import EDGES, SplitTetrahedra
 
 KIND, FACE = 11, 9  # Gmsh's ten-node tetrahedron and six-node triangle
-ORDER = np.array([0, 3, 1, 2, 5, 4])  # Gmsh's edges 01 12 20 03 23 13 among ours, 01 02 03 12 13 23
+ORDER = np.array([0, 3, 1, 2, 5, 4])  # positions of Gmsh's edges 01 12 20 03 23 13 in ``EDGES``, 01 02 03 12 13 23
 # Exact for cubics (Keast 1986, five points): barycentric coordinates and weights of the unit tetrahedron.
 STATIONS = np.vstack([np.full(4, 0.25), np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0])
 WEIGHTS = np.array([-0.8, 0.45, 0.45, 0.45, 0.45]) / 6.0
@@ -42,7 +42,7 @@ def quadratic_tetrahedra(
 
     Args:
         split: Hexahedra into which the tetrahedra were split.
-        points: Present node coordinates of these hexahedra, shape (n, 3) [m]; gives the midpoints of surface edges.
+        points: Smoothed node coordinates of these hexahedra, shape (n, 3) [m]; give the midpoints of surface edges.
         tetrahedra: Vertices of the tetrahedra, shape (c, 4).
         faces: Facet set name -> surface triangles, shape (f, 3).
     """

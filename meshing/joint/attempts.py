@@ -24,7 +24,7 @@ from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.joint_mesh import JointMesh, JointMeshError, check_errors
 from reflowshock.meshing.joint.solder import Solder
 from reflowshock.meshing.joint.swept import Placing, swept_solder
-from reflowshock.meshing.joint.tetrahedra import fill_apart
+from reflowshock.meshing.joint.tetrahedra import fill_in_process
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     PACKAGE_PAD,
@@ -36,8 +36,8 @@ from reflowshock.meshing.surface.closed_surface import (
 )
 
 MOST_LAYERS = 64
-FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # of two layers: split in two, an edge is as long as a layer is high
-LARGEST_DEVIATION = 0.1  # of the equal-volume sphere's radius, in addition to that of the section's polygon
+FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # edge length over two layer heights, since the split halves each edge
+LARGEST_DEVIATION = 0.1  # of the radius of a sphere of equal volume; the polygon of a swept section adds its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +83,10 @@ def _swept(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> I
 
 
 def _fill(surface: ClosedSurface, size: float, cut_into_patches: bool, place: Placing) -> Solder:
-    return free_form_solder(surface, fill_apart(surface, size, cut_into_patches), place)
+    return free_form_solder(surface, fill_in_process(surface, size, cut_into_patches), place)
 
 
-def first_good(
+def first_valid_mesh(
     surface: ClosedSurface, candidates: Iterator[Attempt], name: str, build: Callable[[Solder], JointMesh]
 ) -> JointMesh:
     """Return the first mesh that passes its checks; its record lists why earlier attempts failed.

@@ -50,7 +50,7 @@ class JointPlace:
 
     @classmethod
     def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
-        """Build the map, with the upper face found from the closed surface of the joint."""
+        """Build the map, with the plane of the upper face fitted to the closed surface of the joint."""
         return cls(site, side, copper, pad_planes(surface))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:

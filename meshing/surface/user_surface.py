@@ -108,12 +108,12 @@ def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(all="ignore"):  # meshio prints
             mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # whatever a reader makes of a broken file
+    except (Exception, SystemExit) as error:  # readers of meshio raise any type for a damaged file
         kind = path.suffix[1:].upper()
         raise SurfaceError(f"cannot be read as {kind}: it is damaged, cut off, or of another format") from error
     others = sorted({block.type for block in mesh.cells} - {"triangle", "vertex", "line"})
     if others or not len(mesh.cells_dict.get("triangle", ())):
-        raise SurfaceError(f"holds {', '.join(others) or 'no facets'}, allowed triangles")
+        raise SurfaceError(f"contains {', '.join(others) or 'no facets'}, allowed triangles")
     points, triangles = np.asarray(mesh.points, float), mesh.cells_dict["triangle"].astype(np.int64)
     _check_numbers(points, triangles)
     _check_extent(scale * points[:, :3])

@@ -242,7 +242,7 @@ class InkFreezing(Effect[Printing]):
             why = f"set to {switch} by the user ({why})"
         return decision(scene.freezes, why, scene.share_frozen)
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with drops cured by light; None if the effect is off."""
         return changed(case, f"{case.kind}.freezing", None) if acts else None
 

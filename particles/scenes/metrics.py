@@ -44,7 +44,7 @@ def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run
     reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
-    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
+    rest = _cost_and_rest(solder, flow, run) | energy_metrics([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -70,7 +70,7 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
         shape["max_width_error"] = (width / reference.max_width - 1.0, "")
     if flow.physics.lines:
         shape |= _contact(solder, flow, reference)
-    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
+    rest = _cost_and_rest(solder, flow, run) | energy_metrics([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -301,10 +301,11 @@ def particles_lost(body: Body) -> int:
     return int((winding_numbers.at_points(below, np.concatenate(corners)) < 0.5).sum())
 
 
-def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
-    """Return the energy losses of the scheme ispg in all bodies over the initial energy, and the imbalance.
+def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
+    """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
 
-    The sliding speed of a body is included, since a body may slide on smooth walls for ever.
+    The result is empty for schemes without a budget, that is all but ispg. It includes the sliding speed, since a body
+    may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]
@@ -319,7 +320,7 @@ def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
 
 
 def width_change_bound(geometry: JointGeometry) -> float:
-    """Bound on the relative change of a joint's width, at equal gap, by the package's offset and tilt.
+    """Return a bound on the relative change of a joint's width by offset and tilt of the package, at equal gap.
 
     By symmetry the change is of second order. The factors bound barrels and hourglasses of equal discs, 1.2 to 2.1
     radii apart, to 0.3 radii and 5 deg; widths of Surface Evolver keep to them (test_particles_leaning_joints.py).

@@ -126,9 +126,9 @@ class SteppedMotion:
         """External force on the plate, shape (3,) [N]."""
         return self.motion.load
 
-    def given(self, plate: Plate, time_step: float) -> Floats:
+    def prescribed_twist(self, plate: Plate, time_step: float) -> Floats:
         """Return the twist at the end of the step, shape (6,) [m/s, rad/s]."""
-        return (self.whole * self.motion.given(plate, self.whole) - self.carried) / time_step
+        return (self.whole * self.motion.prescribed_twist(plate, self.whole) - self.carried) / time_step
 
     def after_split(self, wall: int) -> PlateMotion | None:
         """Return the motion of the plate after the body has split."""

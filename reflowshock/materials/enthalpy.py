@@ -19,6 +19,6 @@ def temperature(enthalpy: Any, melting_point: float, heat_capacity: float, laten
 
 
 def enthalpy(temperature: Any, melting_point: float, heat_capacity: float, latent_heat: float) -> Any:
-    """Return the specific enthalpy [J/kg] at a temperature [K]; at the melting point that of the liquid."""
+    """Return the specific enthalpy [J/kg] at a temperature [K]; the melting point counts as liquid."""
     sensible = heat_capacity * (temperature - melting_point)
     return sensible + latent_heat * (sensible >= 0.0)

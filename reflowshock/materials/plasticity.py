@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.materials.parameters import Isotropic, Material
+from reflowshock.materials.parameters import Material
 
 NEVER_YIELDS = np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])  # ``plastic_constants`` of an elastic material
 FIRST_YIELD = 1  # column of the initial yield stress, infinite for an elastic material
@@ -31,11 +31,8 @@ def plastic_constants(material: Material) -> NDArray[np.float64]:
         Array of shape (6,): 3 G [Pa], A and B times the thermal softening [Pa], n, C, reference rate [1/s]. A is
         infinite for an elastic material.
     """
-    if not isinstance(material, Isotropic) or material.plasticity is None:
-        return NEVER_YIELDS.copy()
-    law, softening = material.plasticity, material.softening
-    shear = 3.0 * material.shear_modulus
-    return np.array([shear, law.A * softening, law.B * softening, law.n, law.C, law.reference_rate])
+    constants = material.yield_constants
+    return NEVER_YIELDS.copy() if constants is None else np.array(constants)
 
 
 def yield_stress(plastic_strain, rate, constants):

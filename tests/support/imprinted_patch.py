@@ -36,7 +36,7 @@ from reflowshock.materials.roles import role_of_part
 from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Package, Warpage
-from reflowshock.meshing.joint.attempts import first_good, free_form
+from reflowshock.meshing.joint.attempts import first_valid_mesh, free_form
 from reflowshock.meshing.joint.column import Column, columns_of
 from reflowshock.meshing.joint.joint_mesh import CopperPads, JointMesh, JointPlace, build_joint
 from reflowshock.meshing.joint.solder_mesh import mesh_joint
@@ -109,7 +109,7 @@ def free_form_joint(
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
     joint_place = JointPlace.of(surface, site, side, copper.thickness)
     build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
-    return first_good(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
+    return first_valid_mesh(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
 
 
 def box_lines(mesh: Mesh) -> Floats:

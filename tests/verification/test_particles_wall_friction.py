@@ -31,7 +31,7 @@ class Spin:
     directions = np.zeros((0, 6))
     load = np.zeros(3)
 
-    def given(self, _plate, _time_step):
+    def prescribed_twist(self, _plate, _time_step):
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, SPIN])
 
 

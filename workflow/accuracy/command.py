@@ -236,8 +236,8 @@ def _compute(
     request: AccuracyRequest,
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other, and show the progress."""
-    again = " again, to measure their times" if store.folder.name.startswith("again") else ""
-    with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{again}") as progress:
+    suffix = " again, to measure their times" if store.folder.name.startswith("again") else ""
+    with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{suffix}") as progress:
 
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))

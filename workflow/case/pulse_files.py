@@ -12,7 +12,7 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
     """Yield a problem for each table that cannot be read.
 
     Args:
-        tables: file, quantity and column title (None for single columns), by key.
+        tables: File, quantity and column title (None for single columns), by key.
     """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import read_pulse

@@ -21,8 +21,8 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
     """Remove the scales from the table of a case file and return them.
 
     Args:
-        table: contents of the file; ``scales`` is removed.
-        problems: list to which errors are added.
+        table: Contents of the file; ``scales`` is removed.
+        problems: List to which errors are added.
 
     Returns:
         Values by dotted key, by name of the scale.

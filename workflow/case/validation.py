@@ -19,10 +19,10 @@ def translate(model: type[BaseModel], error: ValidationError, table: dict, repor
     """Translate validation errors.
 
     Args:
-        model: the validated model.
-        error: error of pydantic.
-        table: table as written by the user.
-        reported: keys with a problem already reported, which are skipped.
+        model: The validated model.
+        error: Error of pydantic.
+        table: Table as written by the user.
+        reported: Keys with a problem already reported, which are skipped.
 
     Returns:
         One problem per key.
@@ -91,15 +91,16 @@ def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
 
 
 def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
-    """Return the problem of a table with a missing or unknown ``kind``."""
-    kinds = [fields.tag_of(candidate) for candidate in fields.models_of(field)]
+    """Return the problem of a table with a missing or unknown tag, such as its ``kind``."""
+    candidates = fields.models_of(field)
+    tag, kinds = fields.tag_key(candidates[0]), [fields.tag_of(candidate) for candidate in candidates]
     choice = "one of " + ", ".join(kinds)
     if not isinstance(value, dict):
         return Problem(key, "must be a table", value)
-    if "kind" not in value:
-        return Problem(f"{key}.kind", "is missing", None, choice)
-    kind = str(value["kind"])
-    return Problem(f"{key}.kind", "unknown kind", kind, choice, nearest(kind, kinds))
+    if tag not in value:
+        return Problem(f"{key}.{tag}", "is missing", None, choice)
+    name = str(value[tag])
+    return Problem(f"{key}.{tag}", f"unknown {tag}", name, choice, nearest(name, kinds))
 
 
 def _nearest_name(value: Any, field: FieldInfo) -> str:

@@ -25,7 +25,7 @@ FIELDS = (
 def show_registry(console: Console) -> None:
     """Print every effect of the program."""
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
-        table = new_table(f"\nEffects of the {stage}", "effect", "", "what")
+        table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():
             if effect.stage == stage:
                 _add(table, effect)

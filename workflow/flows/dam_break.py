@@ -58,9 +58,9 @@ def dam_problems(case: DamBreakCase) -> list[Problem]:
 
 
 def _solve(scene: DamBreak, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.sph_flows.dam_break import solve_dam_break
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_dam_break(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def dam_curves(dam: DamBreak, result: "FlowResult") -> "list[Chart]":

@@ -125,9 +125,9 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
 
 
 def _solve(scene: Droplet, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.sph_flows.droplet import solve_droplet
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_droplet(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def _limits(scene: Droplet) -> dict[str, float]:
@@ -151,7 +151,7 @@ def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":
         Series("kinetic", time, history["kinetic_energy"] / surface, ORANGE),
         Series("surface and wall", time, history["surface_energy"] / surface),
     ]
-    if drop.impact_speed:  # its pressure is that of sound waves, which decay slowly
+    if drop.impact_speed:  # sound waves dominate its pressure and decay slowly
         label, motion = "largest speed / impact speed", history["largest_speed"] / drop.impact_speed
         total = (history["kinetic_energy"] + history["surface_energy"]) / surface
         energies.append(Series("total", time, total, RED))

@@ -38,9 +38,9 @@ def channel_problems(case: PoiseuilleCase) -> list[Problem]:
 def _solve(
     scene: Poiseuille, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.sph_flows.viscous_flows import solve_poiseuille
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_poiseuille(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def channel_curves(scene: Poiseuille, result: "FlowResult") -> "list[Chart]":

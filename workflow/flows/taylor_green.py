@@ -41,9 +41,9 @@ def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
 def _solve(
     scene: TaylorGreen, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.sph_flows.viscous_flows import solve_taylor_green
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_taylor_green(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def vortex_curves(_scene: TaylorGreen, result: "FlowResult") -> "list[Chart]":

@@ -21,7 +21,7 @@ PLUGIN = "snakemake_executor_plugin_slurm"
 
 
 class NoAnswer(RuntimeError):
-    """Failure of a Slurm command; the message contains its output."""
+    """Error of a Slurm command; the message contains its output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,14 +86,14 @@ def check_slurm(profile: Profile, cases: Sequence[Case]) -> Partition:
     """Check that jobs can be submitted and that the cases fit into the partition.
 
     Args:
-        profile: profile of the cluster.
-        cases: cases to run.
+        profile: Profile of the cluster.
+        cases: Cases to run.
 
     Returns:
         The partition of the jobs.
 
     Raises:
-        CaseError: jobs cannot be submitted, or a case is too large; with all problems.
+        CaseError: Jobs cannot be submitted, or a case is too large; with all problems.
     """
     problems = list(_missing())
     if problems:

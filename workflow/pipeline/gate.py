@@ -107,16 +107,16 @@ def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
     """Ask the user to confirm a long run.
 
     Args:
-        name: name of the run.
-        seconds: predicted wall time [s].
-        yes: whether the user has already agreed.
-        console: console for the question.
+        name: Name of the run.
+        seconds: Predicted wall time [s].
+        yes: Whether the user has already agreed.
+        console: Console for the question.
 
     Returns:
         Whether the run may start.
 
     Raises:
-        CaseError: the console is not interactive.
+        CaseError: The console is not interactive.
     """
     if yes or seconds <= LONG:
         return True

@@ -47,15 +47,15 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     """Write ``<folder>/<name>.toml``, complete and commented.
 
     Args:
-        name: name of the case.
-        template: name of the shipped case to copy.
-        folder: output folder.
+        name: Name of the case.
+        template: Name of the shipped case to copy.
+        folder: Output folder.
 
     Returns:
         The path of the file.
 
     Raises:
-        CaseError: the name is invalid, the template does not exist, or the file exists already.
+        CaseError: The name is invalid, the template does not exist, or the file exists already.
     """
     cases = templates()
     if template not in cases:

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Span, Text
 
 from reflowshock.workflow.case.text import against_limit
-from reflowshock.workflow.process.progress_file import teller
+from reflowshock.workflow.process.progress_file import progress_writer
 
 REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
 
@@ -36,8 +36,8 @@ def styled(template: str, *values: object) -> Text:
     """Style a template with markup and insert values, which are never interpreted as markup.
 
     Args:
-        template: constant with markup and one ``{}`` per value, such as ``"[bold]{}[/] in {}"``.
-        values: values in the order of their placeholders.
+        template: Constant with markup and one ``{}`` per value, such as ``"[bold]{}[/] in {}"``.
+        values: Values in the order of their placeholders.
     """
     words = Text.from_markup(template, emoji=False)
     ends = [end for match in re.finditer(re.escape(PLACE), words.plain) for end in match.span()]
@@ -105,10 +105,10 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
     """Print the result of a stage: time, failed checks, or otherwise the check closest to its limit.
 
     Args:
-        stage: name of the stage.
-        seconds: wall time of the stage [s].
-        health: value, limit and ok by name of the check.
-        continued: names of parts that continued from checkpoints, or empty.
+        stage: Name of the stage.
+        seconds: Wall time of the stage [s].
+        health: Value, limit and ok by name of the check.
+        continued: Names of parts that continued from checkpoints, or empty.
     """
     failed = [name for name, result in health.items() if not result["ok"]]
     mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
@@ -163,13 +163,13 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
     moving = console.is_terminal and not console.is_dumb_terminal
     if not moving:
         console.print(f"       {description} …", soft_wrap=True)
-    tell = teller(description)
+    write_progress = progress_writer(description)
     with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
         task = bar.add_task(visible(description), total=1.0)
 
         def show(share: float, text: str = "") -> None:
             bar.update(task, completed=share, description=visible(text or description))
-            tell(share, text)
+            write_progress(share, text)
 
         yield show
 

@@ -27,12 +27,12 @@ class Request:
     """Options of a stress test.
 
     Attributes:
-        files: files of hard cases; empty for all shipped files.
-        families: families to run; empty for all.
-        count: number of random cases in all families together.
-        seed: seed of the random cases.
-        cores: number of simultaneous cases.
-        out: output folder.
+        files: Files of hard cases; empty for all shipped files.
+        families: Families to run; empty for all.
+        count: Number of random cases in all families together.
+        seed: Seed of the random cases.
+        cores: Number of simultaneous cases.
+        out: Output folder.
     """
 
     files: Sequence[Path]
@@ -50,8 +50,8 @@ def stress_test(request: Request) -> bool:
         Whether all cases stay within their bounds.
 
     Raises:
-        CaseError: a case is invalid or results cannot be written; raised before any case runs.
-        RunFolderBusy: another stress test uses the output folder.
+        CaseError: A case is invalid or results cannot be written; raised before any case runs.
+        RunFolderBusy: Another stress test uses the output folder.
     """
     families = _families(request.families)
     fixed = {path: read_hard_cases(path) for path in _files(request.files) if read_random_file(path) is None}
@@ -78,8 +78,8 @@ def _try_all(request: Request, fixed: Mapping[Path, list[HardCase]], samples: Se
             show_verdict(verdict)
             return
         sample = by_name[verdict.case.name]
-        sample.found.append(verdict)
-        if len(sample.found) == len(sample.cases):
+        sample.completed.append(verdict)
+        if len(sample.completed) == len(sample.cases):
             show_sample(sample)
 
     session = Session(request.cores, request.seed, {sample.name: len(sample.cases) for sample in samples})

@@ -29,13 +29,13 @@ def named(verdict: Verdict) -> str:
 def show_sample(sample: Sample) -> None:
     """Print the results of the random cases of a trial and its missed cases."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
-    line = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
+    line = styled(" {}  {}  {} s", sample.name, sample_summary(sample), seconds)
     console.print(_mark(sample.ok) + line, soft_wrap=True)
     for verdict in sample.missed:
         console.print(f"     {named(verdict)}  {verdict!s}", soft_wrap=True)
 
 
-def sample_said(sample: Sample) -> str:
+def sample_summary(sample: Sample) -> str:
     """Return a summary of the random cases of a trial."""
     counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
     if sample.too_many_refused:

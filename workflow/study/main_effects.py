@@ -98,8 +98,8 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
     if ordered and len(set(values)) > 1 and np.ptp(metrics) > 0.0 and len(rows) > 2:
         result = spearmanr(np.array(values, dtype=float), metrics)
         correlation, probability = float(result.statistic), float(result.pvalue)
-    named = tuple(value if isinstance(value, float) else str(value) for value in values)
-    return MainEffect(factor, unit, named, metrics, correlation, probability)
+    labels = tuple(value if isinstance(value, float) else str(value) for value in values)
+    return MainEffect(factor, unit, labels, metrics, correlation, probability)
 
 
 def ranked(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:

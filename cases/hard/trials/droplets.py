@@ -11,6 +11,7 @@ from reflowshock.cases.hard.trial import Trial, pure_trial
 from reflowshock.parameters import Parameters, changed
 from reflowshock.particles.flows.dam_break import DamBreak
 from reflowshock.particles.flows.droplet import Droplet, cap
+from reflowshock.particles.flows.flow_effects import sph_sound
 from reflowshock.particles.flows.printing import Printing
 from reflowshock.quantity import Quantity
 
@@ -266,7 +267,7 @@ def printed(parameters: PrintTrial) -> dict[str, float]:
     names = ("volume_error", "volume_drift", "connected_parts_max", "mergers", "splits", "voids", "steps")
     return {
         **{name: result.metrics[name][0] for name in names},
-        "mach": result.history["largest_speed"].max() / scene.sound,
+        "mach": result.history["largest_speed"].max() / sph_sound(scene),
         "closest": nearest.min() / scene.spacing,
         "farthest": nearest.max() / scene.spacing,
         "below_wall": float((points[:, 2] < 0.0).sum()),

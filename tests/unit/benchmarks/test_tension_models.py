@@ -1,4 +1,4 @@
-"""Each model of surface tension against what is exact for it, so that no bug is taken for a weakness of a model."""
+"""Each model of surface tension in an exact case, to separate bugs from weaknesses of the model."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
 
 
 def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
-    """2 p G / rho is what the sums over pairs lack of a uniform pressure, wherever |G| h is above the threshold."""
+    """2 p G / rho completes the pair sums of a uniform pressure wherever |G| h exceeds the threshold."""
     simulation = start(DROP, "free-surface pressure")
     fields, surface = simulation.fields, simulation.surface
     points = np.stack(fields[:3], axis=1)

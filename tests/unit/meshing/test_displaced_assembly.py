@@ -76,7 +76,7 @@ def test_only_what_the_package_does_beyond_the_board_counts(flat):
 
 @pytest.mark.parametrize("symmetry", ["quarter", pytest.param("full", marks=pytest.mark.long)])
 def test_the_underside_equals_the_facets(tmp_path, symmetry):
-    """Heights at points of displaced facets, found by their shape functions, are those of the object."""
+    """``PackageSide`` gives the heights of displaced facets, which their shape functions give independently."""
     write_assembly(package(), board(symmetry=symmetry), tmp_path / "flat.msh")
     side = write_displaced_assembly(tmp_path / "flat.msh", bend, tmp_path / "bent.msh")
     mesh = MeshFile(tmp_path / "bent.msh")

@@ -70,7 +70,7 @@ def test_a_bridge_has_the_pads_of_both_joints(bridge, sites):
 
 
 def test_all_hexahedra_fit_together(bridge):
-    """Facets beyond the solder's are those of the copper: nothing inside is open."""
+    """Boundary facets belong to solder or copper: no crack is open inside."""
     mesh, _ = bridge
     cells = np.vstack(list(mesh.cells.values()))
     quads = boundary_quads(cells)

@@ -16,7 +16,7 @@ from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes import rebuild as rebuild_module
 from reflowshock.particles.scenes.flow_setup import pad_lines, start_flow
-from reflowshock.particles.scenes.metrics import ledger
+from reflowshock.particles.scenes.metrics import energy_metrics
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild, split_to_rest, touch
 from reflowshock.particles.scenes.reflow import LiquidJoint
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -155,4 +155,4 @@ def test_a_detached_joint_keeps_volume_centre_and_energy_budget(monkeypatch):
     assert sum(drop.solver.first_energy for drop in drops) == flow.solver.first_energy
     for drop in drops:
         drop.step()
-    assert abs(ledger(drops)["energy_imbalance"][0]) < 2e-3
+    assert abs(energy_metrics(drops)["energy_imbalance"][0]) < 2e-3

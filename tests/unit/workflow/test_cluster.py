@@ -17,7 +17,7 @@ from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.launch import LAUNCHER, mpi_command
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
-SAID = """\
+SNAKEMAKE_LOG = """\
 rule shock:
     jobid: 2
 
@@ -166,7 +166,7 @@ def test_jobs_that_ended_silently_are_reported(tmp_path):
     assert failures_of(said) == {}
     said.write_text("WorkflowError: the account is invalid")
     assert failures_of(said) == {}
-    said.write_text(SAID)
+    said.write_text(SNAKEMAKE_LOG)
     assert failures_of(said) == {
         "shock-1": "SLURM-job '7' failed, SLURM status is: 'TIMEOUT'. Reason: Unknown.",
         "reflow-2": "SLURM sbatch failed. The error message was 'sbatch: error: Memory specification can not"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reflowshock.workflow.jobs.batch import log_of, missing, show_products, why
+from reflowshock.workflow.jobs.batch import failure_message, log_of, missing, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import MESSAGE, Store
@@ -75,19 +75,19 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
 def test_the_reason_of_an_incomplete_point_is_reported(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
     make(store, point, ["geometry"])
-    assert why(store, point, "geometry") == ""
-    assert why(store, point, "report") == "stage reflow: was not started"
+    assert failure_message(store, point, "geometry") == ""
+    assert failure_message(store, point, "report") == "stage reflow: was not started"
     log = log_of(store, point, "reflow")
     log.parent.mkdir(parents=True)
     log.write_text("some words\nKilled\n")
     assert (
         f'stage reflow: ended without an error message (it may have been killed); last output: "Killed"; see {log}'
-        == (why(store, point, "report"))
+        == (failure_message(store, point, "report"))
     )
     message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE
     message.parent.mkdir(parents=True)
     message.write_text("it broke")
-    assert why(store, point, "report") == "stage reflow: it broke"
+    assert failure_message(store, point, "report") == "stage reflow: it broke"
     store.prepare_work(point, "reflow")
     assert store.message(point, "reflow") is None
 

@@ -9,11 +9,11 @@ import pytest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_own
+from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_program_files
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
-from reflowshock.workflow.store.view import not_as_put, remove_unused, withdraw_all
+from reflowshock.workflow.store.view import altered_files, remove_all_links, remove_unused
 from tests.support.products import OTHER, POINT, make, shown_run
 
 NAMES = POINT.case.pipeline.names
@@ -67,8 +67,8 @@ def test_files_of_a_user_stay(store):
     assert (store.folder / "report.html").read_text() == "report/report.html"
     assert (store.folder / "report.html.kept-1").read_text() == "mine, too"
     show_products(store, OTHER)
-    withdraw_all(store)
-    assert remove_own(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
+    remove_all_links(store)
+    assert remove_program_files(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
     assert all(path.read_text() == "mine" for path in mine)
 
 
@@ -92,8 +92,8 @@ def test_copies_behind_a_link_are_a_users(store, tmp_path, clean):
     shutil.rmtree(store.folder / "shock")
     (store.folder / "shock").symlink_to(copy)
     if clean:
-        withdraw_all(store)
-        assert remove_own(store.folder) == ["shock"]
+        remove_all_links(store)
+        assert remove_program_files(store.folder) == ["shock"]
     else:
         assert show_products(store, POINT) == ["shock/stage.json"]
         assert (store.folder / "shock.kept-1").is_symlink() and not (store.folder / "shock").is_symlink()
@@ -163,7 +163,7 @@ def test_a_users_inputs_are_set_aside_or_left(store, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/case.json").write_text("mine")
     (store.folder / "inputs").symlink_to(tmp_path / "mine")
-    withdraw_all(store)
+    remove_all_links(store)
     assert (tmp_path / "mine/case.json").read_text() == "mine"
     show_products(store, POINT)
     assert (store.folder / "inputs.kept-1").is_symlink() and (store.folder / "inputs/case.json").is_file()
@@ -201,7 +201,7 @@ def test_a_file_where_a_folder_of_the_store_belongs_gives_way(store, name):
                 make(store, POINT, [stage])
         show_products(store, POINT)
     assert not any(state.stale for state in examine(store, POINT).values())
-    assert not_as_put(store, store.folder) == []
+    assert altered_files(store, store.folder) == []
 
 
 def test_a_folder_where_the_list_belongs_gives_way(store):
@@ -272,21 +272,21 @@ def test_an_unfinished_mark_is_not_a_file_of_a_user(tmp_path):
     (tmp_path / ".reflowshock.partial").write_text("{")
     with locked(tmp_path, "run", "small"):
         pass
-    assert remove_own(tmp_path) == []
+    assert remove_program_files(tmp_path) == []
 
 
 def test_missing_files_of_the_run_folder_are_reported(store):
-    assert not_as_put(store, store.folder) == []
+    assert altered_files(store, store.folder) == []
     (store.folder / "report.html").unlink()
     (store.folder / "summary.json").unlink()
     (store.folder / "summary.json").write_text("mine")
-    differences = not_as_put(store, store.folder)
+    differences = altered_files(store, store.folder)
     assert sorted(line.removeprefix(f"{store.folder}/") for line in differences) == [
         "report.html is missing",
         "summary.json was modified",
     ]
     show_products(store, POINT)
-    assert not_as_put(store, store.folder) == []
+    assert altered_files(store, store.folder) == []
 
 
 def test_a_run_folder_has_one_user(tmp_path):

@@ -48,7 +48,7 @@ BAD_VALUES = {
     "force without place": ("loads.poke={kind='point_force',peak='1 N'}", ["loads.poke.at: is missing"]),
     "force outside": (f"loads.poke={{{POKE},peak='1 N',duration='1 ms'}}", ["loads.poke.at", "outside the meshed"]),
     "support that holds nothing": ("supports.edge.on=x_min", ["supports.edge.hold", "any of x, y, z, or a bedding"]),
-    "springs of what is held": (
+    "springs on a fixed face": (
         "supports.holes.bedding.x=1e12 N/m^3",
         ["supports.holes.bedding.x", "is held by supports.holes.hold"],
     ),
