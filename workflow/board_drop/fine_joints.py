@@ -122,7 +122,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
         return
     image = "" if name.upper() in names else _image(name.upper(), sites, case)
     message = "lies in a quarter that is not modelled" if image else "is not a joint of the model"
-    yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or nearest(name, names, alike=0.5))
+    yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or nearest(name, names, similarity=0.5))
 
 
 def _image(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> str:
