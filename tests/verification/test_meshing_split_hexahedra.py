@@ -65,6 +65,7 @@ def answers() -> dict[str, Answer]:
     return {"split": answer(split), "swept": swept(2, 1, 6), "exact": swept(4, 2, 14)}
 
 
+@pytest.mark.long
 def test_split_column_has_the_stiffness_and_frequency_of_fine_hexahedra(answers):
     split, exact = answers["split"], answers["exact"]
     assert split.deflection == pytest.approx(exact.deflection, rel=0.02)

@@ -48,6 +48,7 @@ def to_volume(flow, solder, volume):
     return radius, height, 2.0 * np.degrees(np.arctan(height / radius))
 
 
+@pytest.mark.long
 def test_a_drop_that_is_filled_and_emptied(flow):
     liquid, solder = flow
     radius, _, angle = to_volume(liquid, solder, 1.4 * VOLUME)
@@ -117,6 +118,7 @@ def test_oscillating_contact_line_stops_between_its_angles(half_sphere):
     assert angle == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 per edge, 105.2 at 7 with a quarter of the step
 
 
+@pytest.mark.long
 def test_a_cube_comes_to_rest_between_both_angles():
     drop = Drop(volume=VOLUME, receding_angle=RECEDING, advancing_angle=ADVANCING, particles_per_edge=COUNT)
     metrics = {name: value for name, (value, _) in drop_to_rest(drop, moving(0.227)).shape.metrics.items()}

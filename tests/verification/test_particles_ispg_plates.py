@@ -74,15 +74,16 @@ def test_work_of_slow_plates_equals_the_surface_energy():
     assert flow.body.volume()[0] == pytest.approx(VOLUME, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("end", "wall"),
     [
         (place(0.40e-3), "free-slip"),
-        pytest.param(place(0.31e-3), "free-slip", marks=pytest.mark.long),
-        pytest.param(place(0.36e-3, 0.03e-3), "no-slip", marks=pytest.mark.long),
-        pytest.param(place(0.36e-3, 0.03e-3), "free-slip", marks=pytest.mark.long),
-        pytest.param(place(0.35e-3, 0.0, 3.0), "free-slip", marks=pytest.mark.long),
-        pytest.param(place(0.36e-3, 0.0, 3.0), "slip", marks=pytest.mark.long),
+        (place(0.31e-3), "free-slip"),
+        (place(0.36e-3, 0.03e-3), "no-slip"),
+        (place(0.36e-3, 0.03e-3), "free-slip"),
+        (place(0.35e-3, 0.0, 3.0), "free-slip"),
+        (place(0.36e-3, 0.0, 3.0), "slip"),
     ],
 )
 def test_a_moved_joint_rests_where_the_default_does(end, wall):

@@ -60,6 +60,7 @@ def errors_on_slab(degrees, units):
     return points[:, 2].max() / height - 1.0, (radius - exact).mean() / half
 
 
+@pytest.mark.long
 def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
     height, profile = errors_on_slab(90.0, 1.5)
     assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; 0.18 and 0.2 without wall fractions

@@ -68,6 +68,7 @@ def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
         assert pull[near] == pytest.approx(0.75 * strength(law, 1.0) * force, rel=0.05)
 
 
+@pytest.mark.long
 def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
     """2 p G / rho completes the pair sums of a uniform pressure wherever |G| h exceeds the threshold."""
     simulation = start(DROP, "free-surface pressure")
@@ -87,6 +88,7 @@ def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
     assert not pull[:, ~at_surface].any()
 
 
+@pytest.mark.long
 def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     """Finely filled; the level lies inside the ball by a share of the square of the kernel over the radius."""
     law = start(DROP, "free-surface pressure").law

@@ -53,7 +53,7 @@ def small_dam(device: str) -> Simulation:
 
 
 def small_channel(device: str) -> Simulation:
-    return channel(Poiseuille(width=1e-3, speed=0.1, numerics=SphNumerics(particles_across=8, device=device)))
+    return channel(Poiseuille(width=1e-3, speed=0.1, numerics=SphNumerics(particles_across=6, device=device)))
 
 
 def small_impact(device: str) -> Simulation:

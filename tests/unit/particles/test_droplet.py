@@ -207,6 +207,7 @@ def test_an_impact_wets_the_wall_and_its_surface_can_be_made_anew():
     assert simulation.fields.z.min() >= 0.0
 
 
+@pytest.mark.long
 def test_a_drop_that_does_not_wet_its_wall_rebounds():
     scene = drop(weber=4.0, reynolds=300.0, contact_angle=np.radians(150.0), gravity=0.0)
     unit = np.sqrt(scene.density * scene.diameter**3 / scene.surface_tension)

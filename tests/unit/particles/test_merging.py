@@ -102,6 +102,7 @@ def test_neighbouring_drops_on_a_wall_merge():
     assert surface.volume == pytest.approx(volume, rel=0.01)
 
 
+@pytest.mark.long
 def test_threads_and_a_restart_change_no_merging(every_thread):
     results = []
     for threads in (1, every_thread):

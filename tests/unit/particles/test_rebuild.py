@@ -73,6 +73,7 @@ def test_signed_distance_of_a_net_is_that_of_the_sphere():
     assert np.abs(signed_distance(points, triangles, grid).values - exact.values).max() < 0.1 * spacing
 
 
+@pytest.mark.long
 def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     """In the overlap of two balls of one surface the nearest sheet has the wrong orientation."""
     points, triangles = extract_surface(ball(grid_around_ball((0, 0, 0), R, R / 8), (0, 0, 0), R))

@@ -145,6 +145,7 @@ def rods(monkeypatch, tmp_path):
     return attempt_rods
 
 
+@pytest.mark.long
 def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
     survived, report = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
     assert not survived
@@ -162,7 +163,7 @@ def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
         "reflowshock",
         "stress-test",
         "--family",
-        "coupling",
+        "remesh",
         "--out",
         str(tmp_path),
         "-j",
