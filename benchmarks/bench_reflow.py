@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.support import results
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, fit_derivatives
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.rest import NotAtRest
@@ -53,7 +53,7 @@ def derivative_errors(basis: str, count: int) -> dict:
     neighbours = NeighbourList(SUPPORT[basis] * spacing, 0.0)
     neighbours.update(points)
     start = perf_counter()
-    operators = derivatives(points, inner, neighbours, basis)
+    operators = fit_derivatives(points, inner, neighbours, basis)
     microseconds = 1e6 * (perf_counter() - start) / len(inner)
     x, y, z = points.T
     field = np.sin(2 * x) * np.cos(y) * np.exp(z)

@@ -63,7 +63,7 @@ def stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
     law = liquid_of(scene, scene.spacing)[0]._replace(
         tracked=0, shifting=0.0, mirror=0, viscosity=0.1 * scene.viscosity
     )
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
+    fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     for speed, share, coordinate in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
         speed[:] = share * scene.impact_speed * coordinate / (0.5 * scene.diameter)
     return Simulation(fields, points.shape[1], law, device=device)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Console
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.notebook import Metrics, ReportView, case_html, plan_html, run_html
 from reflowshock.problem import as_toml
 from reflowshock.workflow import plan
@@ -267,7 +267,7 @@ class Run:
 
 def _hint(name: str, names: Sequence[str]) -> str:
     """Return a hint with the nearest name, or an empty string without names."""
-    return f"; did you mean {nearest(name, names) or names[0]}?" if names else ""
+    return f"; did you mean {find_nearest(name, names) or names[0]}?" if names else ""
 
 
 def _is_scalar(value: object) -> bool:

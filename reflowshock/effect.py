@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, NotRequired, TypedDict, TypeVar
 
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 
 Switch = Literal["auto", "on", "off"]
 Scene = TypeVar("Scene", contravariant=True)
@@ -74,9 +74,9 @@ class Effect(ABC, Generic[Scene]):
         """Return the case with the effect toggled, or None if its cost cannot be predicted."""
         if self.toggle is None:
             return None
-        return changed(case, self.toggle.key, self.toggle.off if acts else self.toggle.on)
+        return with_value(case, self.toggle.key, self.toggle.off if acts else self.toggle.on)
 
 
-def decided(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
+def decide_all(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
     """Return the decisions on a list of effects, by name."""
     return {effect.name: effect.decide(scene) for effect in effects}

@@ -37,7 +37,7 @@ class Metrics(dict):
 
 def case_html(name: str, title: str, values: Mapping[str, Any]) -> str:
     """Return the HTML of a case: title and folded table of all parameters."""
-    return heading(name, title) + folded(f"{len(values)} parameters", table(("key", "value"), values.items()), False)
+    return heading(name, title) + fold(f"{len(values)} parameters", table(("key", "value"), values.items()), False)
 
 
 def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]], seconds: float) -> str:
@@ -53,7 +53,7 @@ def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]
     rows.append(("all", "", duration(seconds) if seconds else "", "on an otherwise idle machine"))
     acting = [(_words(name), "on" if decision["on"] else "off", decision["why"]) for name, decision in effects.items()]
     stage_table = table(("stage", "", "predicted", "why"), rows)
-    return stage_table + folded(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
+    return stage_table + fold(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
 
 
 def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> str:
@@ -86,7 +86,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{cells}</tbody></table>"
 
 
-def folded(title: str, inside: str, opened: bool = True) -> str:
+def fold(title: str, inside: str, opened: bool = True) -> str:
     """Return the HTML of a collapsible section."""
     return f"<details{' open' if opened else ''}><summary>{escape(title)}</summary>{inside}</details>"
 
@@ -96,7 +96,7 @@ def _metrics(records: Mapping[str, dict]) -> str:
     from reflowshock.workflow.report.tables import named_quantity
 
     rows = [(_words(name), named_quantity(dict(records), name)) for name in records]
-    return folded(f"{len(rows)} metrics", table(("", "value"), rows), len(rows) <= FIRST)
+    return fold(f"{len(rows)} metrics", table(("", "value"), rows), len(rows) <= FIRST)
 
 
 def _paragraph(text: str) -> str:

@@ -11,7 +11,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def changed(model: BaseModel, key: str, value: object) -> Any:
+def with_value(model: BaseModel, key: str, value: object) -> Any:
     """Return a copy of a model with another value at a dotted key, without validation."""
     name, _, rest = key.partition(".")
-    return model.model_copy(update={name: changed(getattr(model, name), rest, value) if rest else value})
+    return model.model_copy(update={name: with_value(getattr(model, name), rest, value) if rest else value})

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 
 LONGEST = 120  # maximum length of a value or key in a message
 
@@ -32,8 +32,8 @@ class Problem:
     column: int | None = None
 
     def __str__(self) -> str:
-        key = shortened(self.key)
-        location = key if self.value is None else f"{key} = {shortened(as_toml(self.value))}"
+        key = shorten(self.key)
+        location = key if self.value is None else f"{key} = {shorten(as_toml(self.value))}"
         parts = [": ".join(part for part in (location, self.message) if part)]
         if self.allowed:
             parts.append(f"allowed: {self.allowed}")
@@ -51,7 +51,7 @@ def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterat
     """Yield a problem at a dotted key if a name, e.g. of a "joint" (``what``), is not among the valid ones."""
     names = list(valid)
     if name not in names:
-        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
+        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), find_nearest(name, names))
 
 
 def as_toml(value: object) -> str:
@@ -69,7 +69,7 @@ def as_toml(value: object) -> str:
     return str(value)
 
 
-def shortened(text: str) -> str:
+def shorten(text: str) -> str:
     """Return a text cut to at most ``LONGEST`` characters."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 

@@ -11,7 +11,7 @@ from rich.console import RenderableType
 from reflowshock.effect import Effect
 from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
@@ -280,7 +280,7 @@ def kind_named_in(table: Mapping) -> Kind:
         CaseError: The file has the table of no kind, or of several.
     """
     names = [name for name in NAMES if name in table]
-    if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
+    if names == [PACKAGE.name] and not any(find_nearest(name, ("shock",)) for name in table):
         return PACKAGE
     if len(names) == 1:
         return next(kind for kind in KINDS if kind.name == names[0])
@@ -290,7 +290,7 @@ def kind_named_in(table: Mapping) -> Kind:
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
         raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
-    hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
+    hint = next((f"[{near}]" for name in table if (near := find_nearest(name, NAMES))), "")
     raise CaseError("case", [Problem("", "has no table that identifies the kind of case", None, choice, hint)])
 
 

@@ -12,8 +12,8 @@ from reflowshock.workflow.jobs.batch import Machine, failure_of, run_points, sho
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.stage_runner import execute
 from reflowshock.workflow.process.products import read_json
-from reflowshock.workflow.process.terminal import console, print_error, styled
-from reflowshock.workflow.store.folders import locked, read_mark, remove_program_files
+from reflowshock.workflow.process.terminal import console, print_error, style_text
+from reflowshock.workflow.store.folders import lock_folder, read_mark, remove_program_files
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, failed_checks, why_stale
@@ -50,7 +50,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         CaseError: The folder belongs to something else or is not writable.
         RunFolderBusy: Another process is running in the folder.
     """
-    with locked(store.folder, WHAT, point.case.case.name, force) as lock:
+    with lock_folder(store.folder, WHAT, point.case.case.name, force) as lock:
         states = examine(store, point)
         required = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
         _tell_damage(required)
@@ -76,11 +76,11 @@ def _conclude(store: Store, point: Point) -> str:
     console.print(f"report: {store.folder / 'report.html'}")
     summary = read_json(store.product(point, REPORT) / "summary.json")
     for warning in summary.get("warnings", ()):
-        console.print(styled("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
+        console.print(style_text("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
     if "verdict" not in summary:
         return ""
     design = summary["verdict"]["design"]
-    console.print(styled(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
+    console.print(style_text(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
     return design
 
 
@@ -136,7 +136,7 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
     """
     case = read_case_of_run(folder)
     store, point = Store(folder, one_run=True), Point({}, case)
-    with locked(folder, WHAT, name):
+    with lock_folder(folder, WHAT, name):
         states = examine(store, point)
         upstream = {stage_name: states[stage_name] for stage_name in point.case.pipeline.names[:-1]}
         if _tell_damage(upstream, "`reflowshock run` rebuilds it"):
@@ -205,7 +205,7 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
     if mark is None:
         console.print(f"nothing to remove: {folder} is not a run folder")
         return
-    with locked(folder, *((mark["holds"], mark["name"]) if force else (WHAT, name))):
+    with lock_folder(folder, *((mark["holds"], mark["name"]) if force else (WHAT, name))):
         store = Store(folder)
         if unused:
             products, works = remove_unused(store)

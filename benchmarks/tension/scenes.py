@@ -55,7 +55,7 @@ def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
 
 def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
     """Return particles at rest at points [m], shape (3, n), at the pressure of a sphere."""
-    return flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
+    return flow.make_fields(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
 
 
 def untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
@@ -250,7 +250,7 @@ def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: 
     corners, triangles = surface.points.copy(), surface.triangles.copy()
     surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
+    fields = flow.make_fields(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = -speed * np.sign(both[0])
     return Simulation(fields, both.shape[1], drop.law, surface)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
 from reflowshock.fem.division.choose_levels import StepLimits, least_steps
-from reflowshock.fem.division.divide import cut_nodes, grown
+from reflowshock.fem.division.divide import cut_nodes, grow_region
 from reflowshock.fem.division.division import BUFFERED, Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole, seeds_of, touching
 from reflowshock.fem.errors import CouplingError, PulseError
@@ -62,7 +62,7 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
             f" {location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
         )
     layers = rules.coupling.buffer_layers
-    close = division.macro & grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
+    close = division.macro & grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
     if close.any():
         raise CouplingError(
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"

@@ -56,7 +56,7 @@ def buffered_division(whole: Whole, survey: Survey, rules: Rules) -> Division:
     cells that touch the interface (PHYSICS 4).
     """
     cells = whole.mesh.cells
-    buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
+    buffer = grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
     return held_velocity_division(whole, survey, rules, ~rules.coarse | buffer)
 
 
@@ -158,7 +158,7 @@ def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
     return (updates + WINDOW_COST) / division.plan.window
 
 
-def grown(
+def grow_region(
     cells: NDArray[np.int32], seeds: NDArray[np.bool_], through: NDArray[np.bool_], layers: int
 ) -> NDArray[np.bool_]:
     """Return the cells of several layers around seed nodes, shape (ne,); each layer touches the previous one.

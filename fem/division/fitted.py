@@ -76,7 +76,7 @@ def fitted(mesh: MeshData, fittings: Fittings, symmetry: Sequence[str], slaves: 
     )
 
 
-def fitted_to(mesh: MeshData, chosen: NDArray[np.bool_], fittings: Fittings, yields: bool) -> FittedTable:
+def fit_to_mesh(mesh: MeshData, chosen: NDArray[np.bool_], fittings: Fittings, yields: bool) -> FittedTable:
     """Return the fittings of selected cells of a mesh, shape (ne,), such as the board; raises as ``fitted``."""
     body, number = selected_cells(mesh, chosen)
     symmetry = [axis for axis in AXES if len(body.facets_of(f"symmetry_{axis}"))]

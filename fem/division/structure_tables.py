@@ -60,7 +60,7 @@ class StructureTables(Tables):
         }
 
 
-def tied(mesh: MeshData, problem: StructureProblem) -> Whole:
+def tie_layers(mesh: MeshData, problem: StructureProblem) -> Whole:
     """Tie layers of a structure with different meshes.
 
     Raises:
@@ -110,7 +110,7 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
-    """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tied``."""
+    """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tie_layers``."""
     element = problem.structure.element
     if mesh.shape.nodes != NODES[element]:
         raise MeshError(

@@ -153,7 +153,7 @@ class ModelInput(Generic[TablesT_co]):
     cells: NDArray[np.intp]
 
 
-def joined(data: MeshData) -> Whole:
+def join_meshes(data: MeshData) -> Whole:
     """Merge the nodes of board and board patch, insert columns, and tie the joints.
 
     Raises:
@@ -167,7 +167,7 @@ def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
     """Join a mesh and split it into its models; see ``model_inputs``."""
-    return model_inputs(joined(data), division, rules)
+    return model_inputs(join_meshes(data), division, rules)
 
 
 def model_inputs(

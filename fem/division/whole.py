@@ -113,7 +113,9 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     )
 
 
-def on_springs(survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]) -> Survey:
+def add_spring_stiffness(
+    survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]
+) -> Survey:
     """Return a survey with critical steps reduced by elastic supports."""
     added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
     for name, facets in table.bedded.items() if table else ():

@@ -83,7 +83,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     )
 
 
-def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
+def single_model_steps(steps: Steps, critical: float, rules: Rules) -> Steps:
     """Return the steps of an undivided model with the same windows and its own critical step [s]."""
     smallest = damped_critical_step(critical, rules.stiffness)
     substeps = math.ceil(steps.plan.window / (rules.fraction * smallest))
@@ -116,7 +116,7 @@ def assembled_step(
     return highest.critical_step
 
 
-def agreed_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
+def find_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
     """Return the smallest of all values on all ranks, infinity if there are none; collective."""
     return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 
@@ -130,7 +130,7 @@ def critical_by_role(
     world: MPI.Comm, models: Sequence[RankElements], roles: Iterable[str] = tuple(Materials.model_fields)
 ) -> dict[str, float]:
     """Return the smallest element critical step [s] of each material role over all ranks; collective."""
-    smallest = {role: agreed_minimum(world, [model.steps[model.roles == role] for model in models]) for role in roles}
+    smallest = {role: find_minimum(world, [model.steps[model.roles == role] for model in models]) for role in roles}
     return {role: step for role, step in smallest.items() if np.isfinite(step)}
 
 
@@ -140,9 +140,9 @@ def explicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynami
     Mass scaling raises them, stiffness-proportional damping lowers them.
     """
     scaled = dynamics.numerics.mass_scaled
-    target = agreed_minimum(comm, [rank_elements.steps[~np.isin(rank_elements.roles, scaled)]])
+    target = find_minimum(comm, [rank_elements.steps[~np.isin(rank_elements.roles, scaled)]])
     factor = mass_factor(rank_elements, scaled, target)
-    critical = agreed_minimum(comm, [rank_elements.steps * np.sqrt(factor)])
+    critical = find_minimum(comm, [rank_elements.steps * np.sqrt(factor)])
     return make_steps(comm, rank_elements, factor, *explicit_plan(dynamics, critical))
 
 
@@ -176,7 +176,7 @@ def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
 
 def implicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
     """Choose the steps of the implicit solver, from the input or the shortest pulse duration [s]; collective."""
-    critical, plan = agreed_minimum(comm, [rank_elements.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
+    critical, plan = find_minimum(comm, [rank_elements.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
     return make_steps(comm, rank_elements, np.ones(len(rank_elements.steps)), plan, critical)
 
 
@@ -185,13 +185,13 @@ def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
 
     Different solvers then sample a problem at the same times, unless a run has fewer steps than samples.
     """
-    samples = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
-    stride = at_least(dynamics.duration / samples / largest / LONGEST_WINDOW)
+    samples = min(dynamics.numerics.history_samples, round_up(dynamics.duration / largest))
+    stride = round_up(dynamics.duration / samples / largest / LONGEST_WINDOW)
     windows = samples * stride
-    return WindowPlan(dynamics.duration / windows, at_least(dynamics.duration / windows / largest), windows, stride)
+    return WindowPlan(dynamics.duration / windows, round_up(dynamics.duration / windows / largest), windows, stride)
 
 
-def at_least(count: float) -> int:
+def round_up(count: float) -> int:
     """Return ``count`` rounded up to an integer of at least 1, tolerant of round-off in the ratio."""
     return max(1, math.ceil(count * (1.0 - ROUNDING)))
 

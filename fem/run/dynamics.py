@@ -122,7 +122,7 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
         agreed(comms.world, lambda: None)
 
 
-def place(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
+def place_models(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
     """Assign the divided models and their cells to ranks, and print the assignment; collective."""
     works, ranks = works_of(divided, request), request.ranks(world.size)
     return plan_ranks(world, works, ranks, request.checkpoints, divided.scheme)

@@ -63,7 +63,7 @@ def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | N
     return Treatment(request.formulation, request.kinematics, numerics.mass_scaled, mass_scaled_step or np.inf)
 
 
-def divided_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
+def divide_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
     """Divide the models on rank 0 and broadcast all data except the meshes; collective.
 
     Raises:
@@ -74,7 +74,7 @@ def divided_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_
     return divided or shared
 
 
-def distributed(
+def distribute_models(
     comms: Communicators,
     divided: DividedModels[TablesT_co],
     ranks: Mapping[Role, NDArray[np.int32]],
@@ -102,7 +102,7 @@ def distributed(
     return agreed(comms.world, lambda: {role: rank_elements_of(role) for role in meshes})
 
 
-def assembled(
+def assemble_bodies(
     comms: Communicators,
     divided: DividedModels[TablesT_co],
     rank_elements: Mapping[Role, RankElements],

@@ -88,10 +88,10 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
             if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
                 continue
             sites.append(PadSite(name, row, column, x, y, package.standoff, *_pad_sizes(package)))
-    return lifted(sites, package, warpage)
+    return lift_pads(sites, package, warpage)
 
 
-def lifted(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
+def lift_pads(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
     """Return the sites of undeformed joints with the gaps and tilts under a warpage of the package."""
     return [
         replace(

@@ -4,8 +4,8 @@ from abc import abstractmethod
 from math import sqrt
 from typing import Any, cast
 
-from reflowshock.effect import Decision, Effect, decided, decision
-from reflowshock.parameters import changed
+from reflowshock.effect import Decision, Effect, decide_all, decision
+from reflowshock.parameters import with_value
 from reflowshock.particles.flows.flow import FlowScene
 from reflowshock.particles.flows.sph_numerics import ARTIFICIAL_VISCOSITY, MethodNumerics
 
@@ -93,7 +93,7 @@ class ShearDependence(FlowEffect):
 
     def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with constant viscosity; None if the effect is off, since no rheology is specified."""
-        return changed(case, f"{case.kind}.rheology", None) if acts else None
+        return with_value(case, f"{case.kind}.rheology", None) if acts else None
 
 
 FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
@@ -121,4 +121,4 @@ def decide_flow(scene: FlowScene) -> dict[str, Decision]:
     """Decide on all effects of a flow, the common and the specific ones: name -> decision."""
     method = scene.numerics.method
     effects = [effect for effect in FLOW_EFFECTS if not effect.methods or method in effect.methods]
-    return decided(effects, scene.unit_scene) | scene.decide_own_effects()
+    return decide_all(effects, scene.unit_scene) | scene.decide_own_effects()

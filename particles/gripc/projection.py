@@ -145,7 +145,7 @@ class Velocities:
     unsmoothed: Floats
 
 
-def smooth(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
+def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
     """Return the velocities after a step, u_new = (1 - a) (u + S (V_new - V)) + a S V_new with a = 0.5 (eq 28).
 
     Args:

@@ -6,7 +6,7 @@ To add an effect, write a ``LiquidEffect`` in a file of its own and list it in `
 
 from collections.abc import Iterator, Mapping
 
-from reflowshock.effect import Decision, decided
+from reflowshock.effect import Decision, decide_all
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.effect_gravity import GravityEffect
 from reflowshock.particles.parameters.effect_inertia import InertiaEffect
@@ -37,7 +37,7 @@ AT_REST = {
 
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
     """Decide on each effect of a reflow: name -> decision with its reason."""
-    return decided(LIQUID_EFFECTS, LiquidScene(numbers, solder))
+    return decide_all(LIQUID_EFFECTS, LiquidScene(numbers, solder))
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
@@ -47,12 +47,12 @@ def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decisio
 
 def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
     """Decide on each effect of a drop: name -> decision; wall effects are off for a free drop."""
-    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
+    return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
 
 
 def decide_oscillation(solder: Solder) -> dict[str, Decision]:
     """Decide on each effect of a free oscillating drop: name -> decision."""
-    return decided(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
+    return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
 
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:

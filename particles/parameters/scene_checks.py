@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import degrees, pi, radians
 from typing import Any, Protocol
 
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, acting_weight, asymmetric_effect, decide_drop
@@ -51,7 +51,7 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
     """
     if asked != "auto":
         return solder, ""
-    ispg = changed(solder, "numerics.scheme", "ispg")
+    ispg = with_value(solder, "numerics.scheme", "ispg")
     if scene.needs_ispg:
         return ispg, "no other scheme computes it"
     feature = UNVERIFIED_FEATURES[type(scene)](scene, solder)

@@ -25,7 +25,7 @@ from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 from reflowshock.particles.surface.contact_line import ContactLine
 from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine
-from reflowshock.particles.surface.profile import width
+from reflowshock.particles.surface.profile import mean_width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
 # Contact angle of the initial cap of an impact: at 160 degrees particles slip out between surface and wall.
@@ -125,7 +125,7 @@ def _spread(drop: Drop, run: Run) -> Metrics:
     """Return the largest width of an impacting drop over its diameter, and its time."""
     if drop.speed is None:
         return {}
-    widths = [width(snapshot.points) for snapshot in run.snapshots]
+    widths = [mean_width(snapshot.points) for snapshot in run.snapshots]
     widest = int(np.argmax(widths))
     return {"spread_max": (widths[widest] / drop.diameter, ""), "time_of_spread_max": (run.snapshots[widest].time, "s")}
 

@@ -19,7 +19,7 @@ from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, st
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
-from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenated, shifted_indices
+from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenate_shapes, shifted_indices
 from reflowshock.particles.surface.profile import fit_profile
 
 WORST = ("_error", "_drift", "_scatter", "_at_rest")
@@ -138,11 +138,11 @@ def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> J
     """Combine the remaining drops in one shape, with the history of the first; ``capillary`` is mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = concatenated([body.points for body in bodies], counts)
+    points = concatenate_shapes([body.points for body in bodies], counts)
     return JointShape(
         points=points,
-        velocity=concatenated([body.velocity for body in bodies], counts),
-        pressure=concatenated([particle_pressure(drop.flow) for drop in drops], counts),
+        velocity=concatenate_shapes([body.velocity for body in bodies], counts),
+        pressure=concatenate_shapes([particle_pressure(drop.flow) for drop in drops], counts),
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=(),

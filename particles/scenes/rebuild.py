@@ -24,9 +24,9 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.metrics import Metrics, drop_errors, energy_metrics, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
-from reflowshock.particles.steps.shape import JointShape, concatenated, shifted_indices
+from reflowshock.particles.steps.shape import JointShape, concatenate_shapes, shifted_indices
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, with_lids
-from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.level_set import LevelSet, measure_depths, signed_distance, smooth_union
 from reflowshock.particles.surface.morphological_closing import smooth_slits
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
@@ -52,7 +52,7 @@ def touch(first: Body, second: Body) -> bool:
 
 def overlap(first: Body, second: Body) -> float:
     """Return the largest depth of particles of the second body inside the first [m]; negative if all are outside."""
-    return float(depths(second.points, *closed_surface(first)).max())
+    return float(measure_depths(second.points, *closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:
@@ -251,13 +251,13 @@ def split_shape(joint: JointShape, solder: Solder, drops: Sequence[FlowAndRun]) 
     """
     bodies = [flow.body for flow, _ in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = concatenated([body.points for body in bodies], counts)
+    points = concatenate_shapes([body.points for body in bodies], counts)
     metrics = {name: number for name, number in joint.metrics.items() if name in JOINT_METRICS}
     return replace(
         joint,
         points=points,
-        velocity=concatenated([body.velocity for body in bodies], counts),
-        pressure=concatenated([particle_pressure(flow) for flow, _ in drops], counts),
+        velocity=concatenate_shapes([body.velocity for body in bodies], counts),
+        pressure=concatenate_shapes([particle_pressure(flow) for flow, _ in drops], counts),
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=tuple(shifted_indices([body.cloud.rings[0] for body in bodies], counts)),

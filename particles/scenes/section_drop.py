@@ -11,7 +11,7 @@ from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.flow_setup import build_physics
 from reflowshock.particles.section.polyline import Polyline
-from reflowshock.particles.section.section import Section, block
+from reflowshock.particles.section.section import Section, fill_block
 from reflowshock.particles.section.section_step import SectionFlow, SectionStep
 from reflowshock.particles.steps.time_step import TimeStep, largest_step
 
@@ -22,7 +22,7 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
         polyline, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
     else:
         polyline, width = Polyline.meridian(), drop.edge / np.sqrt(np.pi)
-    body = Section.filled(block(polyline, width, drop.edge, drop.count), polyline)
+    body = Section.filled(fill_block(polyline, width, drop.edge, drop.count), polyline)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
     return SectionFlow(body, build_physics(solder, effects, (), in_section=True), time_step, SectionStep())

@@ -194,7 +194,7 @@ def shear_law(scene: FlowScene) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
+def law_in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
     """Return the law of the same flow in space.
 
     Args:
@@ -215,7 +215,7 @@ def wall_layers(scene: FlowScene) -> int:
     return int(np.ceil(SUPPORT * sph_numerics(scene).smoothing_length))
 
 
-def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
+def make_fields(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
     """Return the initial fields of liquid and walls at rest.
 
     Args:

@@ -21,7 +21,7 @@ from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.division.split import part_of
-from reflowshock.fem.division.tables import joined
+from reflowshock.fem.division.tables import join_meshes
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.elements.stress import von_mises
@@ -99,7 +99,7 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
     joint = how(barrel(site.gap, 0.0), site, package_of_joint, side, columns_of(site, package_of_joint, below, side))
     depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
     pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
-    return joined(append(pieces)), joint
+    return join_meshes(append(pieces)), joint
 
 
 def free_form_joint(

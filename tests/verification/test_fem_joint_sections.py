@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.division.tables import joined, model_inputs
+from reflowshock.fem.division.tables import join_meshes, model_inputs
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.loads.load import BodyAcceleration, NodalForces
@@ -45,7 +45,7 @@ def column(held: bool, copper: bool, edges: int = 3, levels=LEVELS, bulge: float
 
 def watched(mesh, solder, response=ELASTICALLY, formulation="incompatible_modes", layer=25e-6):
     """Return body, watch and critical step of a mesh on one rank."""
-    item = model_inputs(joined(mesh), "dns", layer=layer)["dns"]
+    item = model_inputs(join_meshes(mesh), "dns", layer=layer)["dns"]
     materials = Materials(solder=solder)
     rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
     body = make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), response)

@@ -12,7 +12,7 @@ from reflowshock.particles.reference.young_laplace import joint_meridian
 from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, floating_height, placed, scale_of, start
+from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, floating_height, place_joints, scale_of, start
 from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
 from tests.support.workflow_command import SMALL_CASE
@@ -34,7 +34,7 @@ def coupled(folder, structure, steps=(300.0,), *, rigid=0.0, bends=True, fail=No
     coupling = Coupling(structure, joints, drawn, scale, bends, lambda _: None, seen.append)
     coupling.run(state, [LoadStep(temperature, 0.0) for temperature in steps])
     return SimpleNamespace(
-        state=state, joints=joints, places=placed(drawn, state.state.pad_motion), seen=seen, scale=scale
+        state=state, joints=joints, places=place_joints(drawn, state.state.pad_motion), seen=seen, scale=scale
     )
 
 

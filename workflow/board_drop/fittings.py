@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.problem.attachment_checks import fitting_problems, inside
+from reflowshock.fem.problem.attachment_checks import fitting_problems, position_problems
 from reflowshock.fem.problem.fittings import BoardFittings, Neighbour, Place
 from reflowshock.fem.problem.structure import Holes, Layer, Structure
 from reflowshock.problem import Problem
@@ -95,7 +95,7 @@ def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Pro
         for x in (-0.5, 0.5):
             for y in (-0.5, 0.5):
                 corner = (item.at[0] + x * item.substrate[0], item.at[1] + y * item.substrate[1], 0.0)
-                yield from inside(f"{key}.at", corner, board)
+                yield from position_problems(f"{key}.at", corner, board)
         yield from _over_holes(f"{key}.at", item, board)
     if case.packages and case.cooled:
         message = "does not support further packages, whose residual stress is not computed"

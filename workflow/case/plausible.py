@@ -65,7 +65,7 @@ NAMED_NUMBERS = {
 }
 
 
-def implausible(case: Case) -> Iterator[Problem]:
+def find_implausible(case: Case) -> Iterator[Problem]:
     """Yield a problem for each parameter with an implausible value."""
     for key, value, field in fields.leaves(case):
         for number in _numbers(value):

@@ -8,7 +8,7 @@ scale = "full"                                   # or --set scale="quick"
 import tomllib
 from collections.abc import Iterator
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import FULL
 from reflowshock.workflow.case.names import is_name, wrong_name
@@ -61,7 +61,9 @@ def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Pr
     if isinstance(name, str) and (name == FULL or name in scales):
         return scales.get(name, {})
     names = [FULL, *scales]
-    problems.append(Problem("scale", "unknown scale", name, "one of " + ", ".join(names), nearest(str(name), names)))
+    problems.append(
+        Problem("scale", "unknown scale", name, "one of " + ", ".join(names), find_nearest(str(name), names))
+    )
     return {}
 
 

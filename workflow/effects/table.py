@@ -22,7 +22,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 
 @cache
-def measured() -> dict[str, float]:
+def read_measured_ratios() -> dict[str, float]:
     """Return measured ratios of the processor time per step with and without an effect, by effect."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
@@ -56,9 +56,9 @@ def _toggled_seconds(case: Case, name: str, seconds: Mapping[str, float], acts: 
         except CaseError:
             return None  # the case is invalid with the effect toggled
     effect = effect_of(name, reflowed="reflow" in case.pipeline.names)
-    if effect is None or effect.name not in measured() or effect.stage not in seconds:
+    if effect is None or effect.name not in read_measured_ratios() or effect.stage not in seconds:
         return None
-    ratio = measured()[effect.name]
+    ratio = read_measured_ratios()[effect.name]
     return total + seconds[effect.stage] * ((1.0 / ratio if acts else ratio) - 1.0)
 
 

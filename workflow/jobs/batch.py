@@ -103,7 +103,7 @@ def job_name(point: Point, stage: str) -> str:
     return f"{stage}-{point.digests[stage]}"
 
 
-def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
+def list_missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
     """List the missing products of points, up to one stage, without duplicates."""
     jobs: dict[str, Job] = {}
     for point in points:
@@ -151,7 +151,7 @@ def run_points(
     tried: set[str] = set()
     try:
         while True:
-            jobs = missing(store, points, until)
+            jobs = list_missing(store, points, until)
             if not jobs or any(job.name in tried for job in jobs):
                 break
             tried |= {job.name for job in jobs}

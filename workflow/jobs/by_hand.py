@@ -5,9 +5,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.batch import BATCH, Machine, missing, write_jobs
+from reflowshock.workflow.jobs.batch import BATCH, Machine, list_missing, write_jobs
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import Store
@@ -30,8 +30,8 @@ def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
     case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)
     folder = Path(config.get("out", f"runs/{case.run_name}")).resolve()
     store, point = Store(folder, one_run=True), Point({}, case)
-    _locks.enter_context(locked(folder, "run", case.case.name))
-    jobs = missing(store, [point], case.pipeline.names[-1])
+    _locks.enter_context(lock_folder(folder, "run", case.case.name))
+    jobs = list_missing(store, [point], case.pipeline.names[-1])
     discard(store.home / BATCH)
     for job in jobs:
         store.prepare_work(point, job.stage)

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import MOST_BYTES, fault_of
@@ -60,7 +60,7 @@ def read_profile(folder: Path | None) -> Profile:
     resources = _table(path, table, "default-resources")
     for key in config:
         if key not in KEYS:
-            message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), nearest(key, KEYS))
+            message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), find_nearest(key, KEYS))
             raise _wrong(path, message)
     launcher = str(config.get("launcher", "mpirun"))
     if not _is_command(launcher):

@@ -5,7 +5,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.toml_file import resolved_path
 
@@ -49,7 +49,7 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         key, path = f"{KEY}.{name}", Path(text)
         if name not in sites:
             names = list(sites)
-            hint = nearest(name, names)
+            hint = find_nearest(name, names)
             yield Problem(key, "is not a joint of the model", None, f"{names[0]} to {names[-1]}", hint)
         if path.suffix.lower() not in SUFFIXES:
             yield Problem(key, "has an unknown file format", text, ", ".join(SUFFIXES))

@@ -12,7 +12,7 @@ from reflowshock.arrays import Floats
 from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 from reflowshock.workflow.package_report.joint_records import by_shape
 from reflowshock.workflow.report.colours import colour_at, ink_on
-from reflowshock.workflow.report.scene import MOST_TRIANGLES, Field, Group, Scene, decimated
+from reflowshock.workflow.report.scene import MOST_TRIANGLES, Field, Group, Scene, decimate
 
 MICRO, MILLI = 1e-6, 1e-3
 MAPS = (
@@ -44,7 +44,7 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
         part = np.zeros(len(points), int)
         free = Group("solder", points, triangles[is_free], part, values={DEVIATION: distance[None]})
         wetted = Group("wetted discs", points, triangles[~is_free], part, "#8a949e")
-        for surface in decimated([free, wetted], MOST_TRIANGLES // len(joints)):
+        for surface in decimate([free, wetted], MOST_TRIANGLES // len(joints)):
             placed = [_at(surface, joint, joints.index(joint)) for joint in group if len(surface.faces)]
             kinds.setdefault(surface.name, []).extend(placed)
     joined = [_joined(groups) for groups in kinds.values() if groups]

@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from reflowshock.fem.output.ranking import ENDS, OUTER_FIBRE, PEEL, PLASTIC_WORK, VON_MISES, ranked, ranking_measure
+from reflowshock.fem.output.ranking import (
+    ENDS,
+    OUTER_FIBRE,
+    PEEL,
+    PLASTIC_WORK,
+    VON_MISES,
+    rank_joints,
+    ranking_measure,
+)
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
 from reflowshock.workflow.package.verdict import WORDS
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
@@ -79,7 +87,7 @@ def ranked_joints(
     shape = {joint["name"]: joint for joint in joints}
     measure = ranking_measure(history)
     rows = []
-    for column in ranked(history):
+    for column in rank_joints(history):
         name = str(history["joints"][column])
         forces = np.stack([history[f"section_{end}"][:, column] for end in ENDS])
         row = int(np.argmax(PEEL.worse(history)[:, column]))

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
+from reflowshock.workflow.case.plausible import FORCE, find_implausible, implausible_tables
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
@@ -53,7 +53,7 @@ def problems_of(case: Case, leave: Leave) -> list[Problem]:
 def _values(case: Case, leave: Leave) -> list[Problem]:
     """Return problems with the number of ranks, implausible values and tables, and unreadable files."""
     problems = [] if leave.oversubscribe else list(too_many_ranks(case))
-    problems += [] if leave.force else list(implausible(case))
+    problems += [] if leave.force else list(find_implausible(case))
     problems += unreadable_files(case)
     return problems if problems or leave.force else list(implausible_tables(case))
 

@@ -50,7 +50,7 @@ class StoppedProcesses:
         checks: dict[int, int] = {}
         tick = min(TICK, self._patience / 4)
         while not self._over.wait(tick):
-            checks = {process: checks.get(process, 0) + 1 for process in stopped(self._process)}
+            checks = {process: checks.get(process, 0) + 1 for process in find_stopped(self._process)}
             late = [process for process, count in checks.items() if count * tick > self._patience]
             if late:
                 names = " and ".join(name(process) for process in late)
@@ -60,7 +60,7 @@ class StoppedProcesses:
                         os.kill(process, signal.SIGKILL)
 
 
-def stopped(root: int) -> list[int]:
+def find_stopped(root: int) -> list[int]:
     """Return the stopped processes among a process and its descendants."""
     parents: dict[int, int] = {}
     halted = []

@@ -32,7 +32,7 @@ def visible(text: str) -> str:
     return CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
-def styled(template: str, *values: object) -> Text:
+def style_text(template: str, *values: object) -> Text:
     """Style a template with markup and insert values, which are never interpreted as markup.
 
     Args:
@@ -49,7 +49,7 @@ def styled(template: str, *values: object) -> Text:
 
 
 class Terminal(Console):
-    """Console that prints text literally: no markup, no emoji, no colours except those of ``styled``."""
+    """Console that prints text literally: no markup, no emoji, no colours except those of ``style_text``."""
 
     def __init__(self, descriptor: int = 1, **options: Any) -> None:
         """Open standard output (1) or standard error (2); files and pipes receive no control sequences."""
@@ -86,7 +86,7 @@ errors = Terminal(2)
 def print_error(text: str) -> None:
     """Print an error, its first line emphasised."""
     first, _, rest = text.partition("\n")
-    errors.print(styled("[bold red]error:[/] {}", first), soft_wrap=True)
+    errors.print(style_text("[bold red]error:[/] {}", first), soft_wrap=True)
     if rest:
         errors.print(rest, soft_wrap=True)
 
@@ -111,7 +111,7 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         continued: Names of parts that continued from checkpoints, or empty.
     """
     failed = [name for name, result in health.items() if not result["ok"]]
-    mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
+    mark = style_text("[bold red]FAILED[/]") if failed else style_text("[green]ok[/]    ")
     if failed:
         text = ", ".join(_against_limit(name, health[name]) for name in failed)
     elif health:
@@ -122,7 +122,7 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = "done"
     if continued:
         text += f"; {continued} continued from checkpoints"
-    line = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    line = style_text(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
     console.print(mark + line, soft_wrap=True)
 
 

@@ -47,7 +47,7 @@ class Series:
         """Return the record that the script reads."""
         x, y = np.asarray(self.x, dtype=float), np.asarray(self.y, dtype=float)
         if not self.labels:
-            x, y = thinned(x, y)
+            x, y = thin_samples(x, y)
         return {
             "name": self.name,
             "x": page.array(x, "f4"),
@@ -111,7 +111,7 @@ class Chart:
         }
 
 
-def thinned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thin_samples(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Reduce a line to ``MOST_POINTS`` points, the minimum and the maximum of each short interval.
 
     Args:

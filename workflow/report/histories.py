@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, ranked
+from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, rank_joints
 from reflowshock.fem.output.settled import is_settled, settling_measures
 
 Arrays = Mapping[str, NDArray]
@@ -35,7 +35,7 @@ def joint_stress(history: Arrays, joint: str, measure: Measure = VON_MISES) -> N
 def peel_peaks(history: Arrays) -> dict[str, float]:
     """Return the peak peel stress [Pa] by joint, the critical joint first."""
     peaks = PEEL.peaks(history)
-    return {str(history["joints"][column]): float(peaks[column]) for column in ranked(history)}
+    return {str(history["joints"][column]): float(peaks[column]) for column in rank_joints(history)}
 
 
 def unsettled(history: Arrays, longest: float) -> str:

@@ -116,7 +116,7 @@ class Scene:
 
     def record(self, page: "PageData") -> dict:
         """Return the record that the script reads, lengths in mm."""
-        groups = [group for group in decimated(self.groups) if len(group.points)]
+        groups = [group for group in decimate(self.groups) if len(group.points)]
         always = sum(len(group.points) for group in groups if group.only is None)
         frames = kept_frames(len(self.frames), MOST_VALUES // max(always, 1), self.start)
         return {
@@ -150,7 +150,7 @@ def boundary(cells: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.
     return faces[chosen], chosen // len(local)
 
 
-def decimated(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group]:
+def decimate(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group]:
     """Reduce groups to at most ``most`` triangles, coarsening all but small groups by the same share."""
     total = sum(group.triangles for group in groups)
     if total <= most:

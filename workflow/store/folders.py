@@ -72,7 +72,7 @@ def read_mark(folder: Path) -> dict[str, str] | None:
 
 
 @contextmanager
-def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
+def lock_folder(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
     """Create and mark a folder and hold its lock, which the system releases when this process ends.
 
     Args:

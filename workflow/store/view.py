@@ -40,7 +40,7 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     """
     folder = store.run_folder(point)
     links = _expected_links(store, point, set(stages))
-    before = listed(store, folder)
+    before = list_program_files(store, folder)
     _clear_path(folder, CASE)
     write_case(folder, point.case)
     for name, link in before.items():
@@ -53,7 +53,7 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     return restored
 
 
-def listed(store: Store, folder: Path) -> dict[str, Link]:
+def list_program_files(store: Store, folder: Path) -> dict[str, Link]:
     """Return the files of the program in a run folder, by name."""
     try:
         table = json.loads(_list(store, folder).read_text(encoding="utf-8"))
@@ -81,7 +81,7 @@ def _recognised(store: Store, folder: Path) -> dict[str, Link]:
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
     """Return the records of the products that a run folder links, by stage."""
-    sources = {name: link.source for name, link in listed(store, store.run_folder(point)).items()}
+    sources = {name: link.source for name, link in list_program_files(store, store.run_folder(point)).items()}
     source_by_stage = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
     records = {name: read_record((store.home / source).parent) for name, source in source_by_stage.items() if source}
     return {name: record for name, record in records.items() if record is not None}
@@ -96,7 +96,7 @@ def adopt(store: Store, folder: Path, made: Path) -> None:
         made: Folder that contains exactly the files to move.
     """
     files = {path.name: path for path in made.iterdir()}
-    before = listed(store, folder)
+    before = list_program_files(store, folder)
     links = {name: Link(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
     for name, link in list(before.items()):
         if name in links or link.source.startswith(NO_PRODUCT):
@@ -112,7 +112,7 @@ def altered_files(store: Store, folder: Path) -> list[str]:
     """List missing or modified files of the program in a run folder as messages."""
     return [
         f"{folder / name} {'was modified' if os.path.lexists(folder / name) else 'is missing'}"
-        for name, link in listed(store, folder).items()
+        for name, link in list_program_files(store, folder).items()
         if not _is_intact(folder, name, link)
     ]
 
@@ -120,7 +120,7 @@ def altered_files(store: Store, folder: Path) -> list[str]:
 def remove_all_links(store: Store) -> None:
     """Remove all files of the program from the folders of a store, and then empty folders."""
     for folder in _folders(store):
-        for name, link in listed(store, folder).items():
+        for name, link in list_program_files(store, folder).items():
             _remove_link(store, folder, name, link)
         if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
             (folder / CASE).unlink()
@@ -129,7 +129,9 @@ def remove_all_links(store: Store) -> None:
 
 def remove_unused(store: Store) -> tuple[int, int]:
     """Remove products that no run folder links, and interrupted work; return the number of each."""
-    linked = {Path(link.source).parts[1] for folder in _folders(store) for link in listed(store, folder).values()}
+    linked = {
+        Path(link.source).parts[1] for folder in _folders(store) for link in list_program_files(store, folder).values()
+    }
     products = [path for path in (store.home / "products").glob("*") if path.name not in linked]
     works = list((store.home / "work").glob("*"))
     for path in products + works:

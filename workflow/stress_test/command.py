@@ -9,11 +9,11 @@ from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.random_cases import read_random_file, shares
 from reflowshock.cases.hard.trial import FAMILIES
 from reflowshock.cases.hard.verdict import Verdict
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.process.terminal import console
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.stress_test.page import write_results
 from reflowshock.workflow.stress_test.sample import Sample
 from reflowshock.workflow.stress_test.session import Session
@@ -59,7 +59,7 @@ def stress_test(request: Request) -> bool:
     samples = list(_samples(request, families))
     if not fixed and not samples:
         raise CaseError("stress-test", [Problem("", "no case to run", None, "families " + ", ".join(FAMILIES))])
-    with locked(request.out, "stress test", "hard cases"):
+    with lock_folder(request.out, "stress test", "hard cases"):
         verdicts = _try_all(request, fixed, samples)
         show_table(verdicts, samples)
         write_results(request.out, verdicts, samples, request.seed)
@@ -109,6 +109,6 @@ def _samples(request: Request, families: Sequence[str]) -> Iterator[Sample]:
 def _families(names: Sequence[str]) -> list[str]:
     for family in names:
         if family not in FAMILIES:
-            choice, hint = "one of " + ", ".join(FAMILIES), nearest(family, FAMILIES)
+            choice, hint = "one of " + ", ".join(FAMILIES), find_nearest(family, FAMILIES)
             raise CaseError("stress-test", [Problem("--family", "unknown family", family, choice, hint)])
     return [family for family in FAMILIES if not names or family in names]

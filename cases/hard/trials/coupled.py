@@ -14,7 +14,7 @@ from reflowshock.fem.coupling.scheme import Scheme
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Division, Rules
-from reflowshock.fem.division.tables import ModelInput, Tables, joined, model_inputs
+from reflowshock.fem.division.tables import ModelInput, Tables, join_meshes, model_inputs
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import ENERGIES, energy_sums
@@ -44,7 +44,7 @@ def surveyed(
     coupling: Coupling = HELD,
 ) -> tuple[Whole, Survey, Rules]:
     """Return a mesh, its survey, and division rules with coarse boards."""
-    whole = joined(mesh)
+    whole = join_meshes(mesh)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
     rules = Rules(coupling, coarse, fraction, 0.0, DURATION, 1, pushed=False)
     return whole, survey(whole.mesh, materials, Treatment()), rules

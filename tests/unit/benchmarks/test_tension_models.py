@@ -93,7 +93,7 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     """Finely filled; the level lies inside the ball by a share of the square of the kernel over the radius."""
     law = start(DROP, "free-surface pressure").law
     points, volume = filled(lambda x: np.linalg.norm(x, axis=1) < 0.5, 0.5, law.spacing)
-    fields = flow.liquid_and_walls(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
+    fields = flow.make_fields(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
     fields.mass[:] = volume
     radius = np.linalg.norm(level_points(points, volume, law.spacing, half=False), axis=1)
     assert radius.max() / radius.min() < 1.01  # its stairs are a third of a spacing high

@@ -7,7 +7,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.motion_transfer import MovingBody, interpolated_velocity
+from reflowshock.particles.ispg.motion_transfer import MovingBody, interpolate_velocity
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
@@ -109,7 +109,7 @@ def test_linear_velocity_fields_are_transferred_exactly():
     flow.body.velocity = 0.7 + flow.body.points @ slope.T
     moving = MovingBody(flow.body, flow.physics, flow.solver)
     points, spacing = rebuild(flow.body).points, flow.body.cloud.spacing
-    velocity = interpolated_velocity(points, [moving.state], spacing)
+    velocity = interpolate_velocity(points, [moving.state], spacing)
     assert velocity == pytest.approx(0.7 + points @ slope.T, abs=1e-12)
 
 

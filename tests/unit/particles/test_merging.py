@@ -29,7 +29,7 @@ def two_drops(viscosity=0.5, **changes):
     drop = droplet(scene)
     points, aside = np.array(drop.fields[:3]), np.array([0.5 + 0.5 * EDGE * drop.law.spacing, 0.0, 0.0])
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
+    fields = flow.make_fields(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = 0.3 * np.sign(-both[0])
     fields.w[:] = -scene.impact_speed
     surface = drop.surface

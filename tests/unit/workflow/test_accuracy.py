@@ -11,7 +11,7 @@ from reflowshock.workflow.accuracy.command import (
     is_within_tolerance,
     measure,
     read_request,
-    unverified,
+    remark_unverified,
 )
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
@@ -215,8 +215,8 @@ def test_plan_is_corrected_by_earlier_runs_in_its_folder(tmp_path):
 
 def test_recommendation_that_was_not_run_has_a_remark(done):
     accuracy = done[0]
-    assert unverified(accuracy) == []
-    (remark,) = unverified(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
+    assert remark_unverified(accuracy) == []
+    (remark,) = remark_unverified(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
     assert "was not run (it exceeds the remaining budget)" in remark and "predicted, not measured" in remark
 
 

@@ -7,7 +7,7 @@ import pytest
 from reflowshock.workflow.process import progress_file
 from reflowshock.workflow.process.progress_file import progress_writer, read_progress, write_progress_to
 from reflowshock.workflow.process.terminal import progress_bar
-from reflowshock.workflow.store.folders import is_busy, locked
+from reflowshock.workflow.store.folders import is_busy, lock_folder
 
 
 @pytest.fixture(autouse=True)
@@ -50,6 +50,6 @@ def test_a_place_that_cannot_be_written_is_no_reason_to_end(tmp_path, monkeypatc
 def test_a_folder_is_busy_while_somebody_works_in_it(tmp_path):
     folder = tmp_path / "run"
     assert not is_busy(folder)
-    with locked(folder, "run", "mine"):
+    with lock_folder(folder, "run", "mine"):
         assert is_busy(folder)
     assert not is_busy(folder)

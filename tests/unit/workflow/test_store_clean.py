@@ -7,7 +7,7 @@ from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.process.error_exit import LOG, LOGS
 from reflowshock.workflow.run import clean
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.folders import locked, remove_program_files
+from reflowshock.workflow.store.folders import lock_folder, remove_program_files
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.store.view import remove_all_links, remove_unused
@@ -78,7 +78,7 @@ def test_a_users_logs_stay(store):
 def study(tmp_path):
     """The folder of a study of two points, with a table of its own; one of them was also repeated for its times."""
     study = Store(tmp_path / "study")
-    with locked(study.folder, "study", "pads"):
+    with lock_folder(study.folder, "study", "pads"):
         for member, points in ((study, (POINT, OTHER)), (study.repeated[0], (POINT,))):
             for point in points:
                 make(member, point, NAMES)
@@ -108,5 +108,5 @@ def test_a_users_files_in_a_study_stay(study):
 def test_a_study_stays_one_when_its_unused_products_are_removed(study):
     (study.home / "work/reflow-0").mkdir()
     clean(study.folder, "small", unused=True, force=True)
-    with locked(study.folder, "study", "pads"):
+    with lock_folder(study.folder, "study", "pads"):
         assert not any(state.stale for point in (POINT, OTHER) for state in examine(study, point).values())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reflowshock.workflow.jobs.batch import failure_message, log_of, missing, show_products
+from reflowshock.workflow.jobs.batch import failure_message, list_missing, log_of, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import MESSAGE, Store
@@ -50,12 +50,12 @@ def test_a_shared_product_is_missing_once(tmp_path):
     store = Store(tmp_path)
     settings = [{}, {"shock.peak_acceleration": "1000 G"}, {"solder.volume": "0.07 mm^3"}]
     points = read_possible_points(SMALL_CASE, settings)[0]
-    jobs = missing(store, points, "report")
+    jobs = list_missing(store, points, "report")
     count = {stage: sum(job.stage == stage for job in jobs) for stage in points[0].case.pipeline.names}
     assert count == {"geometry": 1, "reflow": 2, "surface": 2, "solder_mesh": 2, "shock": 3, "report": 3}
     make(store, points[0], ["geometry", "reflow"])
-    assert [job.stage for job in missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
-    assert missing(store, points[:1], "surface")[0].needs == ()
+    assert [job.stage for job in list_missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
+    assert list_missing(store, points[:1], "surface")[0].needs == ()
     assert not store.is_complete(points[0], "surface")
     assert store.is_complete(points[0], "reflow")
 

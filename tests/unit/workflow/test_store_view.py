@@ -9,7 +9,7 @@ import pytest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_program_files
+from reflowshock.workflow.store.folders import RunFolderBusy, lock_folder, remove_program_files
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
@@ -195,7 +195,7 @@ def test_whatever_stands_where_a_product_is_made_gives_way(store, tmp_path, plac
 def test_a_file_where_a_folder_of_the_store_belongs_gives_way(store, name):
     discard(store.folder / name)
     (store.folder / name).write_text("?")
-    with locked(store.folder, "run", "small"):
+    with lock_folder(store.folder, "run", "small"):
         for stage in NAMES:
             if not store.has(POINT, stage):
                 make(store, POINT, [stage])
@@ -241,11 +241,11 @@ def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
 
 @pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
 def test_another_case_needs_force(store, what, name):
-    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), locked(store.folder, what, name):
+    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), lock_folder(store.folder, what, name):
         pass
-    with locked(store.folder, what, name, force=True):
+    with lock_folder(store.folder, what, name, force=True):
         pass
-    with locked(store.folder, what, name):
+    with lock_folder(store.folder, what, name):
         pass
 
 
@@ -256,21 +256,21 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
     for name in names:
         (tmp_path / name).mkdir()
     for force in (False, True):
-        with pytest.raises(CaseError, match=words), locked(tmp_path, "run", "small", force):
+        with pytest.raises(CaseError, match=words), lock_folder(tmp_path, "run", "small", force):
             pass
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
 
 
 def test_no_run_folder_is_made_in_a_store(store):
     folder = store.home / "products/mine"
-    with pytest.raises(CaseError, match=r"is inside \.store"), locked(folder, "run", "small"):
+    with pytest.raises(CaseError, match=r"is inside \.store"), lock_folder(folder, "run", "small"):
         pass
     assert not folder.exists()
 
 
 def test_an_unfinished_mark_is_not_a_file_of_a_user(tmp_path):
     (tmp_path / ".reflowshock.partial").write_text("{")
-    with locked(tmp_path, "run", "small"):
+    with lock_folder(tmp_path, "run", "small"):
         pass
     assert remove_program_files(tmp_path) == []
 
@@ -290,10 +290,10 @@ def test_missing_files_of_the_run_folder_are_reported(store):
 
 
 def test_a_run_folder_has_one_user(tmp_path):
-    first, second = locked(tmp_path, "run", "a"), locked(tmp_path, "run", "a")
+    first, second = lock_folder(tmp_path, "run", "a"), lock_folder(tmp_path, "run", "a")
     with first, pytest.raises(RunFolderBusy, match="another run is active"), second:
         pass
-    with locked(tmp_path, "run", "a"):
+    with lock_folder(tmp_path, "run", "a"):
         pass
 
 
@@ -306,12 +306,12 @@ def test_a_removed_lock_does_not_lock(tmp_path, monkeypatch):
         take(descriptor, how)
 
     monkeypatch.setattr(fcntl, "flock", clean_first)
-    with pytest.raises(RunFolderBusy, match="try again"), locked(folder, "run", "a"):
+    with pytest.raises(RunFolderBusy, match="try again"), lock_folder(folder, "run", "a"):
         pass
 
 
 @pytest.mark.parametrize("make_it", [lambda path: path.touch(), lambda path: path.symlink_to(path)])
 def test_paths_that_are_not_folders_are_rejected(tmp_path, make_it):
     make_it(tmp_path / "file")
-    with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), locked(tmp_path / "file", "run", "a"):
+    with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), lock_folder(tmp_path / "file", "run", "a"):
         pass
