@@ -75,7 +75,9 @@ def write_strain_columns(strain, column, gx, gy, gz):
     Args:
         strain: Strain matrix, rows xx, yy, zz, xy, yz, xz (engineering shear), shape (6, k) [1/m].
         column: First of the columns, for the component along x.
-        gx, gy, gz: Gradient of the function, scalars [1/m].
+        gx: Derivative of the function along x, scalar [1/m].
+        gy: Derivative along y.
+        gz: Derivative along z.
     """
     strain[:, column : column + 3] = 0.0
     strain[0, column] = gx

@@ -163,7 +163,10 @@ def improve_flow(w, state, g, law, reference):
 
     Args:
         w: Workspace of ``start_flow``; x at ``FLOW`` and y at ``LOGARITHM`` are improved.
-        state, g, law, reference: As in ``start_flow``.
+        state: As in ``start_flow``.
+        g: As in ``start_flow``.
+        law: As in ``start_flow``.
+        reference: As in ``start_flow``.
 
     Returns:
         Number of elements that have not converged, as a float.
