@@ -33,8 +33,8 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
     Args:
         path: Path of the file; a missing folder is created.
         header: Plain data for JSON, one line at the start of the file that ``read_header`` returns.
-        value: Arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records (dataclasses
-            and pydantic models).
+        value: Arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records
+            (dataclasses and pydantic models).
 
     Raises:
         TypeError: A part of the value has an unsupported type; the message names it.

@@ -98,7 +98,7 @@ def from_si(value: float, unit: str, digits: int = 10) -> str:
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return the magnitude of an SI value in a unit, e.g. 0.48 for 4.8e-4 in "mm"; infinite values and nan are returned."""
+    """Return the magnitude of an SI value in a unit, e.g. 0.48 for 4.8e-4 in "mm"; inf and nan do not change."""
     if not math.isfinite(value):
         return value
     parsed, base = _with_its_base(unit)

@@ -102,8 +102,8 @@ def read_displacement(path: Path) -> Displacement:
     """Read the displacement field of the package that a reflow wrote.
 
     Args:
-        path: NPZ file, ``structure.npz`` of a reflow, with the arrays ``points`` and ``displacement``, shape (n, 3) [m],
-            and ``package``, shape (n,); see ``computed_displacement``.
+        path: NPZ file, ``structure.npz`` of a reflow, with the arrays ``points`` and ``displacement``, shape (n, 3)
+            [m], and ``package``, shape (n,); see ``computed_displacement``.
 
     Returns:
         Function of points of the package, shape (k, 3) [m], as ``computed_displacement`` returns it.
@@ -124,8 +124,8 @@ def computed_displacement(points: np.ndarray, displacement: np.ndarray, is_packa
         is_package: Whether each node belongs to the package, shape (n,).
 
     Returns:
-        Function of points at nodes of the package, shape (k, 3) [m], that returns their displacements, shape (k, 3) [m];
-        it raises DisplacementError for a point without a node.
+        Function of points at nodes of the package, shape (k, 3) [m], that returns their displacements, shape (k, 3)
+        [m]; it raises DisplacementError for a point without a node.
 
     Raises:
         NotStructuredError: The nodes of the board's top face under the package do not form a grid.

@@ -11,7 +11,7 @@ HEXAHEDRON, QUADRANGLE = 5, 3
 
 @contextmanager
 def gmsh_model(name: str) -> Iterator[None]:
-    """Open a fresh, silent Gmsh session with one empty model, for use in a ``with`` statement; Gmsh is closed at its end."""
+    """Open a fresh, silent Gmsh session with one empty model for a ``with`` statement, at whose end Gmsh is closed."""
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

@@ -76,7 +76,7 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
 
 
 def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return a lower bound of the Jacobian of each ten-node tetrahedron, relative to the straight one; <= 0 if inverted.
+    """Return a lower bound of the Jacobian of each ten-node tetrahedron, relative to the straight one.
 
     The Jacobian is a cubic polynomial and thus not below its smallest Bernstein coefficient (Johnen, Remacle &
     Geuzaine 2013).

@@ -73,7 +73,7 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
 
 
 def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """Yield the meshing attempts that suit a body of any shape: split tetrahedra of several sizes, in order of preference.
+    """Yield the meshing attempts that suit a body of any shape, best first: split tetrahedra of several sizes.
 
     Arguments as in ``attempts``.
     """

@@ -197,7 +197,8 @@ def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: f
 
     Args:
         mesh: Mesh of the joint, with the error of its volume.
-        errors: ``standoff_error``, ``contact_area_error`` and ``shape_deviation`` [m], as ``shape_errors`` returns them.
+        errors: ``standoff_error``, ``contact_area_error`` and ``shape_deviation`` [m], as ``shape_errors`` returns
+            them.
         largest_deviation: Largest allowed deviation of the shape [m].
 
     Raises:
@@ -215,8 +216,8 @@ def joint_quality(mesh: JointMesh) -> dict:
 
     Returns:
         ``volume_error``, ``section_scale`` and ``head_mismatch`` [m] (see ``JointMesh``); ``minimum_scaled_jacobian``;
-        ``smallest_length``, material role -> smallest ratio of volume and largest face of an element [m]; and all entries
-        of the record of the mesh.
+        ``smallest_length``, material role -> smallest ratio of volume and largest face of an element [m]; and all
+        entries of the record of the mesh.
     """
     lengths: dict[str, float] = {}
     for part, cells in mesh.cells.items():

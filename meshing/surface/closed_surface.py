@@ -142,7 +142,8 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
 
     Returns:
         ``volume`` [m^3], ``standoff`` [m], ``max_width`` [m], ``contact_radius_board`` and ``contact_radius_package``
-        [m], ``contact_angle_board`` and ``contact_angle_package`` [rad] (inside the solder, mean over the contact line).
+        [m], ``contact_angle_board`` and ``contact_angle_package`` [rad] (inside the solder, mean over the contact
+        line).
     """
     planes = pad_planes(surface)
     straight, top = planes.straighten(surface.points), planes.gap

@@ -67,7 +67,7 @@ ELASTIC = Materials(solder=SAC405.elastic)  # step levels of linear elements req
 
 
 def role_of_part(part: str) -> str:
-    """Return the material role of a mesh part: its name up to the first ``@`` or ``_``, e.g. "solder" for "solder@A1"."""
+    """Return the material role of a mesh part, its name up to the first ``@`` or ``_``: "solder" for "solder@A1"."""
     return part.split("@")[0].split("_")[0]
 
 
