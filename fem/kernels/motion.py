@@ -274,7 +274,8 @@ def link_velocities(rows, velocity, force, terms, link):
         rows: Nodes of the interface, shape (k,).
         velocity: Velocity half a step back, shape (n, 3) [m/s].
         force: Nodal force, shape (n, 3) [N], added to.
-        terms: dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg], infinite without a link;
+        terms: Half time step over mass, dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg],
+            infinite without a link;
             target velocity [m/s]; weight of the work of the link [s]; shape (4, k, 3).
         link: Link forces of the previous step on entry, of this step on return, shape (n, 3) [N].
 
@@ -304,7 +305,7 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
         velocity: Velocity v half a step back, shape (n, 3) [m/s].
         mobility: Inverse mass, zero where the velocity is prescribed and no drag acts, shape (n, 3) [1/kg].
         acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
-        coefficients: Coefficient c [1/s] and dt/2 [s].
+        coefficients: Damping coefficient c [1/s] and half time step dt/2 [s].
         forces: Damping (stiffness-proportional on entry, total on return) and nodal force f (without damping on entry,
             with it on return), two arrays of shape (n, 3) [N].
     """

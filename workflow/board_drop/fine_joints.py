@@ -99,7 +99,11 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield problems of unknown joints, and of more critical joints than the model has."""
+    """Yield problems of unknown joints, and of more critical joints than the model has.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     from reflowshock.meshing.board.pads import pad_table
 
     coupling, sites = case.shock.coupling, pad_table(case.package, case.board, case.warpage)

@@ -186,7 +186,11 @@ def implicit_seconds(case: "BoardDropCase") -> float | None:
 
 
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run."""
+    """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     from reflowshock.fem.division.decide import longest_window
 
     parts = two_scale_parts(case)
