@@ -36,7 +36,7 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
 
     Args:
         plan: Plan of board, package or box.
-        height: z coordinate of the surfaces [m].
+        height: Coordinate z of the surfaces [m].
         hole: Round hole in the blocks ``plan.holes``.
         recombine: Whether surfaces are meshed by quadrilaterals instead of triangles.
 

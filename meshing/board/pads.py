@@ -26,8 +26,8 @@ class PadSite:
         name: JEDEC name.
         row: Row, counted from 0.
         column: Column, counted from 0.
-        x: x coordinate of the centre of the pad on the board [m].
-        y: y coordinate of the centre of the pad on the board [m].
+        x: Coordinate x of the centre of the pad on the board [m].
+        y: Coordinate y of the centre of the pad on the board [m].
         gap: Height between the centres of both pads, copper to copper [m].
         wetted_radius_board: Radius that solder can wet on the board [m].
         wetted_radius_package: Radius that solder can wet on the package [m].

@@ -101,7 +101,7 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
     Args:
         cloud: Cloud of the computed part.
         points: Positions of its particles, shape (n, 3) [m].
-        wall: Number of the contact line.
+        wall: Index of the contact line.
 
     Returns:
         Positions along the closed line, shape (m, 3) [m], and the index of each in the ring of the cloud, shape (m,).
