@@ -20,7 +20,7 @@ ALL_WAYS = 0.7
 
 @njit(cache=True)
 def area_vector(points, i, j, k):
-    """Return the normal of a triangle with corners ``points`` (n, 3) i, j, k: (x, y, z), twice its area as length [m^2]."""
+    """Return the normal (x, y, z) of the triangle of points i, j, k of (n, 3), with twice its area as length [m^2]."""
     ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
     vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx

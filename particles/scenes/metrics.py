@@ -133,8 +133,7 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of an open joint with a drop on the board, under the names of a joint; the axial force is 0.
-    """
+    """Return the metrics of an open joint with a drop on the board, under the names of a joint; axial force 0."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     renamed = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
     return renamed | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
@@ -313,10 +312,10 @@ def particles_lost(body: Body) -> int:
 
 
 def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
-    """Return the metrics of the energy budget of all bodies: losses by cause over the initial energy, and the imbalance.
+    """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
 
-    The result is empty for schemes without a budget, that is all but ispg. It includes the sliding speed, since a body
-    may slide on smooth walls for ever.
+    Losses of all bodies are added. The result is empty for schemes without a budget, that is all but ispg. It includes
+    the sliding speed, since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]
