@@ -26,6 +26,7 @@ STEPS = 8
 
 
 def make_cube(count: int) -> LiquidFlow:
+    """Return the flow of a cube of solder with ``count`` particles per edge that wets a wall."""
     numerics = SolderNumerics(time_step_limit=100)
     solder = Solder(volume=1e-9, pad_contact_angle=np.radians(60), numerics=numerics)
     cloud = box_cloud(1e-3, count)
@@ -33,10 +34,12 @@ def make_cube(count: int) -> LiquidFlow:
 
 
 def peak_memory() -> float:
+    """Return the maximum resident size of this process so far [bytes]."""
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def measure(count: int) -> dict:
+    """Return the cost and the memory of a step of a cube with ``count`` particles per edge."""
     make_cube(7).step()
     before, flow = peak_memory(), make_cube(count)
     records = [flow.step()]

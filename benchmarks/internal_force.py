@@ -48,6 +48,7 @@ PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 def only_term(elements: Elements) -> ForceTerm:
+    """Return the single force term of a body of equal elements."""
     (term,) = force_terms(elements, [STEEL])
     return term
 
@@ -82,6 +83,7 @@ def plastic_force(elements: Elements, kinematics: Kinematics, strain: float) -> 
 
 
 def petsc_product(elements: Elements) -> Callable[[], object]:
+    """Return the product of PETSc's blocked stiffness matrix and a displacement, as a function to call."""
     count = len(elements.points)
     matrix = PETSc.Mat().createBAIJ((3 * count, 3 * count), bsize=3, comm=MPI.COMM_SELF)
     matrix.setPreallocationNNZ(27)
@@ -96,6 +98,7 @@ def petsc_product(elements: Elements) -> Callable[[], object]:
 
 
 def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
+    """Return the assembly of the internal force by DOLFINx, as a function to call."""
     space = dolfinx_api.vector_space(dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
     displacement, test = dolfinx.fem.Function(space), ufl.TestFunction(space)
     displacement.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(displacement.x.array))
@@ -118,6 +121,7 @@ def resident_bytes() -> int:
 
 
 def array_bytes(term: ForceTerm) -> int:
+    """Return the bytes of all arrays of a force term."""
     return sum(value.nbytes for name in term.__slots__ if isinstance(value := getattr(term, name), np.ndarray))
 
 

@@ -51,6 +51,8 @@ def make_motion(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
 
 
 def step_of(motion: ExplicitMotion) -> Callable[[], None]:
+    """Return a function that takes one whole step."""
+
     def work() -> None:
         motion.advance()
         motion.update_force()
@@ -59,6 +61,7 @@ def step_of(motion: ExplicitMotion) -> Callable[[], None]:
 
 
 def force_of(motion: ExplicitMotion) -> Callable[[], None]:
+    """Return a function that evaluates the internal force."""
     scratch = np.zeros_like(motion.force)
 
     def work() -> None:

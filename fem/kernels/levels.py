@@ -197,7 +197,7 @@ def take_steps(motion, forces, interface, accelerations, step):
         forces: ``PacedForces``; all of them have just acted, and act again after the last step.
         interface: ``Interface``.
         accelerations: ``(m + 1, 3)`` [m/s^2] of all masses as each step begins, and after the last.
-        step: dt [s].
+        step: Time step dt [s].
 
     Returns:
         Work of the accelerations [J]; steps taken; what ``add_forces`` returned last; at which pace that was.
@@ -335,7 +335,7 @@ def take_substep(coefficients, inverse, change, state):
     """Add the weighted force to the sum and zero it; move the free nodes, the first ones.
 
     Args:
-        coefficients: memory, rate, weight, see ``levels.chebyshev.Substeps``.
+        coefficients: Memory, rate and weight, see ``levels.chebyshev.Substeps``.
         inverse: ``(nf, 3)`` DT^2 / m [s^2/kg], zero where a component is held.
         change: ``(nf, 3)`` [m], of the displacement in the substep before, then in this one.
         state: See above.

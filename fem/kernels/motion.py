@@ -16,7 +16,7 @@ def advance(state, mobility, acceleration, step):
         state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
         mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed.
         acceleration: ``(3,)`` [m/s^2], of the body force.
-        step: dt [s].
+        step: Time step dt [s].
     """
     kicks = np.zeros((3, 3))
     for c in range(3):
@@ -87,7 +87,7 @@ def work_of_changes(nodes, changes, accelerations, step):
         nodes: Masses ``(n,)`` [kg] that count, velocities ``(n, 3)`` [m/s] at the end, mobility ``(n, 3)``.
         changes: ``(k, 3)`` [m/s^2] mean of this part in each step.
         accelerations: ``(k, 3)`` [m/s^2] of the whole as each step begins.
-        step: dt [s].
+        step: Time step dt [s].
     """
     if not np.any(changes):
         return 0.0
@@ -227,7 +227,8 @@ def link_velocities(rows, velocity, force, terms, link):
         rows: Nodes of the interface, shape (k,).
         velocity: Velocity half a step back, shape (n, 3) [m/s].
         force: Nodal force, shape (n, 3) [N], added to.
-        terms: dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg], infinite without a link;
+        terms: Half time step over mass, dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg],
+            infinite without a link;
             target velocity [m/s]; weight of the work of the link [s]; shape (4, k, 3).
         link: Link forces of the previous step on entry, of this step on return, shape (n, 3) [N].
 
@@ -257,7 +258,7 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
         velocity: ``(n, 3)`` [m/s], v half a step back.
         mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed, without drag.
         acceleration: ``(3,)`` [m/s^2], g of the body force.
-        coefficients: c [1/s] and dt/2 [s].
+        coefficients: Damping coefficient c [1/s] and half time step dt/2 [s].
         forces: ``(n, 3)`` [N] twice: damping, on entry by the stiffness alone, and f without damping.
     """
     own, total = forces[0].reshape(-1), forces[1].reshape(-1)

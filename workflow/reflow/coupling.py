@@ -55,7 +55,7 @@ class Scale:
     """Scales of the residuals: the pull of surface tension.
 
     Attributes:
-        pull: pi a gamma, times the pad's radius a for moments, shape (joints, 2, 6) [N, N m].
+        pull: Capillary pull pi a gamma, times the pad's radius a for moments, shape (joints, 2, 6) [N, N m].
         rigid: Pull of all joints along each rigid motion, shape (k,) [N, N m].
         tolerance: Tolerance of both residuals.
     """
