@@ -19,7 +19,11 @@ def shock_effects(case: BoardDropCase) -> dict[str, Decision]:
 
 
 def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
-    """Decide on coarse and identical joints, the effects that add joint meshes."""
+    """Decide on coarse and identical joints, the effects that add joint meshes.
+
+    Returns:
+        Name of an effect -> its decision (``on``, ``why``).
+    """
     return decide_all(OF_JOINTS, DropScene(case))
 
 

@@ -166,6 +166,7 @@ def seconds_outside_windows(case: "BoardDropCase", parts: Parts, share: float = 
     """Predict the wall time of start, set-up and output of a run [s], all that is not spent in time steps.
 
     Args:
+        case: Case of a board drop.
         parts: Forecast of each part of the mesh by name.
         share: Share of all output samples that the run writes, 0 to 1.
     """

@@ -21,6 +21,8 @@ def thermal_effects(case: "PackageCase", thermal: Thermal, temperatures: Sequenc
     """Decide which effects act between solder and structure, at temperatures [K] with liquid solder.
 
     Args:
+        case: Case of a package.
+        thermal: Temperatures of the case.
         temperatures: Temperatures of the load steps with liquid solder [K].
 
     Returns:

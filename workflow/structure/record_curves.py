@@ -19,6 +19,7 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
     """Return one chart for each watch point: its filtered acceleration relative to space, and its records.
 
     Args:
+        case: Case with watch points, loads and records.
         histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         styles: Solver -> attributes of its line: name, colour, line style.
     """
