@@ -32,8 +32,9 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
 
     Args:
         path: Path of the file; a missing folder is created.
-        header: Header that ``read_header`` returns.
-        value: Arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records.
+        header: Plain data for JSON, one line at the start of the file that ``read_header`` returns.
+        value: Arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records
+            (dataclasses and pydantic models).
 
     Raises:
         TypeError: A part of the value has an unsupported type; the message names it.
@@ -99,7 +100,12 @@ def _checked(path: Path) -> memoryview:
 
 
 def write_atomically(path: Path, *content: bytes | memoryview) -> None:
-    """Replace a file atomically: after a kill, either the old or the new file exists."""
+    """Replace a file atomically: after a kill, either the old or the new file exists.
+
+    Args:
+        path: Path of the file; a missing folder is created.
+        content: Parts of the contents, written one after the other.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     with partial.open("wb") as file:
@@ -115,12 +121,16 @@ def write_atomically(path: Path, *content: bytes | memoryview) -> None:
 
 
 def columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
-    """Return rows with equal keys as one array per key, which is written faster."""
+    """Return rows with equal keys as a table: key -> values of all rows, shape (k, ...), which is written faster.
+
+    Args:
+        rows: Rows, each key -> number, text or array of equal shape; the table of no rows is empty.
+    """
     return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
 
 
 def rows(table: Mapping[str, NDArray]) -> list[dict[str, Any]]:
-    """Return the rows of a table made by ``columns``."""
+    """Return the rows of a table made by ``columns``, each key -> plain value; arrays stay arrays."""
     parts = [column.tolist() if column.ndim == 1 else list(column) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*parts, strict=True)]
 

@@ -21,7 +21,16 @@ class Decision(TypedDict):
 
 
 def decision(on: bool, why: str, influence: float | None = None) -> Decision:
-    """Return a decision as a plain dictionary for plans and results."""
+    """Return a decision as a plain dictionary for plans and results.
+
+    Args:
+        on: Whether the effect acts.
+        why: Reason in words.
+        influence: Expected relative change of the result by the effect; None, if it is not predicted, omits the key.
+
+    Returns:
+        Dictionary with the keys ``on``, ``why`` and, if predicted, ``influence``.
+    """
     result: Decision = {"on": bool(on), "why": why}
     if influence is not None:
         result["influence"] = float(influence)
@@ -78,5 +87,13 @@ class Effect(ABC, Generic[Scene]):
 
 
 def decide_all(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
-    """Return the decisions on a list of effects, by name."""
+    """Return the decision on each effect in a scene.
+
+    Args:
+        effects: Effects to decide on.
+        scene: Parameters that the ``decide`` of these effects takes.
+
+    Returns:
+        Effect name -> decision (state, reason and expected influence), in the given order.
+    """
     return {effect.name: effect.decide(scene) for effect in effects}

@@ -94,7 +94,10 @@ def _insert_locator(caching: ModuleType) -> None:
 
 
 def source_cache(folder: Path) -> Path:
-    """Return the subfolder of a kernel cache for the present sources and version of Numba."""
+    """Return the subfolder of a kernel cache for the present sources and version of Numba; the folder is not created.
+
+    Versions of Numba without locators that can be replaced use ``folder`` itself.
+    """
     version = _compiler()
     return folder / f"numba-{version}" / digest() if _has_locator_classes(version) else folder
 
@@ -123,7 +126,7 @@ def _is_ready(folder: str) -> bool:
 
 
 def ensure_writable(folder: Path) -> bool:
-    """Create a folder if necessary and return whether files can be written in it."""
+    """Create a folder if necessary and return whether files can be written in it; errors give False."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

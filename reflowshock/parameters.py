@@ -12,6 +12,12 @@ class Parameters(BaseModel):
 
 
 def with_value(model: BaseModel, key: str, value: object) -> Any:
-    """Return a copy of a model with another value at a dotted key, without validation."""
+    """Return a copy of a model with another value at a dotted key, without validation.
+
+    Args:
+        model: Parameters; not changed.
+        key: Dotted names of attributes, e.g. "solder.numerics.spacing".
+        value: New value, in SI units.
+    """
     name, _, rest = key.partition(".")
     return model.model_copy(update={name: with_value(getattr(model, name), rest, value) if rest else value})

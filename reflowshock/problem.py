@@ -48,7 +48,14 @@ class Problem:
 
 
 def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterator[Problem]:
-    """Yield a problem at a dotted key if a name, e.g. of a "joint" (``what``), is not among the valid ones."""
+    """Yield a problem with the nearest valid name as hint if a name is unknown; yield nothing otherwise.
+
+    Args:
+        key: Dotted key of the problem.
+        name: Name to check.
+        valid: Valid names.
+        what: Kind of the name for the message, e.g. "joint".
+    """
     names = list(valid)
     if name not in names:
         yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), find_nearest(name, names))

@@ -151,7 +151,11 @@ def choose_pins(
 
 
 def rigid_motions(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return translations along and rotations about x, y, z, shape (n, 3, 6); lengths in units of the body's size."""
+    """Return translations along and rotations about x, y, z, shape (n, 3, 6), with lengths in units of the body's size.
+
+    Args:
+        points: Nodes, shape (n, 3) [m].
+    """
     scaled = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
     motions = np.zeros((len(points), 3, 6))
     for axis in range(3):

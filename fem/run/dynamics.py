@@ -176,7 +176,7 @@ def _make_outputs(comms: Communicators, problem: DynamicProblem, models: Models,
 
 
 def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps: Steps) -> History:
-    """Return an empty history with the watch points of this rank."""
+    """Return an empty history with the watch points of this rank and the limit of the energy balance."""
     limit, trivial = problem.request.numerics.energy_balance_limit, problem.trivial_energy(steps)
     balance = EnergyBalance(limit, trivial, steps.plan.step, steps.smallest)
     watches = {role: problem.watch(model) for role, model in models.items()}

@@ -26,7 +26,12 @@ from reflowshock.fem.statics.initial_state import InitialState
 
 @dataclass(frozen=True, slots=True)
 class Model(Generic[TablesT_co]):
-    """Tables and body of one model on one rank."""
+    """One model on one rank.
+
+    Attributes:
+        tables: Supports, interfaces and watch points of the whole model.
+        body: Nodes, elements and masses of this rank.
+    """
 
     tables: TablesT_co
     body: Body
@@ -108,7 +113,17 @@ def assemble_bodies(
     rank_elements: Mapping[Role, RankElements],
     kinematics: Kinematics,
 ) -> dict[Role, Body]:
-    """Assemble the bodies of this rank's models with their time steps; collective."""
+    """Assemble the bodies of this rank's models with their time steps and initial stress; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        divided: Models before distribution.
+        rank_elements: Elements of this rank by model.
+        kinematics: Kinematics of the elements.
+
+    Returns:
+        Bodies by model.
+    """
     bodies = {}
     for role, elements in rank_elements.items():
         factor = divided.mass_factors[role][elements.local.cell_numbers]

@@ -130,7 +130,7 @@ def _find_package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
 
 
 def _find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
-    """Return one node at the lower end of each mounting hole, the nearest to the centre of the board."""
+    """Return one node at the lower end of each mounting hole, the nearest to the centre of the board, shape (k,)."""
     nodes = mesh.facet_nodes("mounting_holes")
     if not len(nodes):
         return nodes.astype(np.intp)
@@ -142,7 +142,7 @@ def _find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
 
 
 def find_die_corners(mesh: MeshData) -> NDArray[np.intp]:
-    """Return the nodes at the upper die corners that no symmetry plane removes, one in a quarter model.
+    """Return the nodes at the upper die corners that no symmetry plane removes, shape (k,); one in a quarter model.
 
     Raises:
         MeshError: The mesh has no die.

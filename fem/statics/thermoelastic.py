@@ -67,12 +67,12 @@ class RigidSpace:
         return np.asarray(self.comm.allreduce(np.einsum("kni,ni->k", self.fields[:, owned], force[owned])))
 
     def balance(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return nodal forces plus the inertia forces that balance them."""
+        """Return nodal forces plus the inertia forces that balance them, shape (n, 3) [N]; collective."""
         acceleration = np.tensordot(self.inverse @ self.work(force), self.fields, 1)
         return force - self.mass[:, None] * acceleration
 
     def still(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a displacement without its rigid-body part."""
+        """Return a displacement without its rigid-body part, shape (n, 3) [m]; collective."""
         momentum = self.work(self.mass[:, None] * displacement)
         return displacement - np.tensordot(self.inverse @ momentum, self.fields, 1)
 

@@ -57,7 +57,10 @@ def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 def boundary_quads(cells: np.ndarray) -> np.ndarray:
-    """Return the faces that belong to one cell only, counter-clockwise seen from outside, shape (f, 4)."""
+    """Return the faces that belong to one cell only, of hexahedra (c, 8), shape (f, 4).
+
+    Nodes run counter-clockwise seen from outside.
+    """
     faces = cells[:, FACES].reshape(-1, 4)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]

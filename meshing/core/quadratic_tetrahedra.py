@@ -58,11 +58,15 @@ def quadratic_tetrahedra(
 
 
 def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[str, float]:
-    """Return the number of tetrahedra, their smallest scaled Jacobian and the relative error of their volume.
+    """Return measures of the quality of tetrahedra.
 
     Args:
         tetrahedra: Ten-node tetrahedra; the scaled Jacobian refers to straight edges.
         volume: Exact volume [m^3].
+
+    Returns:
+        ``count``, ``minimum_scaled_jacobian`` (0.707 for a regular tetrahedron), and ``volume_error``, the magnitude of
+        the relative error of the volume.
     """
     return {
         "count": len(tetrahedra.cells),
@@ -72,10 +76,17 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
 
 
 def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return a lower bound of the Jacobian of ten-node tetrahedra (c, 10), relative to the straight ones, shape (c,).
+    """Return a lower bound of the Jacobian of each ten-node tetrahedron, relative to the straight one.
 
     The Jacobian is a cubic polynomial and thus not below its smallest Bernstein coefficient (Johnen, Remacle &
     Geuzaine 2013).
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the tetrahedra, shape (c, 10).
+
+    Returns:
+        Lower bounds, shape (c,); 1 for straight edges with midside nodes in the middle.
     """
     corners = points[cells]
     straight = np.linalg.det(corners[:, 1:4] - corners[:, :1])
@@ -86,7 +97,12 @@ def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
-    """Return the exact volume of ten-node tetrahedra (c, 10) [m^3]."""
+    """Return the exact total volume of ten-node tetrahedra [m^3].
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Four vertices and six midside nodes of each tetrahedron, shape (c, 10).
+    """
     total = 0.0
     corners = points[cells]
     for station, weight in zip(STATIONS, WEIGHTS, strict=True):
@@ -106,7 +122,13 @@ def corner_quality(points: np.ndarray, tetrahedra: np.ndarray) -> float:
 
 
 def write_tetrahedra(path: Path, name: str, tetrahedra: QuadraticTetrahedra) -> None:
-    """Write tetrahedra as MSH 4.1 in metres: the volume ``solder@name`` and its facet sets."""
+    """Write tetrahedra as MSH 4.1 in metres.
+
+    Args:
+        path: The ``.msh`` file to write.
+        name: Name of the joint; the volume is called ``solder@name``.
+        tetrahedra: Ten-node tetrahedra with their facet sets, which are written, too.
+    """
     with gmsh_model("free form"):
         first = 1
         groups = [(3, KIND, f"solder@{name}", tetrahedra.cells)]

@@ -73,12 +73,31 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
 
 
 def file_volume(path: Path, unit: Unit) -> float:
-    """Return the volume [m^3] that the surface in a file encloses, before its heights are stretched."""
+    """Return the volume [m^3] that the surface in a file encloses, before its heights are stretched.
+
+    Args:
+        path: STL, PLY or VTU file of triangles.
+        unit: Unit of the coordinates in the file.
+
+    Raises:
+        SurfaceError: The file is damaged, or its triangles do not enclose a body.
+    """
     return volume_of(*closed_triangles(path, unit))
 
 
 def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
-    """Read and check vertices (n, 3) [m] and triangles (t, 3) of a file; errors as in ``load_surface``."""
+    """Read and check the surface in a file.
+
+    Args:
+        path: STL, PLY or VTU file of triangles.
+        unit: Unit of the coordinates in the file.
+
+    Returns:
+        Vertices, shape (n, 3) [m], and triangles, shape (t, 3).
+
+    Raises:
+        SurfaceError: The file is damaged, or its triangles do not enclose a body.
+    """
     if path.suffix.lower() not in SUFFIXES:
         raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
     try:
@@ -193,7 +212,7 @@ def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> C
 
 
 def site_slope(site: PadSite) -> np.ndarray:
-    """Return the slopes along x and y of a plane rotated by the tilt of a site, shape (2,)."""
+    """Return the slopes dz/dx and dz/dy of the package's pad at a site, shape (2,), from its tilt."""
     turn_x, turn_y = site.tilt
     angle = float(np.hypot(turn_x, turn_y))
     steep = np.tan(angle) / angle if angle else 1.0

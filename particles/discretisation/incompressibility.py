@@ -30,10 +30,10 @@ class SaddlePoint:
     """Saddle-point problem without fixed degrees of freedom.
 
     Attributes:
-        operator: A, shape (d, d) [kg/s].
-        constraint: C, shape (m, d) [m^2].
-        load: f, shape (d,) [N].
-        rate: g, shape (m,) [m^3/s].
+        operator: Matrix A, shape (d, d) [kg/s].
+        constraint: Volume gradients C, shape (m, d) [m^2].
+        load: Load f, shape (d,) [N].
+        rate: Required rates of volume g, shape (m,) [m^3/s].
         stabilisation: S, symmetric positive semidefinite, shape (m, m) [m^3/(Pa s)]; None if C needs none.
         guess: Initial guess of the pressure, shape (m,) [Pa]; None for zero.
     """
@@ -178,7 +178,7 @@ def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, scale
         solution: Its approximate solution.
         reason: Convergence reason of PETSc, positive if it converged.
         scale: Norm of the rates of volume that the pressure had to supply [m^3/s].
-        leak: S p, shape (m,) [m^3/s].
+        leak: Stabilisation term S p, shape (m,) [m^3/s].
 
     Raises:
         SolveFailed: A relative residual exceeds the limit.

@@ -163,12 +163,12 @@ def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[F
     The preconditioner is algebraic multigrid, or an LU factorisation for the linear basis.
 
     Args:
-        matrix: A, shape (d, d).
-        right: b, shape (d,).
+        matrix: Matrix A, shape (d, d).
+        right: Right-hand side b, shape (d,).
         basis: Basis of the operators in A, "linear" or "quadratic".
 
     Returns:
-        x, shape (d,), and the number of iterations.
+        Solution x, shape (d,), and the number of iterations.
 
     Raises:
         SolveFailed: The true residual of the scaled system exceeds the limit.

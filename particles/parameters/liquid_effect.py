@@ -19,10 +19,10 @@ class Numbers:
     """Dimensionless numbers and times of a joint or drop.
 
     Attributes:
-        bond: rho g L H / gamma, weight over surface tension.
-        ohnesorge: mu / sqrt(rho gamma L).
-        capillary_time: sqrt(rho L^3 / gamma) [s].
-        viscous_time: rho L^2 / (5 mu) [s], in which the slowest oscillation decays (Lamb 1932, mode 2).
+        bond: Bond number rho g L H / gamma, weight over surface tension.
+        ohnesorge: Ohnesorge number mu / sqrt(rho gamma L).
+        capillary_time: Capillary time sqrt(rho L^3 / gamma) [s].
+        viscous_time: Viscous time rho L^2 / (5 mu) [s], in which the slowest oscillation decays (Lamb 1932, mode 2).
     """
 
     bond: float

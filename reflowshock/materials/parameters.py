@@ -62,7 +62,11 @@ class EngineeringConstants(NamedTuple):
 
 
 def inadmissible(allowed: str) -> PydanticCustomError:
-    """Return the error of an elastic constant for which the strain energy is not positive."""
+    """Return a validation error of an elastic constant for which the strain energy is not positive.
+
+    Args:
+        allowed: Allowed range of the constant in words, for the message.
+    """
     message = "contradicts the values above it: the strain energy would not be positive"
     return PydanticCustomError("inadmissible", message, {"allowed": allowed})
 

@@ -36,12 +36,12 @@ def plastic_constants(material: Material) -> NDArray[np.float64]:
 
 
 def yield_stress(plastic_strain, rate, constants):
-    """Return the yield stress [Pa] of Johnson and Cook.
+    """Return the yield stress [Pa] of Johnson and Cook at a point; a compiled function of scalars.
 
     Args:
-        plastic_strain: Equivalent plastic strain.
-        rate: Rate of the equivalent plastic strain [1/s].
-        constants: Array of ``plastic_constants``.
+        plastic_strain: Equivalent plastic strain, a scalar.
+        rate: Rate of the equivalent plastic strain, a scalar [1/s].
+        constants: Array of ``plastic_constants``, shape (6,).
     """
     factor = 1.0
     if constants[4] > 0.0 and rate > constants[5]:
@@ -101,7 +101,10 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
 
 
 def small_power(growth, exponent):
-    """Return (1 + growth)^exponent for growth below ``SMALL_GROWTH``: five terms of the series, exact to 1e-13."""
+    """Return (1 + growth)^exponent for a scalar growth below ``SMALL_GROWTH``.
+
+    Five terms of the series are exact to 1e-13.
+    """
     n, e = exponent, growth
     higher = 1.0 + e * (n - 2.0) * THIRD * (1.0 + 0.25 * e * (n - 3.0) * (1.0 + 0.2 * e * (n - 4.0)))
     return 1.0 + e * n * (1.0 + 0.5 * e * (n - 1.0) * higher)

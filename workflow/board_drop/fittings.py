@@ -48,7 +48,7 @@ class DrawnBoard(Structure):
 
 
 def drawn_board(case: "BoardDropCase") -> DrawnBoard:
-    """Return the board of a case for geometric checks; its elements and material are arbitrary."""
+    """Return the mesh geometry of a case's board for geometric checks; its elements and material are placeholders."""
     board, holes = case.board, case.board.holes
     return DrawnBoard(
         centre=board.centre,
@@ -62,7 +62,11 @@ def drawn_board(case: "BoardDropCase") -> DrawnBoard:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield problems of fittings off the board, and of supports that contradict the shock."""
+    """Yield problems of fittings off the board, and of supports that contradict the shock.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     board = drawn_board(case)
     yield from fitting_problems(case, board)
     yield from neighbour_problems(case, board)
@@ -79,7 +83,11 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Problem]:
-    """Yield problems of further packages: off the board, over a hole or over another package."""
+    """Yield problems of further packages: off the board, over a hole or over another package.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     package = case.package.substrate
     footprints = {"package": ((0.0, 0.0), (package.length, package.width))}
     for name, item in case.packages.items():
@@ -138,5 +146,5 @@ def in_mm(length: float) -> str:
 
 
 def fem_input(case: "BoardDropCase") -> dict:
-    """Return the fittings of a case in the input format of the package ``fem``."""
+    """Return the fittings of a case, such as masses, supports and gauges, as JSON data for the package ``fem``."""
     return case.model_dump(mode="json", include=set(BoardFittings.model_fields))

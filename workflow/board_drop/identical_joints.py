@@ -20,7 +20,7 @@ PREFIX = "identical_"  # begins the names of meshes and metrics of identical joi
 
 
 def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
-    """Return the truncated sphere of the solder's volume between the wetted discs of the pads."""
+    """Return the truncated sphere of the solder's volume between the wetted discs of the pads, equal for all joints."""
     from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
     board, package = case.package.board_pad, case.package.package_pad
@@ -48,7 +48,11 @@ class IdenticalJoints(Effect["DropScene"]):
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield the problem of identical joints that would touch each other."""
+    """Yield the problem of identical joints that would touch each other.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     package = case.package
     if not case.shock.identical_joints or package.rows * package.columns == 1:
         return
@@ -64,6 +68,9 @@ def shape_effect(real: float, identical: float) -> float | None:
     Args:
         real: Peak stress with real joints [Pa].
         identical: Peak stress with identical joints [Pa]; without a positive one the result is None.
+
+    Returns:
+        ``real / identical - 1``, or None.
     """
     return real / identical - 1.0 if identical > 0.0 else None
 
@@ -76,6 +83,9 @@ def with_comparison(findings: Findings, run: "Run[BoardDropCase]", folder: Path,
         run: Case, and run folder with the pad table after solidification.
         folder: Folder of the shock, with a folder for the mode and a folder ``identical``.
         mode: Mode of the run with real joints, the name of its folder.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     from reflowshock.meshing.board.pads import read_pads
 

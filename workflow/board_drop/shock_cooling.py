@@ -26,7 +26,11 @@ FIRST = {"residual_two_scale": 0, "residual": 1}  # order of the folders of cool
 
 
 def problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Yield problems of settings of the shock that exclude residual stress."""
+    """Yield problems of settings of the shock that exclude residual stress.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     if case.cooled and case.shock.numerics.kinematics == "corotational":
         message = "cannot be combined with thermal.effects.residual_stress = on, whose stress depends on the path"
         yield Problem("shock.numerics.kinematics", message, "corotational", "finite, auto")
@@ -40,9 +44,12 @@ def with_initial_stress(run: Run[BoardDropCase], folder: Path, request: dict, pr
 
     Args:
         run: Case and cores; without residual stress the request is returned as it is.
-        folder: Folder of the shock.
+        folder: Folder of the shock, in which the cooling is computed in a subfolder.
         request: Input of the package ``fem`` for the mode.
         prefix: Prefix of the mesh names of the mode; empty for real joints.
+
+    Returns:
+        Copy of the request that names the file of the initial stress, or the request itself without residual stress.
 
     Raises:
         LaunchError: The run failed; the message contains its last lines.
@@ -58,7 +65,12 @@ def with_initial_stress(run: Run[BoardDropCase], folder: Path, request: dict, pr
 
 
 def cooling_name(request: dict, prefix: str) -> str:
-    """Return the name of the folder with the cooling of a mode; modes with all joints fine share one."""
+    """Return the name of the folder with the cooling of a mode; modes with all joints fine share one.
+
+    Args:
+        request: Input of the package ``fem`` for the mode; ``mode`` and ``shock.coupling.fine_joints`` are read.
+        prefix: Prefix of the mesh names of the mode; empty for real joints.
+    """
     return f"{prefix}residual" + ("" if request["shock"]["coupling"]["fine_joints"] == "all" else f"_{request['mode']}")
 
 
@@ -94,6 +106,9 @@ def with_cooling(findings: Findings, case: BoardDropCase, folder: Path) -> Findi
         findings: Metrics, health checks and effects of the shock.
         case: Case of a board drop.
         folder: Folder of the shock; without coolings in it only the effect is added.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     paths = sorted(folder.glob(f"*residual*/{RESULT}"), key=lambda path: FIRST.get(path.parent.name, len(FIRST)))
     metrics, health = dict(findings.metrics), dict(findings.health)
@@ -105,7 +120,7 @@ def with_cooling(findings: Findings, case: BoardDropCase, folder: Path) -> Findi
 
 
 def effect(case: BoardDropCase) -> dict:
-    """Return the decision on residual stress by the name of the effect; empty for a case without ``[thermal]``."""
+    """Return the decision on residual stress (``on``, ``why``) by effect name; empty without ``[thermal]``."""
     thermal = case.thermal
     if thermal is None:
         return {}

@@ -13,6 +13,9 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
 
     Args:
         tables: File, quantity and column title (None for single columns), by key.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import read_pulse

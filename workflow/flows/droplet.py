@@ -55,7 +55,11 @@ class DropletCase(FlowCase):
 
 
 def droplet_problems(case: DropletCase) -> list[Problem]:
-    """Find values that are given twice or have no meaning, a speed of sound too low, and particles too large."""
+    """Find values that are given twice or have no meaning, a speed of sound too low, and particles too large.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     drop = case.droplet
     problems = _number_problems(drop) + particle_problems("droplet", drop)
     problems += rheology_problems("droplet", drop) + _hysteresis_problems(drop)
@@ -106,6 +110,9 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
     Args:
         kind: Table of the scene in the case file.
         drop: Parameters of one drop.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
     problems, numerics = [], drop.numerics
     if numerics.spacing is not None and numerics.particles_per_diameter is not None:

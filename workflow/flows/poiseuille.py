@@ -31,7 +31,11 @@ class PoiseuilleCase(FlowCase):
 
 
 def channel_problems(case: PoiseuilleCase) -> list[Problem]:
-    """Find a viscosity law with foreign keys, a Reynolds number that is too large, and missing viscosity."""
+    """Find a viscosity law with foreign keys, a Reynolds number that is too large, and missing viscosity.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     return rheology_problems(case.kind, case.scene) + viscosity_problems(case.kind, case.scene)
 
 

@@ -17,6 +17,9 @@ def rheology_problems(kind: str, scene: FlowScene) -> list[Problem]:
     Args:
         kind: Table of the scene in the case file.
         scene: Parameters of the flow.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
     if not computes(scene):
         flows = ", ".join(name for name, solvers in SOLVERS.items() if type(scene).__name__ in solvers)
@@ -43,6 +46,9 @@ def viscosity_problems(kind: str, scene: FlowScene) -> list[Problem]:
     Args:
         kind: Table of the scene in the case file.
         scene: Parameters of the flow.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
     problems = []
     if scene.reynolds_number > LARGEST_REYNOLDS:

@@ -29,7 +29,11 @@ class TaylorGreenCase(FlowCase):
 
 
 def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
-    """Find a viscosity that is not constant, a Reynolds number that is too large, and missing viscosity."""
+    """Find a viscosity that is not constant, a Reynolds number that is too large, and missing viscosity.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     scene = case.taylor_green
     problems = rheology_problems(case.kind, scene)
     if scene.rheology is not None:

@@ -38,6 +38,9 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         package: Package with the names of existing files.
         pads: Pad table as drawn.
         heated: Whether pads move before solidification, so that only the reflow knows the height of a joint.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     if not package.surfaces:
         return

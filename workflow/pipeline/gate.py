@@ -40,7 +40,11 @@ class Leave:
 
 
 def problems_of(case: Case, leave: Leave) -> list[Problem]:
-    """Return the problems of a case whose individual values are valid; the cheapest checks run first."""
+    """Return the problems of a case whose individual values are valid; the cheapest checks run first.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     with np.errstate(all="ignore"):
         try:
             return _values(case, leave) or kind_of(case).problems(case) or list(too_large(case, leave))
@@ -59,7 +63,11 @@ def _values(case: Case, leave: Leave) -> list[Problem]:
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each input file that is missing, unreadable or too large."""
+    """Yield a problem for each input file that is missing, unreadable or too large.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, path in case.files.items():
         fault = fault_of(path, LARGEST_FILE)
         if fault:
@@ -67,7 +75,11 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each key that requests more MPI ranks than this machine has cores."""
+    """Yield a problem for each key that requests more MPI ranks than this machine has cores.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
@@ -76,7 +88,11 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
-    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed)."""
+    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed).
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     needed, leave = needed_memory(case), leave or Leave()
     if leave.force:
         return

@@ -29,6 +29,9 @@ def load_steps(thermal: Thermal) -> list[LoadStep]:
 
     Heating divides the range from the reference to the peak into equal steps; cooling takes the same steps in reverse.
     Melting and solidification are separate load steps.
+
+    Returns:
+        Temperature [K] and displacement of the die's corner [m] of each step.
     """
     rise = (thermal.peak - thermal.reference) / thermal.steps
     way = [thermal.reference + rise * number for number in range(thermal.steps)] if rise > 0.0 else []
@@ -60,7 +63,7 @@ class HeatedForecast:
 
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
-    """Predict load steps, exchanges and effects."""
+    """Predict load steps, effects, and number of exchanges between solder and structure of a coupled reflow."""
     steps = load_steps(thermal)
     effects = thermal_effects(case, thermal, [step.temperature for step in steps])
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY
@@ -78,6 +81,9 @@ def problems(
         geometries: Geometry as drawn by joint name.
         thermal: Temperatures, and motion of the package.
         pitch: Distance of neighbouring joints [m].
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     yield from _no_time(solder, geometries)
     yield from _no_room(solder, min(geometry.gap for geometry in geometries.values()), thermal, pitch)

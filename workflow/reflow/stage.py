@@ -45,7 +45,15 @@ class Reflowed:
 
 
 def reflow(run: Run[PackageCase], folder: Path) -> Findings:
-    """Reflow the solder of the array; write shapes, records of the joints, and the pad table at solidification."""
+    """Reflow the solder of the array; write shapes, records of the joints, and the pad table at solidification.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.meshing.board.pads import lift_pads, read_pads, write_pads
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.scenes.products import write_shapes

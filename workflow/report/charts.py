@@ -117,6 +117,10 @@ def thin_samples(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArra
     Args:
         x: Ascending abscissae, shape (n,).
         y: Ordinates, shape (n,); a line with missing values is not reduced.
+
+    Returns:
+        Abscissae and ordinates of at most ``MOST_POINTS`` points, each of shape (m,); short lines are returned
+        unchanged.
     """
     if len(x) <= MOST_POINTS or not np.isfinite(y).all():
         return x, y

@@ -20,7 +20,7 @@ MARGIN = 0.35  # margin around the focus, as a share of its size
 
 
 def write_movie(scene: Scene, path: Path) -> None:
-    """Write the frames of a scene as a GIF, with the initial displacement scale of the page.
+    """Write the frames of a scene as an animated GIF, with the initial displacement scale of the page.
 
     Args:
         scene: Scene with two frames or more.

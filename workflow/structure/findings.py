@@ -27,7 +27,14 @@ Arrays = Mapping[str, NDArray]
 
 
 def of_mesh(elements: Mapping[str, int]) -> Findings:
-    """Return the numbers of elements of the layers as metrics."""
+    """Return the numbers of elements of the layers as metrics.
+
+    Args:
+        elements: Name of a layer -> number of its elements.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     counts = {f"elements_{layer}": metric(count) for layer, count in elements.items()}
     return Findings(metrics=counts | {"elements": metric(sum(elements.values()))})
 
@@ -36,6 +43,13 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
     """Collect metrics and health checks from the ``result.json`` of each solver.
 
     Names of all solvers but the first get the solver as a prefix.
+
+    Args:
+        results: Solver -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``,
+            ``coupling``), the main solver first.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     metrics: dict = {}
     health: dict = {}
@@ -52,7 +66,10 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
     Args:
         case: Case of a structure.
-        folders: Folder with the products of each solver; the first solver gives the main metrics.
+        folders: Solver -> folder with its products, which are read; the first solver gives the main metrics.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     from reflowshock.fem.output.compare_structures import solver_differences
 
@@ -78,12 +95,19 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
 
 def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
-    """Rename differences from a DNS to errors of the two-scale model."""
+    """Rename differences from a DNS, such as ``strain_difference``, to ``two_scale_strain_error``; values stay."""
     return {f"two_scale_{name.replace('_difference', '_error')}": value for name, value in differences.items()}
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return the ratios of core time and wall time of the coupled run to the DNS, without start-up, as metrics."""
+    """Return the cost of the coupled run over the cost of the DNS, without start-up, as metrics.
+
+    Args:
+        folders: Folders of the solvers "explicit" (the coupled run) and "dns", whose ``result.json`` is read.
+
+    Returns:
+        Metrics ``two_scale_dns_core_ratio`` (processor time) and ``two_scale_dns_time_ratio`` (wall time).
+    """
     results = [
         json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
     ]
@@ -96,19 +120,34 @@ def cost_ratio(folders: Mapping[str, Path]) -> dict:
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:
-    """Read the histories that a solver wrote."""
+    """Return the arrays of a solver's ``history.npz`` by name, such as ``time`` and ``displacement@<watch point>``.
+
+    Args:
+        folder: Folder of the solver.
+    """
     with np.load(folder / "history.npz") as arrays:
         return dict(arrays)
 
 
 def read_modes(folder: Path) -> list[dict]:
-    """Read the natural modes that a solver wrote, lowest first, or an empty list."""
+    """Read the natural modes that a solver wrote, lowest first; empty if it wrote none.
+
+    Args:
+        folder: Folder of the solver.
+
+    Returns:
+        Records with ``mode`` (number), ``frequency`` [Hz] and ``mass_fraction`` by axis.
+    """
     path = folder / "modes.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
 def read_positions(folder: Path) -> dict[str, tuple[float, float, float]]:
-    """Read the node position at which the motion of each watch point is recorded [m]."""
+    """Return, by watch point, the position of the node at which its motion is recorded, (x, y, z) [m].
+
+    Args:
+        folder: Folder of the solver, whose ``result.json`` is read.
+    """
     watch = json.loads((folder / "result.json").read_text(encoding="utf-8"))["model"]["watch"]
     return {name: point["node_at"] for name, point in watch.items()}
 
@@ -129,7 +168,15 @@ class Motion:
 
 
 def compare_with_references(case: StructureCase, motion: Motion) -> tuple[dict, dict]:
-    """Return metrics and health checks of all references of a case, for one solver."""
+    """Compare the motion that one solver computed with all references of a case.
+
+    Args:
+        case: Case of a structure.
+        motion: Natural modes, histories and positions of the watch points.
+
+    Returns:
+        Metrics (``value``, ``unit``) by name, and health checks (``value``, ``limit``, ``ok``) by name.
+    """
     metrics: dict = {}
     health: dict = {}
     for reference in case.references.values():
@@ -201,7 +248,11 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
 
 
 def truncated_waves(case: StructureCase) -> Iterator[Problem]:
-    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run."""
+    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, reference in case.references.items():
         if reference.kind == "layered_bar":
             roles = zip(("near", "far", "beyond"), [*reference.incident, reference.transmitted], strict=True)
@@ -238,7 +289,7 @@ def exact_velocities(
     Args:
         case: Case of a structure.
         reference: Reference solution of a bar.
-        positions: Position of each watch point [m].
+        positions: Position (x, y, z) of each watch point by name [m].
         times: Times, shape (n,) [s].
     """
     layers, pulse = layers_of(case), _pulse_of(case, reference.load)

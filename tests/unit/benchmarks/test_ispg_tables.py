@@ -22,7 +22,7 @@ def test_rows_are_computed_once(tmp_path, monkeypatch):
     asked, refused = [], ispg_tables.drop(16, 60)
     monkeypatch.setattr(results, "FOLDER", tmp_path)
     monkeypatch.setattr(ispg_tables, "TABLES", {"drops": [refused], "free": []})
-    monkeypatch.setattr(ispg_tables, "warm", lambda: asked.append("warm"))
+    monkeypatch.setattr(ispg_tables, "warm_up", lambda: asked.append("warm"))
     for arguments in ([], ["drops"], ["drops", "--again"]):
         monkeypatch.setattr("sys.argv", ["ispg_tables.py", *arguments])
         ispg_tables.main()

@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks.tension.free_pressure import FreeSurfacePressure, level_at
-from benchmarks.tension.half_level import filled, level_points
+from benchmarks.tension.half_level import fill_lattice, level_points
 from benchmarks.tension.pairwise import PAIRED, REACH, cohesion, strength
-from benchmarks.tension.scenes import start, unit_drop
+from benchmarks.tension.scenes import set_up_drop, unit_drop
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.smoothing import SUPPORT, slope
 
@@ -16,7 +16,7 @@ DROP = unit_drop(14, 0.2)
 
 def pulls(model):
     """Points, masses and accelerations by the model of a sphere of particles."""
-    simulation = start(DROP, model)
+    simulation = set_up_drop(DROP, model)
     points = np.stack(simulation.fields[:3], axis=1)
     return points, simulation.fields.mass, simulation.surface.accelerations(points, simulation.fields)
 
@@ -32,7 +32,7 @@ def test_forces_have_the_virial_of_the_tension_of_a_sphere(model, slack):
 
 def test_forces_between_pairs_have_the_tension_and_the_pressure_of_their_theory():
     """A film of particles placed with some disorder, periodic along x and y: gamma = integral of p_N - p_T."""
-    law = start(DROP, "pairwise").law
+    law = set_up_drop(DROP, "pairwise").law
     count, high, spacing = 16, 14, law.spacing
     places = np.meshgrid(np.arange(count), np.arange(count), np.arange(high), indexing="ij")
     points = spacing * np.stack(places, axis=-1).reshape(-1, 3)
@@ -52,7 +52,7 @@ def test_forces_between_pairs_have_the_tension_and_the_pressure_of_their_theory(
 
 
 def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
-    simulation = start(unit_drop(14, 0.2, contact_angle=np.radians(60.0)), "pairwise")
+    simulation = set_up_drop(unit_drop(14, 0.2, contact_angle=np.radians(60.0)), "pairwise")
     law, fields, surface = simulation.law, simulation.fields, simulation.surface
     points = np.stack(fields[:3], axis=1)
     with_wall, surface.law = surface.accelerations(points, fields), law._replace(mirror=0)
@@ -71,7 +71,7 @@ def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
 @pytest.mark.long
 def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
     """2 p G / rho completes the pair sums of a uniform pressure wherever |G| h exceeds the threshold."""
-    simulation = start(DROP, "free-surface pressure")
+    simulation = set_up_drop(DROP, "free-surface pressure")
     fields, surface = simulation.fields, simulation.surface
     points = np.stack(fields[:3], axis=1)
     pull = surface.accelerations(points, fields)
@@ -91,8 +91,8 @@ def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
 @pytest.mark.long
 def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     """Finely filled; the level lies inside the ball by a share of the square of the kernel over the radius."""
-    law = start(DROP, "free-surface pressure").law
-    points, volume = filled(lambda x: np.linalg.norm(x, axis=1) < 0.5, 0.5, law.spacing)
+    law = set_up_drop(DROP, "free-surface pressure").law
+    points, volume = fill_lattice(lambda x: np.linalg.norm(x, axis=1) < 0.5, 0.5, law.spacing)
     fields = flow.make_fields(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
     fields.mass[:] = volume
     radius = np.linalg.norm(level_points(points, volume, law.spacing, half=False), axis=1)
@@ -106,6 +106,6 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
 
 
 def test_a_surface_without_tension_does_nothing():
-    simulation = start(DROP, "free-surface pressure")
+    simulation = set_up_drop(DROP, "free-surface pressure")
     points = np.stack(simulation.fields[:3], axis=1)
     assert not FreeSurfacePressure(simulation.law, 0.0).accelerations(points, simulation.fields).any()
