@@ -57,7 +57,7 @@ def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
 
 
 def opaque_ratio(fraction: float) -> float:
-    """Return the critical step, relative to the larger step, above which one layer decays as much as two.
+    """Return the ratio of critical step to step above which one layer of cells decays a wave as much as two layers.
 
     Both steps are ``fraction`` of critical steps. The decay exponent doubles if arcosh(r x) = 2 arcosh(x).
     """
